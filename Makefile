@@ -30,9 +30,10 @@ quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 # Tests share the cores: a worker that has none left takes half of what another still has. Those of
 # real time (a robot's 20 ms) then run alone, also after a failure. With ARGS there may be none (5).
 # Without GARRY_TEST_ALL long ones are left out, of browsers and real time all but the essential ones,
-# and properties are tried with fewer examples.
+# and properties are tried with fewer examples. What only other targets run is not even read.
 left_out = $(if $(GARRY_TEST_ALL),,or long or ((browser or realtime) and not essential))
-some = $(1) -m pytest $(2) -m 'not (bench or screenshots $(left_out)) $(3)' $(ARGS) || [ $$? = 5 ]
+some = $(1) -m pytest $(2) --ignore tests/bench --ignore tests/screenshots \
+	-m 'not (bench or screenshots $(left_out)) $(3)' $(ARGS) || [ $$? = 5 ]
 shared = { $(call some,$(1),$(2) -n auto --maxprocesses 4 --dist worksteal,and not realtime $(3)); }
 alone = { $(call some,$(1),$(2),and realtime $(3)); }
 run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \
@@ -56,8 +57,9 @@ run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:80
 
 test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
 
+test-fast: export GARRY_TEST_FAST = 1
 test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time, wide and long ones
-	$(call shared,$(PYTHON),,and not (browser or server or wide))
+	$(call shared,$(PYTHON),--ignore tests/browser,and not (browser or server or wide))
 
 test-all: export GARRY_TEST_ALL = 1
 test-all: test-main test-postgres test-pure test-clocks ## Run all tests, before a merge

@@ -3,7 +3,7 @@
 from rehab.boards.models import Leaderboard
 from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
-from rehab.gestures.models import Gesture, GestureStep
+from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
@@ -22,7 +22,7 @@ from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
@@ -36,10 +36,10 @@ TRACKED = (
     Patient,
     Station,
     Device,
-    Measure,
+    MeasureDefinition,
     Protocol,
     ProtocolPhase,
-    Gesture,
+    ComposedGesture,
     GestureStep,
     FeedbackType,
     FeedbackBand,
@@ -58,6 +58,7 @@ __all__ = [
     "BoardCount",
     "BoardEntry",
     "Clinic",
+    "ComposedGesture",
     "Consent",
     "ConsentText",
     "Device",
@@ -65,13 +66,12 @@ __all__ = [
     "FamilyLink",
     "FeedbackBand",
     "FeedbackType",
-    "Gesture",
     "GestureStep",
     "HistoryEntry",
     "ImportTombstone",
     "Leaderboard",
     "LogSeal",
-    "Measure",
+    "MeasureDefinition",
     "Pairing",
     "Patient",
     "PinAttempts",

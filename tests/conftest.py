@@ -15,7 +15,7 @@ import hypothesis
 import pytest
 
 from tests.support import clock, matrix
-from tests.support.extent import EVERYTHING
+from tests.support.extent import EVERYTHING, FAST
 
 if TYPE_CHECKING:
     from tests.support.world import World
@@ -30,9 +30,10 @@ SHARED: dict[str, tuple[Callable[[pytest.Item], bool], Callable[[], None]]] = {}
 
 # How many examples a property is tried with that does not say so itself. A busy machine is no
 # fault of an example.
+hypothesis.settings.register_profile("fast", max_examples=10, deadline=None)
 hypothesis.settings.register_profile("quick", max_examples=25, deadline=None)
 hypothesis.settings.register_profile("full", max_examples=100, deadline=None)
-hypothesis.settings.load_profile("full" if EVERYTHING else "quick")
+hypothesis.settings.load_profile("full" if EVERYTHING else "fast" if FAST else "quick")
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m looks at the marks

@@ -14,7 +14,7 @@ from django.utils.text import slugify
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.gestures.models import Gesture, GestureStep
+from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.gestures.tracks import read_tracks
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import format_refusal
@@ -123,7 +123,7 @@ def describe_dry_run(run: DryRun) -> str:
     return words
 
 
-@admin.register(Gesture)
+@admin.register(ComposedGesture)
 class GestureAdmin(ScopedAdmin):
     """Gestures of the clinic."""
 
@@ -138,7 +138,9 @@ class GestureAdmin(ScopedAdmin):
     def get_urls(self) -> list[Any]:
         """Add the address of the floor's preview."""
         shown = path(
-            "preview/", self.admin_site.admin_view(self.preview), name="rehab_gesture_preview"
+            "preview/",
+            self.admin_site.admin_view(self.preview),
+            name="rehab_composedgesture_preview",
         )
         return [shown, *super().get_urls()]
 
@@ -176,7 +178,7 @@ class GestureAdmin(ScopedAdmin):
         return super().changelist_view(request, {"built_in": shown} | (extra_context or {}))
 
     @admin.display(description=_("simulated"))
-    def simulated(self, gesture: Gesture) -> str:
+    def simulated(self, gesture: ComposedGesture) -> str:
         """Return how long it takes and how far it goes, or what is wrong with it."""
         try:
             return describe_dry_run(dry_run(validate_gesture(gesture.to_data())))

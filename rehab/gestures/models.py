@@ -17,7 +17,7 @@ from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, check_name, to_data
 
 
-class Gesture(ClinicModel):
+class ComposedGesture(ClinicModel):
     """Steps that a robot of the clinic can perform where a session's cue names them."""
 
     scope = Scope(clinic="clinic")
@@ -80,7 +80,7 @@ class GestureStep(ScopedModel):
     scope = Scope(clinic="gesture__clinic")
 
     gesture = models.ForeignKey(
-        Gesture, on_delete=models.CASCADE, related_name="steps", verbose_name=_("gesture")
+        ComposedGesture, on_delete=models.CASCADE, related_name="steps", verbose_name=_("gesture")
     )
     position = models.PositiveSmallIntegerField(
         _("number"), help_text=_("Empty: after the row above.")

@@ -11,20 +11,20 @@ from rehab.people.web.refusals import format_refusal
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.score import read_score
 
-Entry = dict[str, Any]
+TrackEntry = dict[str, Any]
 
 EXAMPLES = {"lights": "0.5 green off", "notes": "0.5 440 0.2"}
 
 
-def read_tracks(lights: str, notes: str) -> dict[str, list[Entry]]:
+def read_tracks(lights: str, notes: str) -> dict[str, list[TrackEntry]]:
     """Return the tracks as a robot gets them; none where nothing is written.
 
     Raises ValidationError, by field, with the line and the cure.
     """
-    tracks: dict[str, list[Entry]] = {}
+    tracks: dict[str, list[TrackEntry]] = {}
     problems: dict[str, str] = {}
     for name, text, read in (("lights", lights, _read_light), ("notes", notes, _read_note)):
-        entries: list[Entry] = []
+        entries: list[TrackEntry] = []
         for number, line in enumerate(text.splitlines(), start=1):
             if words := line.split():
                 try:
@@ -43,7 +43,7 @@ def read_tracks(lights: str, notes: str) -> dict[str, list[Entry]]:
     return tracks
 
 
-def _read_light(words: list[str]) -> Entry:
+def _read_light(words: list[str]) -> TrackEntry:
     at_s, first, *rest = words
     second = rest.pop(0) if rest else "off"
     if rest:
@@ -51,7 +51,7 @@ def _read_light(words: list[str]) -> Entry:
     return {"at_s": float(at_s), "first": first, "second": second}
 
 
-def _read_note(words: list[str]) -> Entry:
+def _read_note(words: list[str]) -> TrackEntry:
     at_s, sound, *rest = words
     if not rest:
         return {"at_s": float(at_s), "melody": sound}

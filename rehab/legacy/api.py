@@ -22,7 +22,7 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.api import ORDERS, visible_sessions
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.schemas import FeedbackType
+from rehab.sessions.schemas import ValenceSlug
 
 router = Router(tags=["The paper's calls"])
 
@@ -58,7 +58,7 @@ class PaperSession(Schema):
 class PaperFilter(Paging):
     """Filters of a user's sessions."""
 
-    feedback_type: FeedbackType | None = None
+    feedback_type: ValenceSlug | None = None
 
 
 @router.get("/users/{code}", response=responses(PaperUser, 404))

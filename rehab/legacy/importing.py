@@ -11,7 +11,7 @@ from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Measure
+from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
@@ -36,7 +36,7 @@ class Importer:
             "participants": dict(database.participant_errors),
             "sessions": dict(database.session_errors),
         }
-        self._measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
+        self._measure = MeasureDefinition.everywhere.get(clinic=None, slug=A2.slug)
         self._zone = ZoneInfo(clinic.time_zone)
 
     def run(self) -> None:

@@ -25,7 +25,7 @@ SAME_GOAL = 0.02  # of the goal
 
 
 @dataclass(frozen=True, slots=True)
-class Walked:
+class SessionResult:
     """What one session came to: hit rate, mean value with feedback, and goal at its end."""
 
     hit_rate: float
@@ -69,7 +69,7 @@ def describe_ending(actor: Any, session: TrainingSession) -> dict[str, Any]:
     }
 
 
-def describe_change(today: Walked, last: Walked | None) -> str:
+def describe_change(today: SessionResult, last: SessionResult | None) -> str:
     """Return one sentence that is true of today and last time, and blames nobody."""
     if last is None:
         return _("Next time you can compare with today.")
@@ -94,7 +94,9 @@ def next_visit(actor: Any, session: TrainingSession, today: date) -> Visit | Non
     return visits.order_by("day").first()
 
 
-def _find_walked(actor: Any, session: TrainingSession) -> tuple[Walked | None, Walked | None]:
+def _find_walked(
+    actor: Any, session: TrainingSession
+) -> tuple[SessionResult | None, SessionResult | None]:
     """Return this session and the one before that compares: same measure, walked alike, counted."""
     seen = TrainingSession.objects.visible_to(actor)
     before = seen.filter(
@@ -108,18 +110,18 @@ def _find_walked(actor: Any, session: TrainingSession) -> tuple[Walked | None, W
         metrics__slug="hit_rate",
     ).order_by("-created_at", "-pk")
     wanted = [session.pk, *before.values_list("pk", flat=True)[:1]]
-    found: dict[int, Walked] = {}
+    found: dict[int, SessionResult] = {}
     for point in load_trend(actor, seen.filter(pk__in=wanted)):
         if point.hit_rate is None:  # nobody counted hits there
             continue
         steps = Step.objects.visible_to(actor).filter(session=point.session, goal__isnull=False)
         goal = steps.order_by("-number").values_list("goal", flat=True).first()
         mean = point.with_feedback.mean if point.with_feedback else None
-        found[point.session.pk] = Walked(point.hit_rate, mean, goal)
+        found[point.session.pk] = SessionResult(point.hit_rate, mean, goal)
     return found.get(session.pk), found.get(wanted[-1]) if len(wanted) > 1 else None
 
 
-def _hit_bars(today: Walked, last: Walked | None) -> list[Bar]:
+def _hit_bars(today: SessionResult, last: SessionResult | None) -> list[Bar]:
     return [
         Bar(
             label,
@@ -130,7 +132,7 @@ def _hit_bars(today: Walked, last: Walked | None) -> list[Bar]:
     ]
 
 
-def _mean_bars(today: Walked, last: Walked | None, unit: str) -> list[Bar]:
+def _mean_bars(today: SessionResult, last: SessionResult | None, unit: str) -> list[Bar]:
     known = [(label, one.mean) for label, one in _labeled(today, last) if one.mean is not None]
     longest = max((mean for _label, mean in known), default=0.0)
     return [
@@ -140,5 +142,5 @@ def _mean_bars(today: Walked, last: Walked | None, unit: str) -> list[Bar]:
     ]
 
 
-def _labeled(today: Walked, last: Walked | None) -> list[tuple[str, Walked]]:
+def _labeled(today: SessionResult, last: SessionResult | None) -> list[tuple[str, SessionResult]]:
     return [(_("Today"), today), *([(_("Last time"), last)] if last else [])]

@@ -53,7 +53,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "PinAttempts": {},
     "Visit": {Role.LEAD: Right.ALL, Role.PT: Right.ALL},
     "FamilyLink": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
-    "Measure": {
+    "MeasureDefinition": {
         Role.HOST: Right.EDIT,
         Role.LEAD: Right.EDIT,
         Role.PT: Right.VIEW,
@@ -78,7 +78,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.VIEW,
         Role.RESEARCHER: Right.VIEW,
     },
-    "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "ComposedGesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "FeedbackType": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "FeedbackBand": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},

@@ -42,7 +42,7 @@ from rehab.sessions.schemas import (
     StepPage,
 )
 from rehab.sessions.services import change_session
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import NotAllowed
@@ -81,7 +81,7 @@ def list_protocols(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_measures(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List what sessions may train."""
-    return paginate(Measure.objects.visible_to(caller(request)).order_by("pk"), wanted)
+    return paginate(MeasureDefinition.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
 @router.get("/stations", response=responses(Page[NamedRow]))

@@ -16,7 +16,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicModel
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ENDED_STATES, OPEN_STATES, State
@@ -110,7 +110,10 @@ class TrainingSession(ClinicModel):
         verbose_name=_("protocol"),
     )
     measure = models.ForeignKey(
-        Measure, on_delete=models.PROTECT, related_name="sessions", verbose_name=_("measure")
+        MeasureDefinition,
+        on_delete=models.PROTECT,
+        related_name="sessions",
+        verbose_name=_("measure"),
     )
     created_by = models.ForeignKey(
         User,

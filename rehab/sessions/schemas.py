@@ -33,7 +33,7 @@ from rehab.training.valences import VALENCES, find_valence
 
 STEPS_MAX = 1000
 ShortLine = Annotated[TextLine, Field(max_length=MAX_DEVICE_LETTERS)]
-FeedbackType = Annotated[
+ValenceSlug = Annotated[
     str,
     AfterValidator(lambda slug: find_valence(slug).slug),
     Field(json_schema_extra={"enum": list(VALENCES)}),
@@ -111,7 +111,7 @@ class SessionFilter(Paging):
 
     patient: Key | None = None
     pseudonym: ShortText | None = None
-    feedback_type: FeedbackType | None = None
+    feedback_type: ValenceSlug | None = None
     state: State | None = None
     since: AwareDatetime | None = Field(None, description="Created at this moment or later.")
     until: AwareDatetime | None = Field(None, description="Created before this moment.")
@@ -137,7 +137,7 @@ class SessionRequestBody(RequestBody):
     """A new session. What is left out is like the patient's last time."""
 
     patient: Key
-    feedback_type: FeedbackType = optional()
+    feedback_type: ValenceSlug = optional()
     measure: Key = optional(description="What is trained, as `GET /measures` lists it.")
     goal: float = optional(description="In the measure's unit, or give `goal_percent`.")
     goal_percent: float = optional(description="Percent of the baseline.")

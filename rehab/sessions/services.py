@@ -18,7 +18,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import ask
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.adaptation import GoalAdaptation
@@ -54,7 +54,7 @@ class SessionRequest:
     goal: GoalRule
     phases: Iterable[Phase] | None = None
     protocol: Protocol | None = None
-    measure: Measure | None = None
+    measure: MeasureDefinition | None = None
     trained_side: Side | None = None
     target: Target = field(default_factory=Target)
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
@@ -94,7 +94,7 @@ def create_session(request: SessionRequest) -> TrainingSession:
     StationTaken, or CrossClinic (patient, station and the rest are not of one clinic).
     """
     patient, station = request.patient, request.station
-    measure = request.measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
+    measure = request.measure or MeasureDefinition.everywhere.get(clinic=None, slug=A2.slug)
     plan = _make_plan(request, measure)
     session = TrainingSession(
         clinic_id=patient.clinic_id,
@@ -134,7 +134,7 @@ def _announce(session: TrainingSession) -> None:
         live.loop.call_soon_threadsafe(live.announce, session.pk, session.station_id)
 
 
-def _make_plan(request: SessionRequest, measure: Measure) -> SessionPlan:
+def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPlan:
     """Return the plan of a session. Raises InvalidSetting for one that could not be walked."""
     patient, phases = request.patient, request.phases
     if phases is None:

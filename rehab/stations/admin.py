@@ -51,7 +51,7 @@ class DeviceInline(ScopedOptions, admin.TabularInline):
         return format_device_state(device, timezone.now())
 
 
-class StationForm(PinForm, ClinicForm):
+class StationAdminForm(PinForm, ClinicForm):
     """A station with its PIN."""
 
 
@@ -59,7 +59,7 @@ class StationForm(PinForm, ClinicForm):
 class StationAdmin(ScopedAdmin):
     """Stations of the clinic, each with its devices."""
 
-    form = StationForm
+    form = StationAdminForm
     fields = ("name", "pin", "no_pin")
     list_display = ("name", "tablets", "sources", "robots", "has_pin")
     search_fields = ("name", "devices__name")

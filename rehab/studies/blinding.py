@@ -13,7 +13,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.studies.models import Arm, Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment, StudyEvent
-from rehab.studies.registration import check_no_open_session, lock, note
+from rehab.studies.registration.lifecycle import check_no_open_session, lock, note
 from rehab.training.measures import InvalidSetting
 
 Task = StudyMark.Task

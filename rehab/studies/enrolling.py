@@ -17,7 +17,7 @@ from rehab.sessions.formatting import clinic_time
 from rehab.studies.allocation.groups import Allocated
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
-from rehab.studies.registration import (
+from rehab.studies.registration.lifecycle import (
     check_no_open_session,
     check_secret,
     current_version,

@@ -19,15 +19,15 @@ from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.services import check_station_is_free
 from rehab.sessions.setup.answers import USUAL_ANSWERS
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.stations.models import Station
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
-from rehab.studies.document import describe
 from rehab.studies.models import OUTCOMES, SCHEDULE_FIELDS, Arm, Study
-from rehab.studies.registration import check_secret
-from rehab.studies.sealing import seal, unseal
+from rehab.studies.registration.document import describe
+from rehab.studies.registration.lifecycle import check_secret
+from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.visits import Place
 from rehab.training.measures import A2, InvalidSetting
 
@@ -157,7 +157,7 @@ class ArmForm(forms.ModelForm):
     def __init__(self, *args: Any, by: User, is_fixed: bool, **options: Any) -> None:
         super().__init__(*args, **options)
         fields: dict[str, Any] = self.fields
-        fields["measure"].queryset = Measure.objects.visible_to(by)
+        fields["measure"].queryset = MeasureDefinition.objects.visible_to(by)
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         if self.instance.pk is None:
             usual = fields["measure"].queryset.filter(clinic=None, slug=A2.slug).first()

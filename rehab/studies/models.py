@@ -15,7 +15,7 @@ from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_schedule
 from rehab.sessions.setup.answers import SCHEDULES, USUAL_ANSWERS, read_schedule
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
 from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
@@ -219,7 +219,7 @@ class Arm(ScopedModel):
         validators=[MinValueValidator(1), MaxValueValidator(50)],
     )
     measure = models.ForeignKey(
-        Measure, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
+        MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
     )
     # None once it was deleted; what was walked stands in the study's versions.
     protocol = models.ForeignKey(

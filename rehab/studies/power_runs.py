@@ -14,7 +14,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import User
 from rehab.people.scope import Scope, ScopedModel
 from rehab.studies.models import Study
-from rehab.studies.simulation.power import Found, PairPower, simulate_from, summarize
+from rehab.studies.simulation.power import PairPower, SimulatedDifference, simulate_from, summarize
 from rehab.studies.simulation.trial import Trial, walkable
 from rehab.studies.simulation.walkers import Population
 from rehab.training.goals import GoalRule
@@ -83,7 +83,9 @@ class PowerRun(ScopedModel):
     @property
     def power(self) -> list[PairPower]:
         """What the simulated studies found, for each pair of arms."""
-        return summarize([Found(*row) for rows in self.found.values() for row in rows])
+        return summarize(
+            [SimulatedDifference(*row) for rows in self.found.values() for row in rows]
+        )
 
     def build_trial(self) -> Trial:
         """Return the study to simulate. Raises InvalidSetting."""

@@ -15,7 +15,7 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
-from rehab.studies.registration import current_version
+from rehab.studies.registration.lifecycle import current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting, Measure
+from robot.marking import gettext_noop
 
 # Strides that a suggestion looks back on: about 20 s of the trained leg, as the PT's page shows.
 SUGGESTION_STRIDES = 20

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting
+from robot.marking import gettext_noop
 
 
 class State(StrEnum):

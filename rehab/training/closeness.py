@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting
+from robot.marking import gettext_noop
 
 CLOSE_WORDS = gettext_noop("About at the goal.")
 # Standard deviations from the middle of a 95 % interval to its ends, of normal errors.

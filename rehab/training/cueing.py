@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting
+from robot.marking import gettext_noop
 
 # The paper's default (P 3.4.1): the robot responds to windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90

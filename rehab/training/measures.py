@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rehab.training.marking import Marked, gettext_noop
+from robot.marking import Marked, TranslatableError, gettext_noop
 
 GAIN_MIN = 0.5
 GAIN_MAX = 1.5
@@ -14,20 +14,8 @@ BOUND_MAX = 1e9
 A2_SD = "a2_sd_w_kg"  # how sources call the standard deviation of A2
 
 
-class InvalidSetting(ValueError):
-    """A setting that cannot be used; the message says what would be accepted.
-
-    Parameters
-    ----------
-    template
-        An English sentence with places for values; pages translate it.
-    values
-        What stands in its places.
-    """
-
-    def __init__(self, template: str, /, **values: object) -> None:
-        super().__init__(template.format(**values) if values else template)
-        self.template, self.values = template, values
+class InvalidSetting(TranslatableError):
+    """A setting that cannot be used; the message says what would be accepted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting, check_baseline_percent, check_gain
+from robot.marking import gettext_noop
 
 REST_MAX_S = 3600.0
 

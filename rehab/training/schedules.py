@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting
+from robot.marking import gettext_noop
 
 INTERVAL_MAX = 100
 

@@ -12,8 +12,8 @@ from enum import StrEnum
 from itertools import pairwise
 
 from rehab.training.bands import BANDS_MAX, TEXT_MAX, Band, Confetti
-from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
+from robot.marking import Marked, gettext_noop
 
 # Larger numbers tell a patient nothing more, and overflow where points are stored.
 POINTS_MAX = 1000

@@ -18,8 +18,8 @@ from robot.bases.drive_train import (
     DriveTrain,
 )
 from robot.bases.kobuki_protocol.wheels import TICK_M, WHEELBASE_M, wheel_speeds
+from robot.bases.odometry import Odometry
 from robot.motion.limits import ORDER_HOLDS_S, TICK_S, WHEEL_LIMITS
-from robot.motion.odometry import Odometry
 from robot.motion.pose import HOME, advance
 from robot.motion.response import Response
 from robot.motion.twist import STILL, Twist
@@ -29,7 +29,7 @@ GYRO_DIGIT_RAD = math.radians(0.01)
 
 
 @dataclass(frozen=True, slots=True)
-class Faults:
+class Imperfections:
     """How a simulated base differs from an ideal one. The defaults are an ordinary Kobuki's.
 
     Parameters
@@ -56,8 +56,8 @@ class Faults:
     held: float = 0.0
 
 
-ORDINARY = Faults()
-IDEAL = Faults(0.0, 0.0, 0.0, has_noise=False, drift_deg_min=0.0)
+ORDINARY = Imperfections()
+IDEAL = Imperfections(0.0, 0.0, 0.0, has_noise=False, drift_deg_min=0.0)
 
 
 class KinematicBase(MobileBase):
@@ -74,7 +74,7 @@ class KinematicBase(MobileBase):
     name: ClassVar[str] = "kinematic"
     abilities = Abilities(simulated=True, moves=True)
 
-    def __init__(self, monotonic: Callable[[], float], faults: Faults = ORDINARY) -> None:
+    def __init__(self, monotonic: Callable[[], float], faults: Imperfections = ORDINARY) -> None:
         self._monotonic, self._faults = monotonic, faults
         self._drive_train = DriveTrain(faults.dead_time_s, faults.lag_s, faults.stiction_m_s)
         self.held = faults.held

@@ -13,7 +13,7 @@ from robot.bases.hazards import UNORDERED, StillWatch, UnreadHazards
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,
-    Melody,
+    MelodyCode,
     Output,
     RequestExtra,
     Sound,
@@ -24,8 +24,8 @@ from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
 from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
 from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_to_twist, twist_to_control
+from robot.bases.odometry import Odometry
 from robot.motion.limits import WHEEL_LIMITS
-from robot.motion.odometry import Odometry
 from robot.motion.response import Response
 from robot.motion.score import Color, Note
 from robot.motion.twist import STILL, Twist
@@ -47,7 +47,7 @@ LIGHTS = {
     Indication.MOVING: Output.LED1_ORANGE,
     Indication.STOPPED: Output.LED1_RED,
 }
-SOUNDS = {Indication.STOPPED: Melody.ERROR}
+SOUNDS = {Indication.STOPPED: MelodyCode.ERROR}
 COLORS = {
     Color.OFF: (Output(0), Output(0)),
     Color.GREEN: (Output.LED1_GREEN, Output.LED2_GREEN),
@@ -72,7 +72,7 @@ class KobukiBase(MobileBase):
         self._odometry = Odometry(WHEELBASE_M)
         self._estimate: Estimate | None = None
         self._opened = 0
-        self._seen_s = self._begun_s = monotonic()
+        self._seen_s = monotonic()
         self._unread, self._still_watch = UnreadHazards(), StillWatch()
         self._felt: frozenset[str] = frozenset()  # in the newest frame
         self._lights, self._sound = LIGHTS[Indication.WAITING], b""
@@ -201,7 +201,7 @@ class KobukiBase(MobileBase):
     def play(self, note: Note) -> None:
         """Play a note of a gesture's score."""
         if note.melody is not None:
-            self._sound = encode_commands(SoundSequence(Melody[note.melody.name]))
+            self._sound = encode_commands(SoundSequence(MelodyCode[note.melody.name]))
         else:
             self._sound = encode_commands(Sound.at(note.frequency_hz, note.duration_s))
 

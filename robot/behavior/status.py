@@ -23,7 +23,7 @@ STATUS_MOVING_S = 0.25
 STATUS_IDLE_S = 1.0
 REPORTS_KEPT = 64  # while nobody sends them, the oldest are dropped
 
-State = tuple[str, str]  # the robot's state, and why it would not perform now
+RobotState = tuple[str, str]  # the robot's state, and why it would not perform now
 
 
 class StatusReporter:
@@ -51,7 +51,7 @@ class StatusReporter:
         if not base.abilities.notes:
             self._aloud.add(Indication.MOVING)
         self._reported_s: float | None = None  # the last status
-        self._reported: State | None = None
+        self._reported: RobotState | None = None
         self._indication: Indication | None = None
 
     def reset(self) -> None:
@@ -71,7 +71,7 @@ class StatusReporter:
     def report_status(
         self,
         now_s: float,
-        state: State,
+        state: RobotState,
         there: BaseState,
         gesture: Gesture | None,
         lights: tuple[Color, Color] | None,
@@ -98,7 +98,7 @@ class StatusReporter:
             }
         )
 
-    def show(self, state: State, *, is_quiet: bool) -> None:
+    def show(self, state: RobotState, *, is_quiet: bool) -> None:
         """Show a state by the base's lights, and by a sound unless it is quiet."""
         match state:
             case "stopped", _:

@@ -2,30 +2,13 @@
 
 from __future__ import annotations
 
-
-def gettext_noop(text: str) -> str:
-    """Return the text, marked for translation by the server; a robot translates nothing."""
-    return text
-
+from robot.marking import Marked, TranslatableError, gettext_noop
 
 NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
 
 
-class Marked(str):
-    """A word within a message, translated separately."""
-
-    __slots__ = ()
-
-
-class BadGesture(ValueError):
-    """A gesture that no base may perform; the message names the cure.
-
-    The message is ``template`` with ``values`` filled in, so that pages can translate it.
-    """
-
-    def __init__(self, template: str, /, **values: object) -> None:
-        super().__init__(template.format(**values) if values else template)
-        self.template, self.values = template, values
+class BadGesture(TranslatableError):
+    """A gesture that no base may perform; the message names the cure."""
 
 
 class BadWaypoint(BadGesture):

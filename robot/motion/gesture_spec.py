@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+from robot.marking import Marked
 from robot.motion.gesture import (
     GESTURE_MAX_S,
     VISIBLE_M,
@@ -22,7 +23,7 @@ from robot.motion.gesture import (
     needed_time_s,
     stages,
 )
-from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint, Marked
+from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME, Pose
@@ -178,11 +179,6 @@ def _check_move(number: int, move: Move) -> None:
         raise BadGesture(
             "Step {number} turns by less than 1°, which nobody sees. Turn further.", number=number
         )
-
-
-def step_poses(moves: Sequence[Move]) -> list[Pose]:
-    """Return the pose at the end of each step, seen from home."""
-    return [step[-1].pose for step in _to_waypoints(moves)]
 
 
 def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:

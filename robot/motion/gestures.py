@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from robot.marking import gettext_noop
 from robot.motion.gesture import Gesture, Waypoint
-from robot.motion.gesture_errors import gettext_noop
 from robot.motion.score import FALLING, RISING
 
 # Up to 3 s each, so that a base that answers late is home and still before the next window of 5 s

@@ -23,8 +23,9 @@ from rehab.people.roles import Role
 from rehab.sessions import api as sessions_api
 from rehab.sessions.models import TrainingSession
 from tests.support.identities import find_identities, identifying_texts
+from tests.support.marks import mark
 from tests.support.programs import ROOT, program_of
-from tests.support.world import Actor, World, build_world, mark, scoped_models, signed_in
+from tests.support.world import Actor, World, build_world, scoped_models, signed_in
 
 pytestmark = pytest.mark.django_db
 

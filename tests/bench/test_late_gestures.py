@@ -6,7 +6,7 @@ Nobody tells the player how late the base is.
 
 import pytest
 
-from robot.bases.kinematic import Faults
+from robot.bases.kinematic import Imperfections
 from robot.motion.gestures import GESTURES, ORIGINALS
 from tests.support.gesture_runs import play_in_a_row
 
@@ -25,7 +25,9 @@ def test_they_end_at_home(name):
     for dead_time_s in DEAD_TIMES_S:
         line = f"  {1000 * dead_time_s:3.0f} ms"
         for lag_s in LAGS_S:
-            faults = Faults(dead_time_s, lag_s, left_scale=1 - SLIP, drift_deg_min=DRIFT_DEG_MIN)
+            faults = Imperfections(
+                dead_time_s, lag_s, left_scale=1 - SLIP, drift_deg_min=DRIFT_DEG_MIN
+            )
             played = play_in_a_row((GESTURES | ORIGINALS)[name], faults, TIMES)
             outcomes = {one.outcome for one in played}
             took_s = max(one.took_s for one in played)

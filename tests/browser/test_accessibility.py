@@ -75,7 +75,7 @@ ADMIN_PAGES = [
     "/admin/rehab/protocol/{protocol}/delete/",
     "/admin/rehab/protocol/{protocol}/history/",
     "/admin/rehab/preset/add/",
-    "/admin/rehab/gesture/add/",
+    "/admin/rehab/composedgesture/add/",
     "/admin/rehab/station/{station}/change/",
     "/admin/rehab/leaderboard/",
     "/admin/rehab/leaderboard/add/",

@@ -36,9 +36,9 @@ STATUS = {
 
 
 SEED = """
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from rehab.people.sign_in.first_start import first_clinic
-wave = Gesture.everywhere.create(clinic=first_clinic(), name="wave")
+wave = ComposedGesture.everywhere.create(clinic=first_clinic(), name="wave")
 wave.steps.create(position=1, turn_deg=40)
 wave.steps.create(position=2, forward_m=0.1)
 wave.steps.create(position=3, forward_m=-0.1)
@@ -167,7 +167,7 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, browser):
     context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
     page = context.new_page()
     page.add_init_script(LISTEN)
-    page.goto(f"/admin/rehab/gesture/{made}/change/")
+    page.goto(f"/admin/rehab/composedgesture/{made}/change/")
     scene, base = page.locator(".gesture-floor svg"), page.locator(".gesture-floor .robot-base")
     box = scene.bounding_box()
     assert box is not None
@@ -184,7 +184,7 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, browser):
     assert (x_m, y_m, heading_rad) == pytest.approx((0, 0, 0), abs=0.03)
     assert page.evaluate("window.heard") == [440]
 
-    page.goto("/admin/rehab/gesture/add/")
+    page.goto("/admin/rehab/composedgesture/add/")
     page.fill("#id_name", "Big hello")
 
     def place(ahead_m: float, left_m: float) -> tuple[float, float]:

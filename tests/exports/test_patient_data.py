@@ -5,11 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 import secrets
 import tracemalloc
 from datetime import date, datetime, time
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,8 +17,6 @@ from django.db import connection
 from django.test import AsyncClient, Client
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rehab.boards.models import Leaderboard
 from rehab.boards.rows import BoardEntry
@@ -33,8 +29,6 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.people.web import csv_tables
-from rehab.people.web.csv_tables import format_cell
 from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -42,8 +36,9 @@ from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.archives import body_of, open_archive, rows_of
+from tests.support.marks import mark
 from tests.support.walks import walk
-from tests.support.world import NOW, World, build_world, client_of, mark
+from tests.support.world import NOW, World, build_world, client_of
 
 NAMED = {Patient, User, Station}
 
@@ -273,54 +268,6 @@ def test_therapists_and_strangers_do_not_take_all_sessions_along(world):
     assert Client().get(reverse("export-sessions")).status_code == 302
     url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
     assert client_of(world, Role.RESEARCHER).get(url).status_code == 403
-
-
-# --- cells ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r", "\n", "'"])
-def test_no_text_is_a_formula_and_all_can_be_told_back(start):
-    text = f'{start}HYPERLINK("http://example.org")'
-    cell = format_cell(text)
-    assert cell == f"'{text}"
-    assert cell[1:] == text
-
-
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "＝", "'"])
-@pytest.mark.parametrize("behind", [";", "\t", "\n", "a;b;"])
-def test_no_text_is_a_formula_behind_what_splits_a_line_elsewhere(behind, start):
-    assert format_cell(f"x{behind}{start}1+1") == f"x{behind}'{start}1+1"
-    assert format_cell(f"x{start}1") == f"x{start}1"
-
-
-@given(st.text(alphabet="=+-@';\t\r\n\"ax, "))
-def test_every_quoted_text_is_told_back(text):
-    cell = format_cell(text)
-    parts = re.split("[;\t\r\n]", cell)
-    assert not any(part.startswith(("=", "+", "-", "@")) for part in parts)
-    assert re.sub(r"(?:^|(?<=[;\t\r\n]))'(?=[=+\-@\t\r\n'])", "", cell) == text
-
-
-@given(st.one_of(st.floats(allow_nan=False), st.integers(), st.text(), st.booleans(), st.none()))
-def test_any_value_is_read_back_as_it_was(value):
-    text = "".join(write_csv(["value", "end"], [(value, "end")]))
-    (row,) = rows_of(text)
-    cell = row["value"]
-    if isinstance(value, str):
-        assert cell.replace("'", "") == value.replace("'", "")
-        assert not cell.startswith(("=", "+", "-", "@", "\t", "\r", "\n"))
-    elif isinstance(value, bool) or value is None:
-        assert cell == {True: "true", False: "false", None: ""}[value]
-    else:
-        assert type(value)(cell) == value
-
-
-def test_every_table_for_spreadsheets_is_written_in_one_place():
-    """So that no new export can forget the quotes. Other modules read CSV, or write no text."""
-    root = Path(csv_tables.__file__).parents[2]
-    writers = re.compile(r"csv\.writer|DictWriter")
-    writing = [file.name for file in root.rglob("*.py") if writers.search(file.read_text())]
-    assert writing == ["csv_tables.py"]
 
 
 def test_a_nickname_that_is_a_formula_stays_text(world):

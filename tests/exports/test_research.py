@@ -30,7 +30,7 @@ from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import read_recording
 from rehab.studies.enrolling import withdraw
-from rehab.studies.registration import close
+from rehab.studies.registration.lifecycle import close
 from rehab.studies.visits import Place, next_visit, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.fold import SessionFold

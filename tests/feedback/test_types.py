@@ -12,7 +12,8 @@ from rehab.feedback.translation import pick_words
 from rehab.people.roles import Role
 from rehab.training.valences import VALENCES, CueGestures
 from tests.support.forms import feedback_form
-from tests.support.world import client_of, mark
+from tests.support.marks import mark
+from tests.support.world import client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from django.test import Client
 
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from tests.support.forms import gesture_form
@@ -18,7 +18,7 @@ from tests.support.world import World, build_world, client_of
 pytestmark = pytest.mark.django_db
 
 WAVE: list[dict[str, Any]] = [{"turn_deg": 30}, {"turn_deg": -60, "hold_s": 0.5}, {"turn_deg": 30}]
-ADD = "/admin/rehab/gesture/add/"
+ADD = "/admin/rehab/composedgesture/add/"
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def complaints(page: Any) -> list[str]:
 def test_a_pt_composes_a_gesture_for_the_clinic(pt, world):
     answer = pt.post(ADD, gesture_form("wave", [*WAVE, {}, {}]))  # rows left as they came are none
     assert answer.status_code == 302
-    wave = Gesture.everywhere.get(name="wave")
+    wave = ComposedGesture.everywhere.get(name="wave")
     assert wave.clinic == world.clinic
     rows = list(wave.steps.values_list("position", "turn_deg", "hold_s"))
     assert rows == [(1, 30, 0), (2, -60, 0.5), (3, 30, 0)]
@@ -45,7 +45,7 @@ def test_a_pt_composes_a_gesture_for_the_clinic(pt, world):
 def test_numbers_say_the_order(pt):
     steps = [WAVE[1] | {"position": 20}, WAVE[0] | {"position": 10}, WAVE[2]]
     pt.post(ADD, gesture_form("wave", steps))
-    wave = Gesture.everywhere.get(name="wave")
+    wave = ComposedGesture.everywhere.get(name="wave")
     assert [move.hold_s for move in wave.to_moves()] == [0, 0.5, 0]
     assert list(wave.steps.values_list("position", flat=True)) == [10, 20, 21]
 
@@ -80,7 +80,7 @@ def test_what_no_robot_plays_is_refused_with_the_cure(pt, world, steps, cure):
     assert page.status_code == 200
     (complaint,) = complaints(page)
     assert complaint.startswith(cure)
-    assert not Gesture.everywhere.filter(name="wave").exists()
+    assert not ComposedGesture.everywhere.filter(name="wave").exists()
 
 
 @pytest.mark.parametrize(
@@ -98,21 +98,21 @@ def test_names_are_short_and_the_clinic_s_own(pt, name, words):
 
 
 def test_two_clinics_may_use_a_name_but_none_twice(pt):
-    Gesture.everywhere.create(clinic=build_world("birch").clinic, name="wave")
+    ComposedGesture.everywhere.create(clinic=build_world("birch").clinic, name="wave")
     assert pt.post(ADD, gesture_form("wave", WAVE)).status_code == 302
     page = pt.post(ADD, gesture_form("wave", WAVE))
     assert page.status_code == 200
-    assert Gesture.everywhere.filter(name="wave").count() == 2
+    assert ComposedGesture.everywhere.filter(name="wave").count() == 2
 
 
 def test_a_name_is_written_as_people_write(pt):
     assert pt.post(ADD, gesture_form("Slow wave", WAVE)).status_code == 302
-    assert Gesture.everywhere.get(name="slow-wave").to_data()["name"] == "slow-wave"
+    assert ComposedGesture.everywhere.get(name="slow-wave").to_data()["name"] == "slow-wave"
 
 
 def simulate(pt: Client, steps: Any, **tracks: str) -> dict[str, Any]:
     """Return what the floor of the form is told of steps, lights and notes."""
-    answer = pt.get("/admin/rehab/gesture/preview/", {"steps": json.dumps(steps)} | tracks)
+    answer = pt.get("/admin/rehab/composedgesture/preview/", {"steps": json.dumps(steps)} | tracks)
     told: dict[str, Any] = answer.json()
     return told
 
@@ -137,20 +137,20 @@ def test_the_floor_is_told_what_steps_would_do(pt):
 
 
 def test_the_list_shows_those_that_every_robot_knows(pt):
-    page = pt.get("/admin/rehab/gesture/").content.decode()
+    page = pt.get("/admin/rehab/composedgesture/").content.decode()
     assert page.count("data-preview=") == len(GESTURES) + len(ORIGINALS) == 7
     assert "Celebrate: a step ahead and a wiggle" in page
 
 
 def test_a_change_is_simulated_as_a_whole(pt):
     pt.post(ADD, gesture_form("wave", WAVE))
-    wave = Gesture.everywhere.get(name="wave")
+    wave = ComposedGesture.everywhere.get(name="wave")
     stored = [
         step | {"id": row.pk, "gesture": wave.pk, "position": row.position}
         for step, row in zip(WAVE, wave.steps.all(), strict=True)
     ]
     stored[2] |= {"DELETE": "on"}
-    url = f"/admin/rehab/gesture/{wave.pk}/change/"
+    url = f"/admin/rehab/composedgesture/{wave.pk}/change/"
     page = pt.post(url, gesture_form("wave", stored, stored=3))
     assert "It ends turned by 30° to the right" in complaints(page)[0]
     page = pt.post(url, gesture_form("wave", [*stored, {"turn_deg": 30}], stored=3))
@@ -160,15 +160,15 @@ def test_a_change_is_simulated_as_a_whole(pt):
 
 def test_one_that_is_no_gesture_any_more_says_so(pt, world):
     """Limits may change with a release; what is stored is then refused."""
-    broken = Gesture.everywhere.create(clinic=world.clinic, name="broken")
+    broken = ComposedGesture.everywhere.create(clinic=world.clinic, name="broken")
     broken.steps.create(position=1, forward_m=0.2)
-    assert "It ends 20 cm from home" in pt.get("/admin/rehab/gesture/").content.decode()
+    assert "It ends 20 cm from home" in pt.get("/admin/rehab/composedgesture/").content.decode()
 
 
 def test_lights_and_notes_are_written_a_line_each_and_played(pt):
     tracks = {"lights": "0 orange\n\n 0.5 green green ", "notes": "0 440 0.1\n1.0 button"}
     assert pt.post(ADD, gesture_form("wave", WAVE) | tracks).status_code == 302
-    wave = Gesture.everywhere.get(name="wave")
+    wave = ComposedGesture.everywhere.get(name="wave")
     score = validate_gesture(wave.to_data()).score
     assert [(one.at_s, one.first, one.second) for one in score.lights] == [
         *((0, "orange", "off"), (0.5, "green", "green"))
@@ -195,4 +195,4 @@ def test_lights_and_notes_are_written_a_line_each_and_played(pt):
 def test_tracks_that_no_robot_plays_are_refused_with_the_cure(pt, tracks, cure):
     answer = pt.post(ADD, gesture_form("wave", WAVE) | tracks)
     assert any(cure in one for one in complaints(answer)), complaints(answer)
-    assert not Gesture.everywhere.filter(name="wave").exists()
+    assert not ComposedGesture.everywhere.filter(name="wave").exists()

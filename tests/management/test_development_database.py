@@ -15,8 +15,8 @@ from tests.support.servers import ROOT, clean_environment, free_port
 pytestmark = pytest.mark.server
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
+@pytest.fixture(params=["0001_initial", "0001_version_0_1"])
+def folder(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """A data folder with the traces by which such a database is known, and a row to lose."""
     database = sqlite3.connect(tmp_path / "garry.sqlite3")
     database.executescript(
@@ -25,13 +25,17 @@ def folder(tmp_path: Path) -> Path:
             id integer PRIMARY KEY, app varchar(255), name varchar(255), applied datetime);
         INSERT INTO django_migrations (app, name, applied)
             VALUES ('auth', '0001_initial', '2026-11-20 10:00:00'),
-                   ('rehab', '0001_initial', '2026-11-20 10:00:00'),
                    ('admin', '0001_initial', '2026-11-20 10:00:00'),
                    ('rehab', '0005_settle_tie_breakers', '2026-11-21 10:00:00');
         CREATE TABLE rehab_step (id integer PRIMARY KEY, number integer);
         INSERT INTO rehab_step (number) VALUES (1), (2);
         """
     )
+    first = ("rehab", request.param, "2026-11-20 10:00:00")
+    with database:
+        database.execute(
+            "INSERT INTO django_migrations (app, name, applied) VALUES (?, ?, ?)", first
+        )
     database.close()
     return tmp_path
 

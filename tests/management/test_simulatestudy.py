@@ -12,7 +12,7 @@ from django.core.management import CommandError, call_command
 
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Patient, User
-from rehab.studies.drawing import FIGURES, TABLES
+from rehab.studies.results.drawing import FIGURES, TABLES
 from rehab.studies.simulation.example import PHASES
 from tests.support.archives import rows_of
 

@@ -28,7 +28,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.support.world import NOW, World, build_world, client_of, mark, scoped_models
+from tests.support.marks import mark
+from tests.support.world import NOW, World, build_world, client_of, scoped_models
 
 pytestmark = pytest.mark.django_db
 

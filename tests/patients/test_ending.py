@@ -9,7 +9,7 @@ from datetime import time, timedelta
 import pytest
 from django.urls import reverse
 
-from rehab.patients.ending import Walked, describe_change
+from rehab.patients.ending import SessionResult, describe_change
 from rehab.patients.visits import plan_visit
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
@@ -45,7 +45,7 @@ def read(world: World, session: TrainingSession) -> str:
     ],
 )
 def test_the_sentence_is_true_of_both_days(rate: float, goal: float, said: str) -> None:
-    assert describe_change(Walked(rate, 2.0, goal), Walked(0.6, 2.0, 2.0)) == said
+    assert describe_change(SessionResult(rate, 2.0, goal), SessionResult(0.6, 2.0, 2.0)) == said
 
 
 def test_today_stands_beside_last_time(world, patient):

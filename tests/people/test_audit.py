@@ -26,12 +26,13 @@ from rehab.people.sign_in.factors.factors import Authenticator
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.extent import EVERYTHING
+from tests.support.marks import mark
 from tests.support.tenancy import Route, all_routes, walk_patterns
-from tests.support.world import NOW, client_of, mark
+from tests.support.world import NOW, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -80,7 +81,16 @@ SILENT = {
 def is_silent(name: str) -> bool:
     """Return, apart from the code under test, whether a route shows nothing of patients."""
     bare = {
-        *("clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"),
+        *(
+            "clinic",
+            "user",
+            "apitoken",
+            "station",
+            "device",
+            "measuredefinition",
+            "protocol",
+            "composedgesture",
+        ),
         *("feedbacktype", "preset", "questionnaire"),
     }
     return name in SILENT or any(name.startswith(f"admin:rehab_{noun}_") for noun in bare)
@@ -127,7 +137,7 @@ def test_which_admin_pages_lead_to_patients():
         name = f"admin:rehab_{model._meta.model_name}_changelist"
         assert access_log.leads_to_patients(model) != is_silent(name), model
     assert access_log.leads_to_patients(Step)
-    assert not any(map(access_log.leads_to_patients, (Clinic, Measure, Protocol, Device)))
+    assert not any(map(access_log.leads_to_patients, (Clinic, MeasureDefinition, Protocol, Device)))
 
 
 # --- who, whose, what -----------------------------------------------------------------------------

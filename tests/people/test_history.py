@@ -16,7 +16,8 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.stations.models import Device
 from rehab.stations.pins import set_pin
-from tests.support.world import build_world, client_of, mark
+from tests.support.marks import mark
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -102,7 +103,7 @@ def test_a_rows_page_tells_its_changes_and_those_of_its_parts(world):
     step.hold_s = 2.5
     step.save()
     GestureStep.everywhere.create(gesture=step.gesture, position=2, hold_s=1.0).delete()
-    url = reverse("admin:rehab_gesture_history", args=[step.gesture_id])
+    url = reverse("admin:rehab_composedgesture_history", args=[step.gesture_id])
     words = client_of(world, Role.LEAD).get(url).content.decode()
     assert "1.0 → 2.5" in words
     assert "Deleted: step" in words
@@ -130,7 +131,7 @@ def test_each_role_reads_the_changes_of_what_it_may_read_and_of_its_clinic(world
     assert not {"Patient", "User", "Device"} & researcher
     host = User.everywhere.create_user("host", role=Role.HOST)
     hosts = HistoryEntry.objects.visible_to(host).values_list("model_name", flat=True)
-    assert set(hosts) <= {"Clinic", "User", "Measure", "Protocol", "ProtocolPhase"}
+    assert set(hosts) <= {"Clinic", "User", "MeasureDefinition", "Protocol", "ProtocolPhase"}
 
 
 def test_who_may_not_see_a_row_does_not_see_its_changes(world):

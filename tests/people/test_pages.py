@@ -139,10 +139,10 @@ def test_a_host_makes_clinics_and_their_leads(world):
 
 
 def test_shared_rows_are_the_hosts_to_change(world):
-    from rehab.sessions.setup.protocols import Measure, Protocol
+    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 
     client = client_of(world, Role.LEAD)
-    for model in (Measure, Protocol):
+    for model in (MeasureDefinition, Protocol):
         shared = model.everywhere.filter(clinic=None).first()
         url = f"/admin/rehab/{model._meta.model_name}/{shared.pk}/"
         assert client.get(f"{url}change/").status_code == 200

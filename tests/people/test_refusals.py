@@ -17,7 +17,7 @@ from django.utils.translation import override
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, NotAllowed, State
 from rehab.training.controls import CONTROLS
@@ -142,7 +142,7 @@ def test_a_preset_is_refused_in_spanish(world):
     data = {
         "name": "x",
         "valence": "positive",
-        "measure": world.rows[Measure].pk,
+        "measure": world.rows[MeasureDefinition].pk,
         "goal_by": "value",
         "robot": "normal",
         "robot_above": "(usual)",
@@ -165,7 +165,7 @@ def test_a_feedback_type_is_refused_in_spanish(world):
 
 
 def test_a_gesture_is_refused_in_spanish(world):
-    url = reverse("admin:rehab_gesture_add")
+    url = reverse("admin:rehab_composedgesture_add")
     found = complaints(client_of(world), url, gesture_form("ola", [{"turn_deg": 30}]))
     assert "Termina con un giro de 30° a la izquierda." in found
     found = complaints(client_of(world), url, gesture_form("nod", [{"hold_s": 1}]))

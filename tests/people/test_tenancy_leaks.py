@@ -56,7 +56,15 @@ class NoScope(Scope):
 
 # Models that have pages, and where at least the matrix must find them shown to another clinic.
 SHOWN_UNDER = {
-    "/admin/": {"Patient", "Station", "Device", "Measure", "Protocol", "Gesture", "Leaderboard"}
+    "/admin/": {
+        "Patient",
+        "Station",
+        "Device",
+        "MeasureDefinition",
+        "Protocol",
+        "ComposedGesture",
+        "Leaderboard",
+    }
     | {"TrainingSession", "ProtocolPhase", "User", "ApiToken"},
     "/api/v1/": {"Patient", "Station", "Protocol", "Leaderboard"},
     "/admin/autocomplete/": {"Patient", "User"},

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from robot import calibrate, play_gesture
-from robot.bases.kinematic import Faults, KinematicBase
+from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.calibrate import NotMeasured, measure
 from robot.calibration import BadCalibration, apply_calibration, store_calibration
 from robot.motion.response import Response
@@ -29,14 +29,16 @@ def measured(faults):
 
 @pytest.mark.parametrize(("dead_time_s", "lag_s"), [(0.0, 0.02), (0.08, 0.06), (0.25, 0.06)])
 def test_dead_time_and_lag_are_measured(file, dead_time_s, lag_s):
-    response = measured(Faults(dead_time_s, lag_s, left_scale=0.99))
+    response = measured(Imperfections(dead_time_s, lag_s, left_scale=0.99))
     assert response.delay_s == pytest.approx(dead_time_s + lag_s, abs=0.015)
 
 
 @pytest.mark.parametrize("scale", [0.97, 1.0, 1.03])
 @pytest.mark.parametrize("drift_deg_min", [-3.0, 30.0])
 def test_wheels_and_gyro_are_measured(file, scale, drift_deg_min):
-    response = measured(Faults(left_scale=scale, right_scale=scale, drift_deg_min=drift_deg_min))
+    response = measured(
+        Imperfections(left_scale=scale, right_scale=scale, drift_deg_min=drift_deg_min)
+    )
     assert response.wheel_scale == pytest.approx(1 / scale, abs=0.003)
     drift_rad_s = math.radians(drift_deg_min / 60)
     assert response.gyro_bias_rad_s == pytest.approx(drift_rad_s, abs=math.radians(0.3 / 60))
@@ -44,7 +46,7 @@ def test_wheels_and_gyro_are_measured(file, scale, drift_deg_min):
 
 def test_a_base_that_is_held_is_not_measured(file):
     with pytest.raises(NotMeasured, match="stalled"):
-        measured(Faults(held=1.0))
+        measured(Imperfections(held=1.0))
 
 
 def test_the_command_stores_it_and_a_gesture_uses_it(file, capsys, monkeypatch):

@@ -39,7 +39,7 @@ PAGES = {
     "leaderboard": "/admin/rehab/leaderboard/add/",
     "feedback": "/admin/rehab/feedbacktype/add/?slug=binary",
     "feedback-types": "/admin/rehab/feedbacktype/",
-    "gesture": "/admin/rehab/gesture/1/change/",
+    "gesture": "/admin/rehab/composedgesture/1/change/",
     "ending": "/sessions/12/ending/",
     "ending-explicit": "/sessions/4/ending/",
     "scores-points": "/sessions/12/scores/",
@@ -80,12 +80,12 @@ VISITS = """
 from datetime import time, timedelta
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient, User
 from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.presets import Preset
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station
@@ -93,7 +93,7 @@ from tests.support.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
 )
-wave = Gesture.everywhere.create(clinic=first_clinic(), name="slow-wave")
+wave = ComposedGesture.everywhere.create(clinic=first_clinic(), name="slow-wave")
 for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0, -0.12), (40, 0)]):
     wave.steps.create(position=position + 1, turn_deg=turn, forward_m=way)
 types = "explicit positive positive negative binary positive binary negative positive".split()
@@ -123,7 +123,7 @@ for name, valence, percent, minutes in (
 ):
     Preset.everywhere.create(
         clinic=first_clinic(), name=name, valence=valence, goal_by="percent", goal_percent=percent,
-        measure=Measure.everywhere.get(clinic=None, slug="a2"), protocol=blocks,
+        measure=MeasureDefinition.everywhere.get(clinic=None, slug="a2"), protocol=blocks,
         wanted_hits=60, minutes=minutes,
     )
 for station, kind, name, seen in (

@@ -22,7 +22,7 @@ from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
 from tests.support.walks import strides, walk
@@ -166,7 +166,7 @@ def multiply(world: World) -> None:
             clinic=world.clinic,
             name=f"More {number}",
             valence="binary",
-            measure=Measure.everywhere.get(clinic=None, slug="a2"),
+            measure=MeasureDefinition.everywhere.get(clinic=None, slug="a2"),
             goal_value=2,
             protocol=protocol,
         )

@@ -25,8 +25,9 @@ from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State
 from rehab.training.fold.tallies import Tally
+from tests.support.marks import mark
 from tests.support.walks import RIGHT, strides, walk
-from tests.support.world import World, build_world, client_of, mark, signed_in
+from tests.support.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 

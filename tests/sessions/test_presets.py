@@ -8,15 +8,16 @@ import pytest
 from django.core.exceptions import ValidationError
 from django.test import Client
 
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.marks import mark
+from tests.support.world import World, build_world, client_of
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
@@ -43,7 +44,7 @@ def preset_of(world: World, **fields: object) -> Preset:
             "clinic": world.clinic,
             "name": "Challenge",
             "valence": "binary",
-            "measure": Measure.everywhere.get(clinic=None, slug="a2"),
+            "measure": MeasureDefinition.everywhere.get(clinic=None, slug="a2"),
             "goal_by": "percent",
             "goal_percent": 118,
             "wanted_hits": 70,
@@ -133,7 +134,7 @@ def test_a_preset_may_bring_its_source(pt, world, patient):
 
 
 def test_a_gesture_that_is_gone_becomes_the_usual_one(pt, world, patient):
-    gesture = Gesture.everywhere.create(clinic=world.clinic, name="wave")
+    gesture = ComposedGesture.everywhere.create(clinic=world.clinic, name="wave")
     preset = preset_of(world, robot_above="wave")
     page = f"/patients/{patient.pk}/new/?preset={preset.pk}"
     assert filled(pt.get(page).content.decode())["robot_above"] == "wave"
@@ -227,7 +228,7 @@ def test_the_admin_refuses_what_could_not_be_walked(pt, world):
     form = {
         "name": "New one",
         "valence": "positive",
-        "measure": Measure.everywhere.get(clinic=None, slug="a2").pk,
+        "measure": MeasureDefinition.everywhere.get(clinic=None, slug="a2").pk,
         "protocol": protocol("Training only").pk,
         "goal_by": "percent",
         "goal_percent": "100",

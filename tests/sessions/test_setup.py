@@ -7,12 +7,12 @@ import re
 import pytest
 from django.test import Client
 
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, change_session, create_session
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.cueing import CueRule, CueTiming
@@ -64,8 +64,8 @@ def choices(place: Station, protocol: str = "Training only", **others: object) -
     }
 
 
-def a_pulse(world) -> Measure:
-    return Measure.everywhere.create(
+def a_pulse(world) -> MeasureDefinition:
+    return MeasureDefinition.everywhere.create(
         clinic=world.clinic, slug="pulse", name="heart rate", unit="1/min", channel="heart_rate",
         value_min=30, value_max=220, goal_min=40, goal_max=200, first_goal=110,
     )  # fmt: skip
@@ -132,7 +132,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
     assert 'value="112.5"' in again
     assert re.search(r"goal\s+112.5\s+1/min", pt.get(f"/patients/{patient.pk}/").content.decode())
     birch = build_world("birch")
-    other = Measure.everywhere.get(clinic=birch.clinic)
+    other = MeasureDefinition.everywhere.get(clinic=birch.clinic)
     assert "Select a valid choice" in pt.post(url, chosen | {"measure": other.pk}).content.decode()
 
 
@@ -231,8 +231,8 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     assert again.plan | alike == session.plan | alike
 
 
-def compose(world: World, name: str = "wave") -> Gesture:
-    gesture = Gesture.everywhere.create(clinic=world.clinic, name=name)
+def compose(world: World, name: str = "wave") -> ComposedGesture:
+    gesture = ComposedGesture.everywhere.create(clinic=world.clinic, name=name)
     for position, degrees in enumerate((30, -60, 30), start=1):
         gesture.steps.create(position=position, turn_deg=degrees)
     return gesture

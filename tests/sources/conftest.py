@@ -3,9 +3,13 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rehab.sources.recording import Recording, parse_recording, read_recording
+from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.walker import walk
+from tests.sources.intake_harness import MASS
 
 REPO = Path(__file__).parents[2]
 
@@ -63,3 +67,15 @@ def hebb03():
         return "\n".join(lines) + "\n"
 
     return write
+
+
+@pytest.fixture(scope="module")
+def made():
+    return make_signals(list(walk(seed=4, strides=30)), MASS, Sensors(rate_hz=200), seed=4)
+
+
+@pytest.fixture
+def table(made):
+    legs = (made.left, made.right)
+    columns = [c for leg in legs for c in (leg.force_n, leg.moment_nm, leg.angle_rad)]
+    return np.column_stack([made.t_s, *columns])

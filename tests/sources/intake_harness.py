@@ -48,3 +48,7 @@ def measure(made, rate_hz=200.0):
         LegSamples(leg.force_n, leg.moment_nm, leg.angle_rad) for leg in (made.left, made.right)
     )
     return measure_both_legs(made.t_s, left, right, rate_hz=rate_hz, mass_kg=MASS)
+
+
+def rows_of(table, names=NAMES):
+    return [dict(zip(["time_s", *names], row, strict=True)) for row in table.tolist()]

@@ -29,7 +29,7 @@ from rehab.studies.blinding import (
 )
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
-from rehab.studies.registration import close
+from rehab.studies.registration.lifecycle import close
 from rehab.studies.visits import Place, next_visit, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.fold import SessionFold
@@ -123,7 +123,7 @@ def test_who_cannot_take_part_is_not_enrolled_and_nothing_is_stored(world, case)
 def test_a_session_of_the_study_is_the_arms(world):
     study = running_study(world)
     study.arms.filter(code="A").update(gain=0.85, robot_intensity=0.0)
-    from rehab.studies.registration import revise
+    from rehab.studies.registration.lifecycle import revise
 
     revise(study, "hidden gain", None, NOW)
     by_arm = {}

@@ -9,11 +9,17 @@ import pytest
 from scipy import stats
 
 from rehab.studies.analysis.comparison import compare
-from rehab.studies.analysis.curves import Place, average
+from rehab.studies.analysis.curves import CurvePlace, average
 from rehab.studies.analysis.outcomes import OF_STRIDES, channel_changes, describe_phases
-from rehab.studies.analysis.participants import Visit, curves_by_arm, find, flow, make_participant
+from rehab.studies.analysis.participants import (
+    PlannedVisit,
+    curves_by_arm,
+    find,
+    flow,
+    make_participant,
+)
 from rehab.studies.analysis.walks import read_walk
-from rehab.studies.figures.learning import PhaseLabel, Words, draw_curves
+from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.trial import simulate
@@ -160,9 +166,12 @@ def test_a_group_without_figures_is_compared_with_nothing():
 
 
 def test_places_that_few_reached_are_left_out_of_a_curve():
-    curves = [{Place(0, 0, 0): 100.0, Place(0, 0, 1): 90.0}, *[{Place(0, 0, 0): 110.0}] * 3]
+    curves = [
+        {CurvePlace(0, 0, 0): 100.0, CurvePlace(0, 0, 1): 90.0},
+        *[{CurvePlace(0, 0, 0): 110.0}] * 3,
+    ]
     [point] = average(curves)
-    assert (point.place, point.participants) == (Place(0, 0, 0), 4)
+    assert (point.place, point.participants) == (CurvePlace(0, 0, 0), 4)
     assert point.mean == pytest.approx(107.5)
     assert point.low < point.mean <= point.high
 
@@ -185,7 +194,9 @@ def test_a_study_from_a_seed_is_the_same_again_to_the_last_digit():
 def test_the_flow_counts_who_came_who_left_and_who_is_missing():
     whole = people()
     left = make_participant(
-        "099", [(Visit(1, "A"), None), (Visit(2, "A", is_due=False), None)], has_left=True
+        "099",
+        [(PlannedVisit(1, "A"), None), (PlannedVisit(2, "A", is_due=False), None)],
+        has_left=True,
     )
     mine = sum("A" in one.arms for one in whole)
     of_a = flow([*whole, left], ["A"], "late_change")[0]
@@ -206,7 +217,7 @@ def test_figures_are_well_formed_and_name_every_arm_once_escaped():
     phases = [PhaseLabel("Baseline", False), *[PhaseLabel("Training", True)] * 4]
     for svg in (
         draw_curves(
-            curves_by_arm(whole, arms), labels, phases, Words("t", "y", "x", "Visit {number}")
+            curves_by_arm(whole, arms), labels, phases, CurveLabels("t", "y", "x", "Visit {number}")
         ),
         draw_people(finding, values, labels, "title", "%", joined=False),
     ):

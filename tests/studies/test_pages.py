@@ -15,15 +15,15 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
-from rehab.studies.document import digest_of
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
-from rehab.studies.registration import close
-from rehab.studies.sealing import unseal
+from rehab.studies.registration.document import digest_of
+from rehab.studies.registration.lifecycle import close
+from rehab.studies.registration.sealing import unseal
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World, client_of, signed_in
 
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.django_db
 def plan(*valences: str, **changes: Any) -> dict[str, Any]:
     """Return what the browser sends for a study of these arms."""
     protocol = Protocol.everywhere.get(clinic=None, name="Baseline, training, washout").pk
-    measure = Measure.everywhere.get(clinic=None, slug="a2").pk
+    measure = MeasureDefinition.everywhere.get(clinic=None, slug="a2").pk
     form: dict[str, Any] = {
         "code": "VAL",
         "title": "Ways to answer a step",

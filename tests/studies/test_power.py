@@ -12,7 +12,7 @@ from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import Protocol
 from rehab.studies.models import Arm
 from rehab.studies.power_runs import PowerRun, plan_run, work
-from rehab.studies.simulation.power import Found, summarize, wilson
+from rehab.studies.simulation.power import SimulatedDifference, summarize, wilson
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
 from tests.support.studies import draft_study
@@ -65,10 +65,10 @@ def test_what_is_stored_is_not_simulated_again_and_the_end_is_the_same(world):
 
 def test_power_is_the_share_of_intervals_without_zero():
     found = [
-        Found("B", "A", 2.0, 1.0, 3.0),
-        Found("B", "A", -2.0, -3.0, -1.0),
-        Found("B", "A", 0.0, -1.0, 1.0),
-        Found("B", "A", 1.0, None, None),
+        SimulatedDifference("B", "A", 2.0, 1.0, 3.0),
+        SimulatedDifference("B", "A", -2.0, -3.0, -1.0),
+        SimulatedDifference("B", "A", 0.0, -1.0, 1.0),
+        SimulatedDifference("B", "A", 1.0, None, None),
     ]
     [pair] = summarize(found)
     assert pair.power == 0.5

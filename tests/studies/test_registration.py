@@ -9,14 +9,14 @@ import pytest
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.questionnaires import Questionnaire
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.append_only import AppendOnlyRow
-from rehab.studies.document import describe, digest_of
 from rehab.studies.models import StudyState
 from rehab.studies.participants import StudyEvent
-from rehab.studies.registration import close, current_version, register, revise, start
-from rehab.studies.sealing import seal, unseal
+from rehab.studies.registration.document import describe, digest_of
+from rehab.studies.registration.lifecycle import close, current_version, register, revise, start
+from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
@@ -147,7 +147,7 @@ def edit_phase(**changes):
 
 
 def edit_measure(study, _phase) -> None:
-    Measure.everywhere.filter(clinic=study.clinic).update(value_max=9.0)
+    MeasureDefinition.everywhere.filter(clinic=study.clinic).update(value_max=9.0)
 
 
 def edit_words(study, _phase) -> None:
@@ -169,7 +169,7 @@ def edit_words(study, _phase) -> None:
 def test_nothing_that_decides_what_is_walked_changes_unseen(world, edit):
     study = draft_study(world)
     training = own_protocol(world, study)
-    own = Measure.everywhere.create(
+    own = MeasureDefinition.everywhere.create(
         clinic=world.clinic,
         slug="speed",
         unit="m/s",

@@ -16,11 +16,11 @@ from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
-from rehab.studies.drawing import FIGURES, TABLES, write_table
 from rehab.studies.models import Arm, Study
-from rehab.studies.registration import close, register, start
-from rehab.studies.results import label_arms, read_results
-from rehab.studies.sealing import seal
+from rehab.studies.registration.lifecycle import close, register, start
+from rehab.studies.registration.sealing import seal
+from rehab.studies.results.drawing import FIGURES, TABLES, write_table
+from rehab.studies.results.results import label_arms, read_results
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.study import find_or_plan
 from rehab.studies.simulation.study import walk_study as study_walks

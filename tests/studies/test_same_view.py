@@ -23,7 +23,7 @@ from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.enrolling import withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
-from rehab.studies.sealing import seal
+from rehab.studies.registration.sealing import seal
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side

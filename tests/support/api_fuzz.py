@@ -15,8 +15,9 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web import api_base
 from tests.support.api_noise import Noise, make_noise
+from tests.support.marks import mark
 from tests.support.programs import ROOT, program_of
-from tests.support.world import build_world, mark, scoped_models
+from tests.support.world import build_world, scoped_models
 
 SLOWEST_S = 5.0  # no call may hold the server up
 

@@ -18,7 +18,7 @@ from rehab.sessions.live.protocol.frames import READ_NOW
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
-from rehab.sessions.setup.protocols import Measure
+from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
@@ -341,7 +341,7 @@ def open_session(
     at_station: bool = True,
     beside: bool = False,
     cue: CueGestures | None = None,
-    measure: Measure | None = None,
+    measure: MeasureDefinition | None = None,
     **rules: Any,
 ) -> TrainingSession:
     """Make a session that is ready at the place's station.

@@ -10,8 +10,9 @@ from django.urls import reverse
 
 from rehab.people.roles import Role
 from tests.support.archives import words_of
+from tests.support.marks import mark
 from tests.support.tenancy import MARK, all_routes, enter
-from tests.support.world import Actor, World, mark, scoped_models
+from tests.support.world import Actor, World, scoped_models
 
 # What lets a page act, beside the keys: the words of its buttons and fields.
 WORDS = {

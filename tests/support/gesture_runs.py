@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from robot.bases.kinematic import Faults, KinematicBase
+from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.motion.gesture import Gesture
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
@@ -33,7 +33,7 @@ class OrdinaryBase(KinematicBase):
 
 
 def play_in_a_row(
-    gesture: Gesture, faults: Faults, times: int, response: Response | None = None
+    gesture: Gesture, faults: Imperfections, times: int, response: Response | None = None
 ) -> list[Played]:
     """Play a gesture several times without setting home anew, until one does not end well.
 

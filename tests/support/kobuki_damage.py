@@ -21,7 +21,7 @@ from robot.bases.kobuki_protocol import (
     GyroRaw,
     Inertia,
     MotorCurrent,
-    Side,
+    SensorSide,
     decode_feedback,
     encode_feedback,
 )
@@ -50,7 +50,7 @@ def drive(number: int, noise: random.Random) -> Feedback:
     return Feedback(
         core=CoreSensors(
             time_ms=20 * number % 65536,
-            bumper=Side.CENTER if is_bumped(number) else 0,
+            bumper=SensorSide.CENTER if is_bumped(number) else 0,
             left_ticks=ticks,
             right_ticks=ticks,
         ),
@@ -158,7 +158,7 @@ def _faults(seen: Estimate, frame_filter: FrameFilter, number: int) -> Iterator[
     recent = {is_bumped(max(0, number - back)) for back in range(LAG)}
     if bool(seen.bumper) not in recent:
         yield "bumper"
-    if seen.bumper & ~Side.CENTER or seen.cliff or seen.wheel_drop or seen.over_current:
+    if seen.bumper & ~SensorSide.CENTER or seen.cliff or seen.wheel_drop or seen.over_current:
         yield "hazard"
     if (
         seen.buttons

@@ -7,7 +7,7 @@ from typing import Any
 
 from rehab.people.models import Clinic
 from rehab.studies.analysis.participants import Participant
-from rehab.studies.results import Results
+from rehab.studies.results.results import Results
 from rehab.studies.simulation import study as simulated
 from rehab.studies.simulation.trial import Trial
 from tests.support.world import NOW

@@ -8,12 +8,12 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Arm, Study
 from rehab.studies.participants import Enrollment
-from rehab.studies.registration import register, start
-from rehab.studies.sealing import seal
+from rehab.studies.registration.lifecycle import register, start
+from rehab.studies.registration.sealing import seal
 from rehab.training.measures import A2
 from tests.support.world import NOW, World
 
@@ -33,7 +33,7 @@ def draft_study(world: World, *valences: str, **settings: Any) -> Study:
         "sealed": seal(Secret(SEED, (2, 4))),
     }
     study = Study.everywhere.create(clinic=world.clinic, **defaults | settings)
-    measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
+    measure = MeasureDefinition.everywhere.get(clinic=None, slug=A2.slug)
     protocol = Protocol.everywhere.get(clinic=None, name="Baseline, training, washout")
     for position, valence in enumerate(valences or ("positive", "negative")):
         Arm.everywhere.create(

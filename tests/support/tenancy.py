@@ -27,7 +27,8 @@ from rehab.studies.participants import Enrollment
 from rehab.studies.power_runs import PowerRun
 from tests.support.archives import words_of
 from tests.support.identities import find_identities, identifying_texts
-from tests.support.world import Actor, World, all_actors, mark, scoped_models
+from tests.support.marks import mark
+from tests.support.world import Actor, World, all_actors, scoped_models
 
 # What a role reads in the pages of its own clinic, by the marks of tests/support/world.py.
 # Researchers see no patient; a host sees clinics and accounts and nothing else.

@@ -13,7 +13,7 @@ from django.test import Client
 from rehab.boards.models import Leaderboard
 from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
-from rehab.gestures.models import Gesture, GestureStep
+from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
@@ -38,9 +38,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
-from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
+from rehab.studies.models import StudyMark, StudyVersion
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.power_runs import PowerRun
 from rehab.training.changes import Change, ChangeKind
@@ -48,6 +48,8 @@ from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
 from robot.wire.incident import pack
 from tests.support.clock import START
+from tests.support.closed_study import close_study
+from tests.support.marks import mark
 
 NOW = START  # the moment at which a test begins
 # What a robot recorded around a bump.
@@ -57,11 +59,6 @@ RECORDED = [
     {"at_s": 10.5, "kept": "bump", "is_first": True},
     {"at_s": 10.7, "tick": [0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.0]},
 ]
-
-
-def mark(clinic: str, model: type[Model]) -> str:
-    """Return the text that marks a clinic's rows of a model, and stands nowhere else."""
-    return f"zq{clinic}{model.__name__.lower()}qz"
 
 
 @dataclass
@@ -129,73 +126,6 @@ def seal_nothing(clinic: Clinic) -> LogSeal:
     return seal
 
 
-# What a version of a study tells (`describe` in rehab/studies/document.py), as short as can be.
-PLAN: dict[str, Any] = {
-    **dict.fromkeys(("code", "title", "clinic", "question"), ""),
-    "participants": 2,
-    "months_since_stroke_at_least": None,
-    "design": "parallel",
-    "arms": [],
-    "allocation": {"method": "blocks", "groups": [], "factors": [], "commitment_sha256": ""},
-    "visits": dict.fromkeys(("in_each_period", "days_between", "days_between_periods"), 1),
-    "goal_percent_of_baseline": 100,
-    "primary_outcome": "hit_rate",
-    "secondary_outcomes": [],
-    "scoring_rules_version": 1,
-}
-
-
-def close_study(name: str, patient: Patient, session: TrainingSession, by: User) -> Study:
-    """Store a study that is closed, so that it hides nothing: with a row of each of its models."""
-    study = Study.everywhere.create(
-        clinic=patient.clinic,
-        code=f"7{patient.clinic_id}",
-        title=mark(name, Study),
-        question=mark(name, Study),
-        state="closed",
-        participants=2,
-        primary_outcome="hit_rate",
-        closed_at=NOW,
-    )
-    version = StudyVersion.everywhere.create(
-        study=study, number=1, document=PLAN, reason=mark(name, StudyVersion)
-    )
-    for position, valence in enumerate(("positive", "binary")):
-        Arm.everywhere.create(
-            study=study,
-            position=position,
-            code="AB"[position],
-            name=mark(name, Arm),
-            valence=valence,
-            measure=session.measure,
-            protocol=session.protocol,
-        )
-    StudyMark.everywhere.create(study=study, user=by, task="assessor")
-    enrollment = Enrollment.everywhere.create(
-        clinic=patient.clinic,
-        study=study,
-        patient=patient,
-        version=version,
-        code=mark(name, Enrollment),
-        keep_data=True,
-    )
-    Allocation.everywhere.create(enrollment=enrollment, group="A")
-    StudyVisit.everywhere.create(
-        enrollment=enrollment, number=1, period=0, day=NOW.date(), session=session, version=version
-    )
-    StudyEvent.everywhere.create(
-        study=study, enrollment=enrollment, kind="enrolled", reason=mark(name, StudyEvent)
-    )
-    PowerRun.everywhere.create(
-        study=study,
-        settings={"effects": {"B": 5.0}, "participants": 8, "sd_percent": 10.0}
-        | {"kept_percent": 25.0, "dropout_percent": 0.0},
-        simulations=1,
-        trouble=mark(name, PowerRun),
-    )
-    return study
-
-
 def build_world(name: str) -> World:
     """Build a clinic with people of every role and one row of every model."""
     clinic = Clinic.everywhere.create(name=mark(name, Clinic))
@@ -213,10 +143,10 @@ def build_world(name: str) -> World:
     )
     token = device.new_token()
     device.save()
-    measure = Measure.everywhere.create(
+    measure = MeasureDefinition.everywhere.create(
         clinic=clinic,
         slug=f"m-{name}",
-        name=mark(name, Measure),
+        name=mark(name, MeasureDefinition),
         unit="m",
         value_min=0,
         value_max=2,
@@ -233,7 +163,7 @@ def build_world(name: str) -> World:
         name=mark(name, ProtocolPhase),
         feedback=True,
     )
-    gesture = Gesture.everywhere.create(clinic=clinic, name=mark(name, Gesture))
+    gesture = ComposedGesture.everywhere.create(clinic=clinic, name=mark(name, ComposedGesture))
     step = GestureStep.everywhere.create(gesture=gesture, position=1, hold_s=1.0)
     feedback = FeedbackType.everywhere.create(
         clinic=clinic, slug="negative", hit_points=0, miss_points=-1, cue_below="droop"

@@ -36,7 +36,7 @@ KEPT_FOR = timedelta(hours=24)
 CHUNK_BYTES = 256 * 1024
 
 
-class Progress(NamedTuple):
+class ExportProgress(NamedTuple):
     """How many of the sessions are written."""
 
     done: int
@@ -126,13 +126,13 @@ class Package:
         return self.folder / str(key)
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> ExportProgress:
         """How far it is."""
-        return Progress(sum(self._part(key).is_dir() for key in self.keys), len(self.keys))
+        return ExportProgress(sum(self._part(key).is_dir() for key in self.keys), len(self.keys))
 
     def advance(
         self, seconds: float, clock: Callable[[], float] = time.monotonic
-    ) -> Iterator[Progress]:
+    ) -> Iterator[ExportProgress]:
         """Write sessions until the time is over, one at least; yield the progress after each."""
         until = clock() + seconds
         done, total = self.progress
@@ -148,7 +148,7 @@ class Package:
             else:
                 write_part(self.user, session, self._part(key), shift_dates=self.shift_dates)
             done += 1
-            yield Progress(done, total)
+            yield ExportProgress(done, total)
             if clock() >= until:
                 return
 

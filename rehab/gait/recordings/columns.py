@@ -14,7 +14,7 @@ SIDES = ("left", "right")
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class SignalColumn:
     """A column by name, and what takes its numbers to SI units, our signs and the force's time.
 
     Attributes
@@ -36,12 +36,12 @@ class Column:
 class ColumnMap:
     """The time column [s], for each measured side the columns of its channels, the frame number."""
 
-    time: Column
-    legs: dict[str, dict[str, Column]] = field(default_factory=dict)
-    frame: Column | None = None
+    time: SignalColumn
+    legs: dict[str, dict[str, SignalColumn]] = field(default_factory=dict)
+    frame: SignalColumn | None = None
 
     @property
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[SignalColumn]:
         """All columns that a recording needs to have."""
         frame = [] if self.frame is None else [self.frame]
         legs = (column for leg in self.legs.values() for column in leg.values())
@@ -61,29 +61,32 @@ class ColumnMap:
         return ColumnMap(self.time, legs, frame) if legs and self.time.name in header else None
 
 
-def _moore_leg(side: str) -> dict[str, Column]:
+def _moore_leg(side: str) -> dict[str, SignalColumn]:
     return {
-        "force": Column(f"{side}GRF_y"),
-        "moment": Column(f"{side}AnklePlantarFlexionMoment"),
-        "angle": Column(f"{side}AnklePlantarFlexionAngle"),
-        "forward": Column(f"{side}GRF_x"),
-        "position": Column(f"{side}Foot_x"),
+        "force": SignalColumn(f"{side}GRF_y"),
+        "moment": SignalColumn(f"{side}AnklePlantarFlexionMoment"),
+        "angle": SignalColumn(f"{side}AnklePlantarFlexionAngle"),
+        "forward": SignalColumn(f"{side}GRF_x"),
+        "position": SignalColumn(f"{side}Foot_x"),
     }
 
 
-def _own_leg(side: str) -> dict[str, Column]:
+def _own_leg(side: str) -> dict[str, SignalColumn]:
     names = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
     return {
-        channel: Column(f"{side}_{name}") for channel, name in zip(CHANNELS, names, strict=True)
+        channel: SignalColumn(f"{side}_{name}")
+        for channel, name in zip(CHANNELS, names, strict=True)
     }
 
 
 SIGNAL_LAYOUTS = {
     # As our sources send and store them.
-    "garry": ColumnMap(Column("time_s"), {side: _own_leg(side) for side in SIDES}, Column("frame")),
+    "garry": ColumnMap(
+        SignalColumn("time_s"), {side: _own_leg(side) for side in SIDES}, SignalColumn("frame")
+    ),
     # Moore, Hnat, van den Bogert 2015 (PeerJ 3:e918), as written by their GaitAnalysisToolKit.
     "moore2013": ColumnMap(
-        Column("time"), {"left": _moore_leg("Left"), "right": _moore_leg("Right")}
+        SignalColumn("time"), {"left": _moore_leg("Left"), "right": _moore_leg("Right")}
     ),
 }
 
@@ -103,16 +106,16 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
     GaitInputError
         With the cure, for pairs of another form and for too few to measure a leg with.
     """
-    time: Column | None = None
-    frame: Column | None = None
-    legs: dict[str, dict[str, Column]] = {}
+    time: SignalColumn | None = None
+    frame: SignalColumn | None = None
+    legs: dict[str, dict[str, SignalColumn]] = {}
     for pair in pairs:
         channel, _, text = pair.partition("=")
         side, _, what = channel.partition(".")
         if channel == "time" and text:
             time = read_column(text)
         elif channel == "frame" and text:
-            frame = Column(text)
+            frame = SignalColumn(text)
         elif side in SIDES and what in CHANNELS and text:
             legs.setdefault(side, {})[what] = read_column(text)
         else:
@@ -152,10 +155,10 @@ def find_layout(header: Sequence[str]) -> ColumnMap:
     )
 
 
-def read_column(text: str) -> Column:
+def read_column(text: str) -> SignalColumn:
     """Return the column that a text such as ``ANK_L*0.01745@0.01`` describes."""
     text, delay_s = _split_number(text, "@", 0.0)
-    return Column(*_split_number(text, "*", 1.0), delay_s)
+    return SignalColumn(*_split_number(text, "*", 1.0), delay_s)
 
 
 def _split_number(text: str, mark: str, usual: float) -> tuple[str, float]:

@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, Column, ColumnMap
+from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, ColumnMap, SignalColumn
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
@@ -98,7 +98,7 @@ def apply_columns(
     """
     time: Floats = table[columns.time.name] * columns.time.factor
 
-    def read(column: Column | None) -> Floats | None:
+    def read(column: SignalColumn | None) -> Floats | None:
         if column is None:
             return None
         values: Floats = table[column.name] * column.factor

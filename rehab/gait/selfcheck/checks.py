@@ -76,11 +76,6 @@ class SignalCheck:
     lag_s: float | None
     deceleration_s: dict[str, float | None]
 
-    @property
-    def is_good(self) -> bool:
-        """Whether there is nothing to put right."""
-        return not self.findings
-
 
 def check_signals(
     t_s: ArrayLike,

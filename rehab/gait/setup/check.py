@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 from rehab.gait.offline import measure_both_legs, measure_strides
-from rehab.gait.recordings.columns import REQUIRED, Column, ColumnMap
+from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import PERSON_TOLERANCE_S, find_deceleration_peak
@@ -149,9 +149,9 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
 
 
 def _make_map(proposal: Proposal) -> ColumnMap:
-    legs: dict[str, dict[str, Column]] = {}
+    legs: dict[str, dict[str, SignalColumn]] = {}
     for (side, channel), guess in proposal.guesses.items():
-        legs.setdefault(side, {})[channel] = Column(guess.column, guess.factor)
+        legs.setdefault(side, {})[channel] = SignalColumn(guess.column, guess.factor)
     whole = {side: leg for side, leg in legs.items() if leg.keys() >= set(REQUIRED)}
     if not whole:
         seen = ", ".join(f"{s} {c} {g.column}" for (s, c), g in proposal.guesses.items())
@@ -159,8 +159,8 @@ def _make_map(proposal: Proposal) -> ColumnMap:
             f"No leg is whole: a vertical force, an ankle moment and an ankle angle are needed, "
             f"seen was {seen}. Let the lab send what is missing."
         )
-    frame = None if proposal.frame is None else Column(proposal.frame)
-    return ColumnMap(Column(proposal.time, proposal.time_factor), whole, frame)
+    frame = None if proposal.frame is None else SignalColumn(proposal.frame)
+    return ColumnMap(SignalColumn(proposal.time, proposal.time_factor), whole, frame)
 
 
 def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.gait.recordings.columns import Column
+from rehab.gait.recordings.columns import SignalColumn
 from rehab.gait.setup.check import SetupCheck
 from rehab.gait.setup.guess import Guess
 
@@ -45,7 +45,7 @@ def format_arguments(check: SetupCheck) -> str:
     return f"--mass {check.proposal.mass_kg:.1f} --columns {quoted}"
 
 
-def _format_column(column: Column) -> str:
+def _format_column(column: SignalColumn) -> str:
     factor = "" if column.factor == 1 else f"*{column.factor:.9g}"
     return f"{column.name}{factor}"
 

@@ -12,7 +12,6 @@ from scipy.interpolate import PchipInterpolator
 from rehab.gait.signals.filters import Floats
 
 POINTS = 100  # of a stride
-STANCE = 0.62  # of it
 
 _TIMES = np.arange(POINTS) / POINTS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.samples import TIME, Layout
+from rehab.gait.signals.samples import TIME, ChannelLayout
 
 
 class SampleBuffer:
@@ -23,7 +23,7 @@ class SampleBuffer:
         self.keep = keep
         self.end = 0
         self.first = 0  # the oldest sample that is still there
-        self.layout = Layout(legs)
+        self.layout = ChannelLayout(legs)
         wide = len(self.layout.order)
         table = np.full((wide, 3 * keep), np.nan)
         middle = self.layout.time_rows[wide]
@@ -36,7 +36,7 @@ class SampleBuffer:
         self._late_end = 0  # behind the newest sample that was late
 
     def append(self, table: Floats, late_s: Floats | None = None) -> None:
-        """Append samples as ``Layout.read`` returns them, shape (rows, samples).
+        """Append samples as ``ChannelLayout.read`` returns them, shape (rows, samples).
 
         ``late_s`` is by how much each came late, None where none did.
         """

@@ -27,7 +27,7 @@ class LegSamples(NamedTuple):
     position_m: ArrayLike | None = None
 
 
-class Layout:
+class ChannelLayout:
     """Where each channel of one or two legs lies in a table of samples, shape (rows, samples).
 
     Time lies between two legs, so that each has its six rows side by side; rows that are seldom

@@ -44,7 +44,7 @@ CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
-class Channel(NamedTuple):
+class StanceChannel(NamedTuple):
     """A channel around a stance, and how it changes from sample to sample.
 
     Attributes
@@ -60,15 +60,15 @@ class Channel(NamedTuple):
     jump: float
 
 
-def read_channel(values: Floats) -> Channel:
+def read_channel(values: Floats) -> StanceChannel:
     """Return a channel of shape (n,) and how it changes."""
     steps = values[1:] - values[:-1]
-    return Channel(values, steps, max(find_maximum(steps), -find_minimum(steps)))
+    return StanceChannel(values, steps, max(find_maximum(steps), -find_minimum(steps)))
 
 
 def check_samples(
     taken_s: float,
-    channels: Sequence[Channel],
+    channels: Sequence[StanceChannel],
     stance: int,
     clock: StanceClock,
     rate_hz: float,

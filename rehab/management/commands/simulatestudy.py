@@ -21,9 +21,9 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
-from rehab.studies.drawing import FIGURES, TABLES, name_pair, write_table
 from rehab.studies.models import Study
-from rehab.studies.results import Results
+from rehab.studies.results.drawing import FIGURES, TABLES, name_pair, write_table
+from rehab.studies.results.results import Results
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.study import find_or_plan, finish_study, walk_study
 from rehab.studies.simulation.walkers import Population

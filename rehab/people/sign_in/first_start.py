@@ -17,8 +17,8 @@ from rehab.people.roles import Role
 
 FIRST_USERNAME = "pt"
 FIRST_CLINIC = "My clinic"
-# The first migration of development versions from before 22 November 2026.
-DEVELOPMENT_MIGRATION = ("rehab", "0001_initial")
+# The first migrations of development versions from before 23 November 2026.
+DEVELOPMENT_MIGRATIONS = {("rehab", "0001_initial"), ("rehab", "0001_version_0_1")}
 
 
 def prepare_database() -> None:
@@ -46,11 +46,12 @@ def prepare_database() -> None:
 
 def refuse_development_database(using: str = DEFAULT_DB_ALIAS) -> None:
     """Raise CommandError, with the cure, for a database made by a development version."""
-    if DEVELOPMENT_MIGRATION not in MigrationRecorder(connections[using]).applied_migrations():
+    applied = MigrationRecorder(connections[using]).applied_migrations()
+    if DEVELOPMENT_MIGRATIONS.isdisjoint(applied):
         return
     name = connections[using].settings_dict["NAME"]
     raise CommandError(
-        f"The database {name} was made by a development version of GARRY from before 22 November "
+        f"The database {name} was made by a development version of GARRY from before 23 November "
         "2026, and this one cannot read it. Nothing was changed. To begin anew, move it away or "
         "name another one (GARRY_DATA_DIR, GARRY_DATABASE_URL); to see what it holds, run the "
         "version that made it."

@@ -8,9 +8,7 @@ from __future__ import annotations
 from django.utils.formats import number_format
 from django.utils.translation import gettext
 
-from rehab.training import marking
-from rehab.training.measures import InvalidSetting
-from robot.motion import gesture_errors
+from robot.marking import OR, AnyOf, Marked, TranslatableError
 
 
 class _Number(float):
@@ -20,7 +18,7 @@ class _Number(float):
         return number_format(super().__format__(spec))
 
 
-def format_refusal(problem: InvalidSetting | gesture_errors.BadGesture) -> str:
+def format_refusal(problem: TranslatableError) -> str:
     """Return an error in the active language; one without values may be translated already."""
     template = gettext(problem.template)
     if not problem.values:
@@ -30,10 +28,10 @@ def format_refusal(problem: InvalidSetting | gesture_errors.BadGesture) -> str:
 
 def _format_value(value: object) -> object:
     match value:
-        case marking.Marked() | gesture_errors.Marked():
+        case Marked():
             return gettext(value)
-        case marking.AnyOf():
-            return f" {gettext(marking.OR)} ".join(map(gettext, value))
+        case AnyOf():
+            return f" {gettext(OR)} ".join(map(gettext, value))
         case float():
             return _Number(value)
     return value

@@ -23,7 +23,7 @@ from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
 from rehab.sessions.questionnaires import Questionnaire, questionnaire_choices
 from rehab.sessions.setup.gestures import robot_gesture_choices
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase, display_name
 
 TEMPORARY_OFFSET = (
     10_000  # of positions while phases change places; no protocol has this many phases
@@ -34,17 +34,17 @@ class SharedAdmin(ScopedAdmin):
     """Admin of rows that are the clinic's own or shared by all."""
 
     @admin.display(description=_("name"), ordering="name")
-    def named(self, row: Measure | Protocol) -> str:
+    def named(self, row: MeasureDefinition | Protocol) -> str:
         """Its name."""
         return display_name(row)
 
     @admin.display(description=_("belongs to"), ordering="clinic")
-    def whose(self, row: Measure | Protocol) -> str:
+    def whose(self, row: MeasureDefinition | Protocol) -> str:
         """Whether all clinics have it."""
         return gettext("all clinics") if row.clinic_id is None else gettext("this clinic")
 
 
-@admin.register(Measure)
+@admin.register(MeasureDefinition)
 class MeasureAdmin(SharedAdmin):
     """Measures: the shared ones, and the clinic's own."""
 

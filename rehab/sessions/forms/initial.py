@@ -13,7 +13,7 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.answers import USUAL_ANSWERS, answers_of
 from rehab.sessions.setup.gestures import DEFAULT_GESTURE, choices_from_cue
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import LIVE, source_choices
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind
@@ -133,6 +133,6 @@ def _read_last_changes(session: TrainingSession, by: User) -> dict[str, Any]:
     return {row.kind: row.data.get("value", row.value) for row in changes.order_by("pk")}
 
 
-def usual_measure(by: User) -> Measure:
+def usual_measure(by: User) -> MeasureDefinition:
     """Return A2, which all clinics share."""
-    return Measure.objects.visible_to(by).get(clinic=None, slug=A2.slug)
+    return MeasureDefinition.objects.visible_to(by).get(clinic=None, slug=A2.slug)

@@ -32,7 +32,7 @@ from rehab.sessions.setup.gestures import (
     cue_from_choices,
     robot_gesture_choices,
 )
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
@@ -49,7 +49,7 @@ class SessionForm(WalkingFields, AnswerFields):
     """The set-up of one patient's session. With its initial values it can be sent as it is."""
 
     valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
-    measure: forms.ModelChoiceField[Measure] = forms.ModelChoiceField(
+    measure: forms.ModelChoiceField[MeasureDefinition] = forms.ModelChoiceField(
         queryset=None, empty_label=None, required=False
     )
     goal_by = forms.ChoiceField(choices=[("value", _("value")), ("percent", _("% of baseline"))])
@@ -76,7 +76,7 @@ class SessionForm(WalkingFields, AnswerFields):
         super().__init__(*args, **options)
         self.patient, self.by = patient, by
         fields: dict[str, Any] = self.fields
-        fields["measure"].queryset = Measure.objects.visible_to(by)
+        fields["measure"].queryset = MeasureDefinition.objects.visible_to(by)
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
         fields["source"].choices = [
@@ -89,12 +89,12 @@ class SessionForm(WalkingFields, AnswerFields):
         """The measure that the form shows, A2 where it names none that exists."""
         field: Any = self.fields["measure"]
         try:
-            row: Measure | None = field.clean(self["measure"].value())
+            row: MeasureDefinition | None = field.clean(self["measure"].value())
         except ValidationError:
             row = None
         return A2 if row is None else row.to_rule()
 
-    def clean_measure(self) -> Measure:
+    def clean_measure(self) -> MeasureDefinition:
         """Return the measure, A2 where none is named."""
         return self.cleaned_data["measure"] or usual_measure(self.by)
 

@@ -19,7 +19,7 @@ from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.builtin import first_station
 
 # Where the person who set the session up may go next.
@@ -60,7 +60,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     else:
         initial = initial_choices(patient, user) | (chosen.to_initial(user) if chosen else {})
         form = SessionForm(initial=initial, patient=patient, by=user)
-    measures = {row.pk: row.to_rule() for row in Measure.objects.visible_to(user)}
+    measures = {row.pk: row.to_rule() for row in MeasureDefinition.objects.visible_to(user)}
     measure = form.chosen_measure
     protocols = Protocol.objects.visible_to(user).prefetch_related("phases")
     targets = {

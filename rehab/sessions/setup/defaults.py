@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from django.db import transaction
 from django.utils.translation import gettext_noop
 
-from rehab.training.measures import A2
+from rehab.training.measures import MEASURES
 from rehab.training.phases import Phase, make_phase
 
 
@@ -128,14 +128,13 @@ PROTOCOLS: dict[str, Template] = {
 
 def install_defaults(using: str = "default", **_signal: Any) -> None:
     """Add missing shared rows; existing ones are not changed."""
-    from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
-        Measure.everywhere.using(using).get_or_create(
-            clinic=None,
-            slug=A2.slug,
-            defaults={name: value for name, value in asdict(A2).items() if name != "slug"},
-        )
+        for slug, measure in MEASURES.items():
+            MeasureDefinition.everywhere.using(using).get_or_create(
+                clinic=None, slug=slug, defaults=asdict(measure)
+            )
         for name, template in PROTOCOLS.items():
             about = {"description": template.description, "wanted_hits": template.wanted_hits}
             protocol, is_new = Protocol.everywhere.using(using).get_or_create(

@@ -10,7 +10,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.clinic_valences import valences_of
 from rehab.gestures.choices import gesture_choices
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient, User
 from rehab.people.web.refusals import format_refusal
 from rehab.training.measures import InvalidSetting
@@ -34,7 +34,7 @@ def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
 
 def known_gesture_choices(by: User) -> set[str]:
     """Return all choices without their labels."""
-    composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
+    composed = ComposedGesture.objects.visible_to(by).values_list("name", flat=True)
     return {DEFAULT_GESTURE, NO_GESTURE, *GESTURES, *ORIGINALS, *composed}
 
 
@@ -51,7 +51,7 @@ def _gesture(choice: str, default: str | None) -> str | None:
 def choices_from_cue(cue: CueGestures, valence: str, patient: Patient, by: User) -> tuple[str, str]:
     """Return the choices for a cue; the default for a gesture that was deleted."""
     default = valences_of(patient.clinic_id)[valence].cue
-    composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
+    composed = ComposedGesture.objects.visible_to(by).values_list("name", flat=True)
     known = {None, *GESTURES, *ORIGINALS, *composed}
     return _choice(cue.above, default.above, known), _choice(cue.below, default.below, known)
 
@@ -69,7 +69,7 @@ def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, 
     """
     named = {name for name in (cue.above, cue.below) if name is not None}
     for name in sorted(named - GESTURES.keys() - ORIGINALS.keys()):
-        row = Gesture.everywhere.filter(clinic=patient.clinic_id, name=name).first()
+        row = ComposedGesture.everywhere.filter(clinic=patient.clinic_id, name=name).first()
         if row is None:
             raise InvalidSetting(
                 gettext("There is no gesture %(name)s. Compose it in the admin, or choose another.")

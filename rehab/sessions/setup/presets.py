@@ -30,7 +30,7 @@ from rehab.sessions.setup.answers import (
     read_schedule,
 )
 from rehab.sessions.setup.gestures import DEFAULT_GESTURE, known_gesture_choices
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import LIVE
 from rehab.sources.synthetic import PROFILES
 from rehab.training.cueing import COUNT_MAX, REST_MAX_S, WINDOW_MAX_S, WINDOW_MIN_S
@@ -57,7 +57,10 @@ class Preset(ClinicModel):
         _("feedback type"), max_length=16, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
     )
     measure = models.ForeignKey(
-        Measure, on_delete=models.CASCADE, related_name="presets", verbose_name=_("measure")
+        MeasureDefinition,
+        on_delete=models.CASCADE,
+        related_name="presets",
+        verbose_name=_("measure"),
     )
     goal_by = models.CharField(
         _("goal is given as"),

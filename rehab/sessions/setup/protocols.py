@@ -21,12 +21,12 @@ from rehab.training.phases import PHASE_KINDS, Phase
 from robot.wire.frames import NAME
 
 
-def display_name(row: Measure | Protocol) -> str:
+def display_name(row: MeasureDefinition | Protocol) -> str:
     """Return the name of a row; that of a shared one is translated."""
     return row.name if row.clinic_id else gettext(row.name)
 
 
-class Measure(ClinicModel):
+class MeasureDefinition(ClinicModel):
     """A quantity of a stride that can be trained. Without a clinic it is shared by all."""
 
     scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))

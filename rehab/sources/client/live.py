@@ -10,9 +10,9 @@ from dataclasses import replace
 
 from rehab.sources.client.playback import KEPT_MAX
 from rehab.sources.client.step_queue import add_own_reason
-from rehab.training.clocks import RemoteClock
 from rehab.training.phases import make_phase
 from rehab.training.steps import InvalidReason, Measurement, Side
+from robot.wire.clocks import RemoteClock
 
 
 class LiveFeed:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from rehab.sources.client.journal import Journal
 from rehab.sources.client.kept import Kept
-from rehab.training.clocks import LATE_S
 from rehab.training.steps import InvalidReason, Measurement
+from robot.wire.clocks import LATE_S
 from robot.wire.frames import NAME
 from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 

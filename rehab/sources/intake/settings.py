@@ -11,8 +11,8 @@ from rehab.gait.recordings.columns import (
     CHANNELS,
     SIDES,
     SIGNAL_LAYOUTS,
-    Column,
     ColumnMap,
+    SignalColumn,
     read_column,
     read_column_map,
 )
@@ -29,7 +29,7 @@ class Gyroscope:
 
     side: Side
     segment: str
-    column: Column
+    column: SignalColumn
 
 
 @dataclass(frozen=True, slots=True)

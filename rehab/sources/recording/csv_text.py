@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from itertools import islice
 
-from rehab.sources.recording.table import RecordingError, Row, Table, quote
+from rehab.sources.recording.table import RecordedTable, RecordingError, Row, quote
 
 MAX_ROWS = 200_000  # walking all day takes 80,000 strides of a leg
 MAX_CELL_CHARACTERS = 200
@@ -21,7 +21,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:e[+-]?\d+)?", re.ASCII | re.IGNOREC
 _SAVE_AGAIN = 'Open it in a spreadsheet and save it as "CSV UTF-8".'
 
 
-def parse_table(data: bytes, name: str) -> Table:
+def parse_table(data: bytes, name: str) -> RecordedTable:
     """Return the table in a file's bytes. Raises RecordingError for anything but a clean one.
 
     Accepted are UTF-8 and, with a byte order mark, UTF-16; commas, semicolons or tabs between
@@ -40,7 +40,7 @@ def parse_table(data: bytes, name: str) -> Table:
     decimal_comma = delimiter != "," and any(
         _DECIMAL_COMMA.fullmatch(cell) for row in cells for cell in row
     )
-    table = Table(name, columns, tuple(cells), "," if decimal_comma else ".")
+    table = RecordedTable(name, columns, tuple(cells), "," if decimal_comma else ".")
     for row in table.rows:
         _check_row(row)
     return table

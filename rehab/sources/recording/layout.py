@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rehab.sources.recording.table import Row, Table, quote
+from rehab.sources.recording.table import RecordedTable, Row, quote
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.steps import Side
@@ -35,11 +35,11 @@ class Layout:
     other: tuple[str, ...] = ()
     extra: tuple[str, ...] | None = None
 
-    def missing_in(self, table: Table) -> list[str]:
+    def missing_in(self, table: RecordedTable) -> list[str]:
         """Return the required columns that a table does not have."""
         return [column for column in self.required if column not in table.columns]
 
-    def extra_in(self, table: Table) -> list[str]:
+    def extra_in(self, table: RecordedTable) -> list[str]:
         """Return the columns of a table that are kept as further named values."""
         if self.extra is not None:
             return [column for column in self.extra if column in table.columns]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from rehab.sources.recording.hebb import HEBB03, HEBB91
 from rehab.sources.recording.layout import Layout
 from rehab.sources.recording.plain import PLAIN
-from rehab.sources.recording.table import RecordingError, Table, quote
+from rehab.sources.recording.table import RecordedTable, RecordingError, quote
 
 LAYOUTS: dict[str, Layout] = {layout.name: layout for layout in (HEBB03, HEBB91, PLAIN)}
 
 
-def choose_layout(table: Table, name: str | None = None) -> Layout:
+def choose_layout(table: RecordedTable, name: str | None = None) -> Layout:
     """Return the layout of that name, or the one whose required columns the table has.
 
     Raises RecordingError where the name is unknown, columns are missing or several layouts fit.

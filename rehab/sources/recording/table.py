@@ -23,7 +23,7 @@ def quote(text: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class RecordedTable:
     """A file's columns (name → place), its rows, and the mark its decimals are written with."""
 
     name: str
@@ -41,7 +41,7 @@ class Table:
 class Row:
     """One row. A column that the file does not have reads as blank."""
 
-    table: Table
+    table: RecordedTable
     number: int
     cells: list[str]
 

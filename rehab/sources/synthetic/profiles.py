@@ -101,7 +101,7 @@ class WalkerProfile:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class FeedbackResponse:
     """How people answer a feedback type, by how they answer positive feedback.
 
     Attributes
@@ -123,10 +123,10 @@ class Answer:
 # variability and retention (Wood 2024); a target that is seen is learned and kept better than
 # reward or punishment (Hill 2024). docs/reference/gait.md#outcomes
 ANSWERS = {
-    "positive": Answer(),
-    "negative": Answer(learning=1.2, retention=0.9),
-    "binary": Answer(learning=0.8, noise=1.2, retention=1.2),
-    "explicit": Answer(learning=1.4, noise=0.9, retention=1.1),
+    "positive": FeedbackResponse(),
+    "negative": FeedbackResponse(learning=1.2, retention=0.9),
+    "binary": FeedbackResponse(learning=0.8, noise=1.2, retention=1.2),
+    "explicit": FeedbackResponse(learning=1.4, noise=0.9, retention=1.1),
 }
 
 GOOD = WalkerProfile()  # learns as HEBB_03 did in session 1

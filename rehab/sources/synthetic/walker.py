@@ -12,7 +12,7 @@ import math
 import random
 from collections.abc import Iterator, Sequence
 
-from rehab.sources.synthetic.profiles import ANSWERS, GOOD, Answer, WalkerProfile
+from rehab.sources.synthetic.profiles import ANSWERS, GOOD, FeedbackResponse, WalkerProfile
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import InvalidReason, Measurement, Side
 
@@ -32,7 +32,7 @@ class SyntheticWalker:
     The caller says in which phase each stride is walked and gets one stride of the trained leg. A
     change of phase, and two minutes in one, begin a new trial after a short pause. What feedback
     shows is answered: learning leads to where the shown value exceeds the goal, by the feedback
-    type's ``Answer``; who hardly ever hits gives up some of the way.
+    type's ``FeedbackResponse``; who hardly ever hits gives up some of the way.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class SyntheticWalker:
         self.profile = profile
         self.side = side
         self.goal_w_kg: float | None = None
-        self._answer = ANSWERS.get(valence, Answer())
+        self._answer = ANSWERS.get(valence, FeedbackResponse())
         self._random = random.Random(seed).random  # noqa: S311 (chance for walking, not for secrets)
         self._number = 0
         self._time_s = 0.0

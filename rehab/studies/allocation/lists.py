@@ -13,7 +13,7 @@ MAX_ENTRIES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ListEntry:
     """A line of a list: its number within the levels of the factors, and the group."""
 
     number: int
@@ -21,7 +21,9 @@ class Entry:
     group: str
 
 
-def read_list(text: str, groups: Sequence[Group], factors: Sequence[Factor]) -> tuple[Entry, ...]:
+def read_list(
+    text: str, groups: Sequence[Group], factors: Sequence[Factor]
+) -> tuple[ListEntry, ...]:
     """Return the entries of a CSV file, by number.
 
     Its columns are `number`, each factor by its name, and `group`: an arm's code, or in a crossover
@@ -40,7 +42,7 @@ def read_list(text: str, groups: Sequence[Group], factors: Sequence[Factor]) -> 
             missing=", ".join(missing),
             wanted=", ".join(wanted),
         )
-    entries: dict[tuple[tuple[str, ...], int], Entry] = {}
+    entries: dict[tuple[tuple[str, ...], int], ListEntry] = {}
     for line, row in enumerate(reader, start=2):
         if line > MAX_ENTRIES + 1:
             raise InvalidSetting("A list has at most {most} lines.", most=MAX_ENTRIES)
@@ -57,7 +59,7 @@ def read_list(text: str, groups: Sequence[Group], factors: Sequence[Factor]) -> 
     return listed
 
 
-def _read_entry(row: dict[str, str], line: int, factors: Sequence[Factor]) -> Entry:
+def _read_entry(row: dict[str, str], line: int, factors: Sequence[Factor]) -> ListEntry:
     if not row["number"].isdecimal() or int(row["number"]) < 1:
         raise InvalidSetting(
             "Line {line}: “{number}” is no number. Count the participants from 1.",
@@ -65,10 +67,10 @@ def _read_entry(row: dict[str, str], line: int, factors: Sequence[Factor]) -> En
             number=row["number"],
         )
     levels = check_levels(factors, [row[factor.name] for factor in factors])
-    return Entry(int(row["number"]), levels, row["group"])
+    return ListEntry(int(row["number"]), levels, row["group"])
 
 
-def _check_complete(listed: Sequence[Entry], groups: Sequence[Group]) -> None:
+def _check_complete(listed: Sequence[ListEntry], groups: Sequence[Group]) -> None:
     """Raise InvalidSetting for gaps in the numbers and for a group that nobody would join."""
     expected: dict[tuple[str, ...], int] = {}
     for entry in listed:
@@ -88,7 +90,7 @@ def _check_complete(listed: Sequence[Entry], groups: Sequence[Group]) -> None:
             )
 
 
-def group_at(listed: Sequence[Entry], levels: Sequence[str], index: int) -> str:
+def group_at(listed: Sequence[ListEntry], levels: Sequence[str], index: int) -> str:
     """Return the group of a stratum's participant, counted from 0. Raises InvalidSetting."""
     here = [entry.group for entry in listed if entry.levels == tuple(levels)]
     if index >= len(here):

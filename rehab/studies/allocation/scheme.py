@@ -18,7 +18,7 @@ from rehab.studies.allocation.groups import (
     check_groups,
     check_levels,
 )
-from rehab.studies.allocation.lists import Entry
+from rehab.studies.allocation.lists import ListEntry
 from rehab.training.measures import InvalidSetting
 
 MIN_SEED_LETTERS = 8
@@ -48,7 +48,7 @@ class Secret:
 
     seed: str
     block_sizes: tuple[int, ...] = ()
-    listed: tuple[Entry, ...] = ()
+    listed: tuple[ListEntry, ...] = ()
 
     def to_text(self) -> str:
         """Return the secret as canonical JSON."""
@@ -58,7 +58,7 @@ class Secret:
     def from_text(cls, text: str) -> Secret:
         """Return the secret of ``to_text``."""
         data = json.loads(text)
-        entries = (Entry(**row | {"levels": tuple(row["levels"])}) for row in data["listed"])
+        entries = (ListEntry(**row | {"levels": tuple(row["levels"])}) for row in data["listed"])
         return cls(data["seed"], tuple(data["block_sizes"]), tuple(entries))
 
     @property

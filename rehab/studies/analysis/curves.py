@@ -14,7 +14,7 @@ BIN = 10  # strides of a point
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class CurvePlace:
     """Where a point of a curve lies: the index of its visit, of its phase, and its bin there."""
 
     visit: int
@@ -22,14 +22,14 @@ class Place:
     bin: int
 
 
-Curve = dict[Place, float]
+Curve = dict[CurvePlace, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
     """A mean over participants with its 95 % band [% of baseline]; None of too few of them."""
 
-    place: Place
+    place: CurvePlace
     participants: int
     mean: float
     low: float | None
@@ -52,7 +52,7 @@ def curve_of(walks: Sequence[Walk | None]) -> Curve:
                 values = walk.value[chosen][walk.valid[chosen]]
                 if len(values) > BIN // 2 or (len(values) and len(here) <= BIN // 2):
                     mean = 100 * float(values.mean()) / walk.baseline
-                    curve[Place(visit, phase, place)] = mean
+                    curve[CurvePlace(visit, phase, place)] = mean
     return curve
 
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from rehab.studies.analysis.walks import Flags, Floats, Walk
-from rehab.training.marking import gettext_noop
 from rehab.training.summary.metrics import METRICS, MIN_TRAINED_GAIN
+from robot.marking import gettext_noop
 
 # A mean of so many strides has a standard error of 1-2 % (docs/reference/gait.md#phases).
 ENDS = 50

@@ -15,7 +15,7 @@ CHANNEL = "channel:"  # begins the slug of a further channel's change: never reg
 
 
 @dataclass(frozen=True, slots=True)
-class Visit:
+class PlannedVisit:
     """A planned visit: in which arm, and what it gave.
 
     Attributes
@@ -47,7 +47,7 @@ class Participant:
     """One participant: code, visits in their order, whether they count, a curve for each arm."""
 
     code: str
-    visits: tuple[Visit, ...]
+    visits: tuple[PlannedVisit, ...]
     has_left: bool = False
     is_analyzed: bool = True
     curves: dict[str, Curve] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Participant:
 
 
 @dataclass(frozen=True, slots=True)
-class Walked:
+class CountedSession:
     """A session that counts: its strides, and the metrics that it stores of itself."""
 
     walk: Walk
@@ -77,13 +77,13 @@ class Walked:
 
 def make_participant(
     code: str,
-    planned: Sequence[tuple[Visit, Walked | None]],
+    planned: Sequence[tuple[PlannedVisit, CountedSession | None]],
     *,
     has_left: bool = False,
     is_analyzed: bool = True,
 ) -> Participant:
     """Return a participant from the planned visits and what was walked of them."""
-    visits: list[Visit] = []
+    visits: list[PlannedVisit] = []
     walks: dict[str, list[Walk | None]] = {}
     before: Walk | None = None
     for visit, walked in planned:
@@ -95,7 +95,7 @@ def make_participant(
         outcomes = compute_outcomes(walked.walk, before, walked.metrics)
         outcomes |= {f"{CHANNEL}{name}": value for name, value in channels.items()}
         phases = tuple(describe_phases(walked.walk))
-        visits.append(Visit(visit.number, visit.arm, True, outcomes, phases))
+        visits.append(PlannedVisit(visit.number, visit.arm, True, outcomes, phases))
         before = walked.walk
     curves = {arm: curve_of(of_arm) for arm, of_arm in walks.items()}
     return Participant(code, tuple(visits), has_left, is_analyzed, curves)
@@ -124,7 +124,7 @@ class ArmFigure:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class OutcomeResult:
     """An outcome over all arms, and the differences between them."""
 
     slug: str
@@ -134,7 +134,7 @@ class Finding:
 
 def find(
     participants: Sequence[Participant], arms: Sequence[str], slug: str, *, crossover: bool
-) -> Finding:
+) -> OutcomeResult:
     """Return what was found of an outcome."""
     groups = by_arm(participants, arms, slug)
     figures = []
@@ -143,7 +143,7 @@ def find(
         values = list(groups[arm].values())
         mean = mean_of(values) if values else None
         figures.append(ArmFigure(arm, len(values), meant - len(values), mean))
-    return Finding(slug, tuple(figures), tuple(compare(groups, paired=crossover)))
+    return OutcomeResult(slug, tuple(figures), tuple(compare(groups, paired=crossover)))
 
 
 def curves_by_arm(

@@ -23,7 +23,7 @@ FAR = 3.0  # effects beyond are drawn at the edge
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ForestRow:
     """A line of the plot: a heading without a difference, or a difference."""
 
     words: str
@@ -31,7 +31,7 @@ class Row:
     strong: bool = False
 
 
-def draw_forest(rows: Sequence[Row], title: str, x_axis: str) -> str:
+def draw_forest(rows: Sequence[ForestRow], title: str, x_axis: str) -> str:
     """Return the figure: one row each, effect sizes about a line at 0."""
     height = TOP + ROW * len(rows) + FOOT
     canvas = Canvas(WIDTH, height, title)
@@ -62,7 +62,7 @@ def draw_forest(rows: Sequence[Row], title: str, x_axis: str) -> str:
     return canvas.to_text()
 
 
-def _draw_row(canvas: Canvas, row: Row, top: float, x: Callable[[float], float]) -> None:
+def _draw_row(canvas: Canvas, row: ForestRow, top: float, x: Callable[[float], float]) -> None:
     middle = top + ROW / 2
     if row.difference is None:
         canvas.add("rect", x=8, y=round(top + 2, 1), width=WIDTH - 16, height=ROW - 4, fill=QUIET)

@@ -22,7 +22,7 @@ class PhaseLabel:
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class CurveLabels:
     """What a figure says, in the reader's language."""
 
     title: str
@@ -35,7 +35,7 @@ def draw_curves(
     curves: Mapping[str, Sequence[Point]],
     labels: Mapping[str, str],
     phases: Sequence[PhaseLabel],
-    words: Words,
+    words: CurveLabels,
 ) -> str:
     """Return the figure. ``curves`` and ``labels`` by arm, in the order of the arms."""
     everything = [point for points in curves.values() for point in points]
@@ -85,7 +85,7 @@ class _Places:
         return start + (point.place.bin + 0.5) * self.step
 
 
-def _lay_out(points: Sequence[Point], words: Words) -> _Places:
+def _lay_out(points: Sequence[Point], words: CurveLabels) -> _Places:
     bins: dict[tuple[int, int], int] = {}
     for point in points:
         key = point.place.visit, point.place.phase

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from rehab.studies.analysis.participants import Finding
+from rehab.studies.analysis.participants import OutcomeResult
 from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, Canvas, number, shorten, ticks
 
 WIDTH, HEIGHT = 1000.0, 400.0
@@ -13,7 +13,7 @@ DOT = 4.6
 
 
 def draw_people(
-    finding: Finding,
+    finding: OutcomeResult,
     values: Mapping[str, Mapping[str, float]],
     labels: Mapping[str, str],
     title: str,

@@ -32,16 +32,16 @@ from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draf
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
-from rehab.studies.protocol_pdf import write_pdf
-from rehab.studies.registration import close, register, revise, start
-from rehab.studies.results import may_look
-from rehab.studies.sealing import unseal
+from rehab.studies.registration.lifecycle import close, register, revise, start
+from rehab.studies.registration.protocol_pdf import write_pdf
+from rehab.studies.registration.sealing import unseal
+from rehab.studies.results.results import may_look
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 
 # What moves a study on, by the name of its button.
-Step = Callable[[Study, User, datetime], Any]
-STEPS: dict[str, Step] = {"register": register, "start": start, "close": close}
+StudyAction = Callable[[Study, User, datetime], Any]
+STEPS: dict[str, StudyAction] = {"register": register, "start": start, "close": close}
 
 
 def get_study(user: User, study_id: int) -> Study:

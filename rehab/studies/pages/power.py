@@ -19,11 +19,11 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.live import runtime
-from rehab.studies.drawing import outcome_label, outcome_unit
 from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.power_runs import SIMULATIONS_MAX, PowerRun, plan_run
+from rehab.studies.results.drawing import outcome_label, outcome_unit
 from rehab.studies.simulation.walkers import Population
 from rehab.training.measures import InvalidSetting
 

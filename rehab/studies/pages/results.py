@@ -18,7 +18,9 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import format_number
 from rehab.studies.analysis.comparison import Interval
-from rehab.studies.drawing import (
+from rehab.studies.models import Study, StudyState
+from rehab.studies.pages.planning import get_study
+from rehab.studies.results.drawing import (
     FIGURES,
     TABLES,
     name_pair,
@@ -26,9 +28,7 @@ from rehab.studies.drawing import (
     outcome_unit,
     write_table,
 )
-from rehab.studies.models import Study, StudyState
-from rehab.studies.pages.planning import get_study
-from rehab.studies.results import Results, may_look, note_look, read_results
+from rehab.studies.results.results import Results, may_look, note_look, read_results
 
 
 def _open(request: HttpRequest, study_id: int) -> tuple[Study, User]:

@@ -11,7 +11,7 @@ from rehab.studies.analysis.comparison import CONFIDENCE, Interval
 from rehab.studies.simulation.trial import Trial, differences, simulate
 
 
-class Found(NamedTuple):
+class SimulatedDifference(NamedTuple):
     """What one simulated study found of a pair of arms: the difference with its interval."""
 
     group: str
@@ -48,9 +48,9 @@ class PairPower:
 
 def simulate_from(
     trial: Trial, seeds: Iterable[int], every_s: float
-) -> Iterator[dict[int, list[Found]]]:
+) -> Iterator[dict[int, list[SimulatedDifference]]]:
     """Yield what the studies of some seeds found, by seed, about every so many seconds."""
-    batch: dict[int, list[Found]] = {}
+    batch: dict[int, list[SimulatedDifference]] = {}
     began = time.monotonic()
     for seed in seeds:
         batch[seed] = [
@@ -64,17 +64,17 @@ def simulate_from(
         yield batch
 
 
-def _found(group: str, reference: str, of: Interval) -> Found:
-    return Found(group, reference, of.estimate, of.low, of.high)
+def _found(group: str, reference: str, of: Interval) -> SimulatedDifference:
+    return SimulatedDifference(group, reference, of.estimate, of.low, of.high)
 
 
-def summarize(found: Sequence[Found]) -> list[PairPower]:
+def summarize(found: Sequence[SimulatedDifference]) -> list[PairPower]:
     """Return the power for each pair of arms, in the order in which they were found."""
     pairs = dict.fromkeys((one.group, one.reference) for one in found)
     return [_power(group, reference, found) for group, reference in pairs]
 
 
-def _power(group: str, reference: str, found: Sequence[Found]) -> PairPower:
+def _power(group: str, reference: str, found: Sequence[SimulatedDifference]) -> PairPower:
     mine = [one for one in found if (one.group, one.reference) == (group, reference)]
     hits = sum(
         one.low is not None and one.high is not None and (one.low > 0 or one.high < 0)

@@ -10,13 +10,13 @@ from functools import partial
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.setup.defaults import install_defaults
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.models import Arm, Study, StudyState
 from rehab.studies.participants import Enrollment
-from rehab.studies.registration import close, register, start
-from rehab.studies.results import Results, read_results
-from rehab.studies.sealing import seal
+from rehab.studies.registration.lifecycle import close, register, start
+from rehab.studies.registration.sealing import seal
+from rehab.studies.results.results import Results, read_results
 from rehab.studies.simulation.example import ARMS, OUTCOME, PHASES, SECONDARY
 from rehab.studies.simulation.trial import Trial
 from rehab.studies.simulation.walkers import Person, walk_through
@@ -68,7 +68,7 @@ def _plan(clinic: Clinic, code: str, trial: Trial, seed: int, now: datetime) -> 
         secondary_outcomes=list(SECONDARY),
         sealed=seal(trial.secret(seed)),
     )
-    measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
+    measure = MeasureDefinition.everywhere.get(clinic=None, slug=A2.slug)
     for position, (arm, valence, effect) in enumerate(ARMS):
         Arm.everywhere.create(
             study=study,

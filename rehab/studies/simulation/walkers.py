@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.training.fold import SessionFold
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.steps import Measurement, Side
+from robot.marking import gettext_noop
 
 STRIDES_MAX = 20_000  # of one session: more than three hours
 ENDLESS = gettext_noop(

@@ -15,12 +15,12 @@ from rehab.training.changes import (
     PauseReason,
     State,
 )
-from rehab.training.marking import AnyOf, Marked
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import (
     SessionPlan,
 )
 from rehab.training.valences import Valence
+from robot.marking import AnyOf, Marked
 
 
 class Audience(StrEnum):

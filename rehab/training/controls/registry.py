@@ -22,7 +22,6 @@ from rehab.training.controls.control import (
     ValueKind,
 )
 from rehab.training.cueing import check_activation_threshold
-from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.plans import (
     ROBOT_LEVELS,
@@ -31,6 +30,7 @@ from rehab.training.plans import (
     check_robot_intensity,
 )
 from rehab.training.valences import VALENCES
+from robot.marking import gettext_noop
 
 
 def _check_words_shown(number: float) -> bool:

@@ -20,7 +20,6 @@ from rehab.training.fold.tallies import Block, Tally
 from rehab.training.fold.telling import Telling
 from rehab.training.fold.valence_course import ValenceCourse
 from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
-from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.scoring import RULES_VERSION, score_measurement
@@ -35,6 +34,7 @@ from rehab.training.steps import (
     select_value,
 )
 from rehab.training.valences import Valence
+from robot.marking import Marked, gettext_noop
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
 # so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rehab.training.fold import SessionFold
-from rehab.training.marking import gettext_noop
+from robot.marking import gettext_noop
 
 # Below this share of the baseline a gain is within a walker's own noise (CV 6.5-12 %,
 # standard error of a 50-stride mean 1-2 %: docs/reference/gait.md#phases), and a share of it is

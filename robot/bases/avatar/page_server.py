@@ -23,7 +23,7 @@ POLICY = "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; conn
 MAX_PAGES = 8
 CLOSE_WITHIN_S = 2.0
 
-State = dict[str, Any]
+PageState = dict[str, Any]
 
 
 class PageServer:
@@ -34,7 +34,12 @@ class PageServer:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        self._state: State = {"state": "waiting", "pose": [0, 0, 0], "answer": None, "answers": 0}
+        self._state: PageState = {
+            "state": "waiting",
+            "pose": [0, 0, 0],
+            "answer": None,
+            "answers": 0,
+        }
         self._changed = threading.Condition()
         self._version = self._pages = 0
         self._is_closing = False
@@ -58,7 +63,7 @@ class PageServer:
                 self._version += 1
                 self._changed.notify_all()
 
-    def say(self, answer: State) -> None:
+    def say(self, answer: PageState) -> None:
         """Show an answer, also where it is the same as the one before."""
         self.show(answer=answer, answers=self._state["answers"] + 1)
 

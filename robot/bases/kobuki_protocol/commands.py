@@ -33,7 +33,7 @@ class Output(IntFlag):
     LED2_ORANGE = 0x0C00
 
 
-class Melody(IntEnum):
+class MelodyCode(IntEnum):
     """What ``SoundSequence`` can play."""
 
     ON = 0

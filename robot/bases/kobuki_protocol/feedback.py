@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from robot.bases.kobuki_protocol.frames import Malformed, frame, split, sub_payload, unpack
 
 
-class Side(IntFlag):
+class SensorSide(IntFlag):
     """Bits of ``bumper`` and ``cliff``."""
 
     RIGHT = 0x01
@@ -43,9 +43,9 @@ class CoreSensors(NamedTuple):
     """What every frame has."""
 
     time_ms: int  # wraps at 65536, as the encoders do
-    bumper: int = 0  # Side
+    bumper: int = 0  # SensorSide
     wheel_drop: int = 0  # Wheel
-    cliff: int = 0  # Side
+    cliff: int = 0  # SensorSide
     left_ticks: int = 0
     right_ticks: int = 0
     left_pwm: int = 0

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 
 from robot.bases.base import Answer, BaseState, SensorState
 from robot.bases.hazards import UNORDERED, StillWatch, rim_speed_m_s
-from robot.bases.rosbridge.figure import Figure
 from robot.bases.rosbridge.orders import Orders
 from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
 from robot.bases.rosbridge.topics import ALL_HAZARDS, RELAY_ALIVE, Topics
+from robot.bases.rosbridge.voice_and_joints import VoiceAndJoints
 from robot.motion.twist import STILL, Twist
 from robot.ros.frames import (
     BadRosFrame,
@@ -65,7 +65,7 @@ class BaseClient:
             DeadReckoning() if topics.odometry is None else ReportedOdometry()
         )
         self.sensors = HazardSensors()
-        self._figure = Figure(topics.voice, topics.joints)
+        self._voice_and_joints = VoiceAndJoints(topics.voice, topics.joints)
         self._still_watch = StillWatch()
         self._is_open = False
         self._opened_s = now_s
@@ -102,12 +102,12 @@ class BaseClient:
             if sound is not None:
                 self._signals.append(publish(topics.sound, sound))
         if self._is_open:
-            self._signals += self._figure.show(state)
+            self._signals += self._voice_and_joints.show(state)
 
     def answer(self, answer: Answer) -> None:
         """Begin to answer; one that finds no connection is left out."""
         if self._is_open:
-            self._signals += self._figure.answer(answer)
+            self._signals += self._voice_and_joints.answer(answer)
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
@@ -158,14 +158,14 @@ class BaseClient:
         self.orders.reset()
         self.odometry.order(STILL, now_s)
         self.sensors.reset()
-        self._figure.disconnect()
+        self._voice_and_joints.disconnect()
         self._missing.clear()
         self._signals.clear()
         self._relay_s = -math.inf
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames: stand still, unsubscribe, unadvertise."""
-        last_pose = list(self._figure.show("stopped"))
+        last_pose = list(self._voice_and_joints.show("stopped"))
         self.disconnect(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):

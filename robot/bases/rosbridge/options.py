@@ -9,8 +9,8 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from robot.bases.base import BadOption
-from robot.bases.rosbridge.figure import LONGEST_S, Joints, Voice
 from robot.bases.rosbridge.topics import BUMP, DEFAULT_PROFILE, PROFILES, RELAY_INPUT, Topics
+from robot.bases.rosbridge.voice_and_joints import LONGEST_S, Joints, Voice
 from robot.ros.frames import Topic
 from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, STRING, TWISTS, without_msg
 from robot.ros.signals import LIGHT_TYPES, SOUND_TYPES

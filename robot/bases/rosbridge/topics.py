@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from robot.bases.base import Abilities
-from robot.bases.rosbridge.figure import Joints, Voice
+from robot.bases.rosbridge.voice_and_joints import Joints, Voice
 from robot.ros.frames import Topic
 from robot.ros.messages import DOCK, HAZARDS, ODOMETRY, STRING, TWIST, TWIST_STAMPED
 

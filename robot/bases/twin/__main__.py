@@ -32,7 +32,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from robot.bases.kobuki_protocol import FRAME_S, Version
-from robot.bases.twin.bodies import Body, KinematicBody
+from robot.bases.twin.bodies import KinematicBody, WheeledBody
 from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
@@ -41,7 +41,7 @@ from robot.bases.twin.output import redirect_output
 from robot.bases.twin.process import Twin
 
 
-def make_body(name: str, notice: Callable[[str], None]) -> Body:
+def make_body(name: str, notice: Callable[[str], None]) -> WheeledBody:
     """Return a body by its name, ``bullet`` or ``kinematic``; ``auto`` prefers physics.
 
     Raises ImportError where physics was asked for by name and is not there.

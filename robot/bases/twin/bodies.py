@@ -32,7 +32,7 @@ class Touch(NamedTuple):
     torque_n_m: tuple[float, float] = (0.0, 0.0)
 
 
-class Body(Protocol):
+class WheeledBody(Protocol):
     """Two wheels and what they carry.
 
     Attributes

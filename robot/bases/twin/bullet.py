@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib.resources import as_file, files
 from typing import Any
 
-from robot.bases.kobuki_protocol import Side, Wheel
+from robot.bases.kobuki_protocol import SensorSide, Wheel
 from robot.bases.twin.bodies import Touch
 from robot.motion.pose import HOME, Pose, wrap
 
@@ -220,5 +220,5 @@ def _third(angle_rad: float) -> int:
     if abs(angle_rad) > math.pi / 2:
         return 0
     if abs(angle_rad) <= THIRD_RAD:
-        return Side.CENTER
-    return Side.LEFT if angle_rad > 0 else Side.RIGHT
+        return SensorSide.CENTER
+    return SensorSide.LEFT if angle_rad > 0 else SensorSide.RIGHT

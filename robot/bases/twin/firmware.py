@@ -30,8 +30,8 @@ from robot.bases.kobuki_protocol import (
     MotorCurrent,
     Output,
     RequestExtra,
+    SensorSide,
     SetGain,
-    Side,
     Sound,
     SoundSequence,
     Udid,
@@ -41,7 +41,7 @@ from robot.bases.kobuki_protocol import (
     encode_feedback,
     wheel_speeds,
 )
-from robot.bases.twin.bodies import Body
+from robot.bases.twin.bodies import WheeledBody
 from robot.bases.twin.faults import Faults
 
 # The newest firmware there is, and the common hardware (docs/reference/kobuki.md#firmware).
@@ -64,7 +64,7 @@ ORDERS_KEPT = 1024
 NO_DOCK, NO_INPUT = DockIr(), GpInput()
 
 
-class Order(NamedTuple):
+class ReceivedOrder(NamedTuple):
     """A setpoint that came in, and when [s]."""
 
     at_s: float
@@ -102,7 +102,7 @@ class Firmware:
 
     def __init__(
         self,
-        body: Body,
+        body: WheeledBody,
         faults: Faults,
         version: Version = FIRMWARE,
         watchdog_s: float | None = None,
@@ -111,7 +111,7 @@ class Firmware:
     ) -> None:
         self.body, self.faults, self.version = body, faults, version
         self.watchdog_s = watchdog_s
-        self.orders: deque[Order] = deque(maxlen=ORDERS_KEPT)
+        self.orders: deque[ReceivedOrder] = deque(maxlen=ORDERS_KEPT)
         self._chance = chance
         self.switch_on()
 
@@ -173,7 +173,7 @@ class Firmware:
             case BaseControl():
                 self._ordered_s = now_s
                 self._order(command, now_s)
-                self.orders.append(Order(now_s, command))
+                self.orders.append(ReceivedOrder(now_s, command))
             case RequestExtra(flags):
                 names = {"hardware": Extra.HARDWARE, "firmware": Extra.FIRMWARE, "udid": Extra.UDID}
                 self._requested |= {name for name, flag in names.items() if flags & flag}
@@ -237,11 +237,11 @@ class Firmware:
 
 def _cliff(floor_m: tuple[float, float, float]) -> int:
     right_m, center_m, left_m = floor_m
-    cliff = Side.RIGHT if right_m > CLIFF_M else 0
+    cliff = SensorSide.RIGHT if right_m > CLIFF_M else 0
     if center_m > CLIFF_M:
-        cliff |= Side.CENTER
+        cliff |= SensorSide.CENTER
     if left_m > CLIFF_M:
-        cliff |= Side.LEFT
+        cliff |= SensorSide.LEFT
     return cliff
 
 

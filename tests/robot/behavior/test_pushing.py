@@ -3,7 +3,7 @@
 import pytest
 
 from robot.bases.base import Abilities
-from robot.bases.kinematic import Faults, KinematicBase
+from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
 from robot.motion.twist import Twist
@@ -18,7 +18,7 @@ class PushedBase(KinematicBase):
     abilities = Abilities(simulated=False, moves=True)
 
     def __init__(self, monotonic, dead_time_s):
-        super().__init__(monotonic, Faults(dead_time_s))
+        super().__init__(monotonic, Imperfections(dead_time_s))
         self.pushed_s, self.work_j, self.last_s = 0.0, 0.0, monotonic()
 
     def drive(self, twist: Twist) -> Twist:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robot.bases.kinematic import Faults
+from robot.bases.kinematic import Imperfections
 from robot.motion.delay_meter import DelayMeter
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
@@ -77,7 +77,7 @@ def test_a_response_that_no_base_has_is_refused(bad):
 @pytest.mark.parametrize("lag_s", [0.02, 0.06])
 def test_a_late_base_ends_at_home_though_nobody_has_measured_it(gesture, dead_time_s, lag_s):
     """The full table is of `make bench`: tests/bench/test_late_gestures.py."""
-    faults = Faults(dead_time_s, lag_s, left_scale=0.98, drift_deg_min=3.0)
+    faults = Imperfections(dead_time_s, lag_s, left_scale=0.98, drift_deg_min=3.0)
     for played in play_in_a_row(gesture, faults, times=2):
         assert played.outcome == "done"
         assert played.away_m < 0.02
@@ -88,5 +88,5 @@ def test_a_late_base_ends_at_home_though_nobody_has_measured_it(gesture, dead_ti
 def test_one_that_plans_from_where_it_is_would_fail(monkeypatch):
     """The fault that the prediction mends (issue 15): a plan from the pose as it is."""
     monkeypatch.setattr("robot.motion.player.DelayMeter.delay_s", None)
-    played = play_in_a_row(GESTURES["sway"], Faults(0.16), times=2, response=AT_ONCE)
+    played = play_in_a_row(GESTURES["sway"], Imperfections(0.16), times=2, response=AT_ONCE)
     assert played[-1].outcome != "done"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from asgiref.sync import sync_to_async
 
-from rehab.gestures.models import Gesture
+from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Clinic
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import hub
@@ -237,7 +237,7 @@ async def test_composed_gestures_travel_in_the_cue(place, ready):
 
 def compose(clinic: Clinic) -> Message:
     """Make a gesture; return it as it travels."""
-    gesture = Gesture.everywhere.create(clinic=clinic, name="wave")
+    gesture = ComposedGesture.everywhere.create(clinic=clinic, name="wave")
     for position, degrees in enumerate((30, -60, 30), start=1):
         gesture.steps.create(position=position, turn_deg=degrees)
     return gesture.to_data()

@@ -11,7 +11,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Measure
+from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
@@ -223,7 +223,7 @@ async def test_the_same_step_again_is_acked_again(place, begun):
 
 
 async def test_a_measure_may_be_an_extra_value_of_the_steps(place, begun):
-    pulse = await Measure.everywhere.acreate(
+    pulse = await MeasureDefinition.everywhere.acreate(
         clinic=place.patient.clinic, slug="pulse", name="heart rate", unit="1/min",
         channel="heart_rate", value_min=30, value_max=220, goal_min=40, goal_max=200,
     )  # fmt: skip

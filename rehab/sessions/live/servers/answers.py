@@ -7,8 +7,8 @@ from typing import Any
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.servers.intercom import Data
 from rehab.training.changes import NotAllowed
-from rehab.training.marking import AnyOf, Marked
 from rehab.training.measures import InvalidSetting
+from robot.marking import AnyOf, Marked
 
 REFUSALS = {"refused": InvalidSetting, "not_allowed": NotAllowed}
 

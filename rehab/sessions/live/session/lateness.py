@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rehab.training.clocks import RemoteClock
+from robot.wire.clocks import RemoteClock
 
 
 class Lateness:

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from robot.bases.kinematic import Faults
+from robot.bases.kinematic import Imperfections
+from robot.bases.odometry import Odometry
 from robot.motion.gestures import GESTURES
-from robot.motion.odometry import Odometry
 from tests.support.gesture_runs import play_in_a_row
 
 FRAME_S = 0.02
@@ -93,7 +93,9 @@ def test_wheels_that_roll_too_far_are_taken_back():
 
 @pytest.mark.parametrize("drift_deg_min", [3.0, 30.0, -30.0])
 def test_twenty_celebrations_keep_their_heading(drift_deg_min):
-    played = play_in_a_row(GESTURES["celebrate"], Faults(drift_deg_min=drift_deg_min), times=20)
+    played = play_in_a_row(
+        GESTURES["celebrate"], Imperfections(drift_deg_min=drift_deg_min), times=20
+    )
     assert [one.outcome for one in played] == ["done"] * 20
     assert max(one.turned_deg for one in played) < 2
 
@@ -102,7 +104,9 @@ def test_twenty_celebrations_keep_their_heading(drift_deg_min):
 def test_a_heading_that_wanders_unseen_is_refused_as_away_from_home(monkeypatch, drift_deg_min):
     """A drift that no rest has taught, as of a sensor that warms up while it moves."""
     monkeypatch.setattr(Odometry, "_learn_drift", lambda *_: None)
-    played = play_in_a_row(GESTURES["celebrate"], Faults(drift_deg_min=drift_deg_min), times=20)
+    played = play_in_a_row(
+        GESTURES["celebrate"], Imperfections(drift_deg_min=drift_deg_min), times=20
+    )
     assert played[-1].outcome == "away_from_home"
     assert max(one.turned_deg for one in played[:-1]) < 2 + abs(drift_deg_min) / 60 * 4.5
 

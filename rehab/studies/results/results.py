@@ -19,15 +19,15 @@ from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.analysis.participants import (
     CHANNEL,
     ArmFlow,
-    Finding,
+    OutcomeResult,
     Participant,
     flow,
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import StudyEvent
-from rehab.studies.reading import Analysis, analyze
-from rehab.studies.registration import note
-from rehab.studies.sealing import unseal
+from rehab.studies.registration.lifecycle import note
+from rehab.studies.registration.sealing import unseal
+from rehab.studies.results.reading import Analysis, analyze
 
 
 def may_look(study: Study, user: User) -> bool:
@@ -85,7 +85,7 @@ class Results:
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
         return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
 
-    def find(self, slug: str) -> Finding:
+    def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
         return self.analysis.find(slug)
 

@@ -9,7 +9,7 @@ import pytest
 
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import Answer, BadOption
-from robot.bases.rosbridge.figure import FASTEST_RAD_S, HOLD, LONGEST_S, Joints, Voice
+from robot.bases.rosbridge.voice_and_joints import FASTEST_RAD_S, HOLD, LONGEST_S, Joints, Voice
 from robot.ros.frames import Topic
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import CLOSED, Stage

@@ -72,7 +72,7 @@ class Joints:
         return {"joint_names": list(self.names), "points": [point]}
 
 
-class Figure:
+class VoiceAndJoints:
     """The voice and the joints of a base, either of which it may lack.
 
     An answer raises it; it goes back to rest where the gesture has ended well, and stays as it is

@@ -12,10 +12,10 @@ from rehab.people.web.csv_tables import CsvWriter
 from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.analysis.participants import CHANNEL, by_arm
 from rehab.studies.figures.flow import Box, draw_flow
-from rehab.studies.figures.forest import Row, draw_forest
-from rehab.studies.figures.learning import PhaseLabel, Words, draw_curves
+from rehab.studies.figures.forest import ForestRow, draw_forest
+from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
-from rehab.studies.results import (
+from rehab.studies.results.results import (
     Results,
     curve_rows,
     difference_rows,
@@ -42,7 +42,7 @@ def outcome_unit(slug: str) -> str:
 
 def draw_learning(results: Results) -> str:
     """Return the curves of learning and retention."""
-    words = Words(
+    words = CurveLabels(
         gettext("Learning and retention, with 95 % bands"),
         gettext("% of baseline"),
         gettext("blocks of 10 strides"),
@@ -88,9 +88,9 @@ def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
         primary = slug == results.study.primary_outcome
         label = outcome_label(slug)
         heading = gettext("%(outcome)s (primary)") % {"outcome": label} if primary else label
-        rows.append(Row(heading))
+        rows.append(ForestRow(heading))
         rows += [
-            Row(name_pair(results, one.group, one.reference), one, strong=primary)
+            ForestRow(name_pair(results, one.group, one.reference), one, strong=primary)
             for one in results.find(slug).differences
         ]
     return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its interval (95 %)"))

@@ -11,10 +11,10 @@ from django.utils.translation import gettext
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
-from rehab.studies.document import describe, digest_of
 from rehab.studies.models import Study, StudyState, StudyVersion
 from rehab.studies.participants import StudyEvent
-from rehab.studies.sealing import unseal
+from rehab.studies.registration.document import describe, digest_of
+from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
 

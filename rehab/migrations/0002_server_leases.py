@@ -32,7 +32,7 @@ def drop(apps: Any, schema_editor: Any) -> None:
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0019_languages"),
+        ("rehab", "0001_tables"),
     ]
 
     operations = [migrations.RunPython(create, drop)]

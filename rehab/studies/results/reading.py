@@ -20,10 +20,10 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.studies.analysis.curves import Point
 from rehab.studies.analysis.participants import (
-    Finding,
+    CountedSession,
+    OutcomeResult,
     Participant,
-    Visit,
-    Walked,
+    PlannedVisit,
     curves_by_arm,
     find,
     make_participant,
@@ -47,10 +47,10 @@ class Analysis:
     crossover: bool
 
     @cached_property
-    def _findings(self) -> dict[str, Finding]:
+    def _findings(self) -> dict[str, OutcomeResult]:
         return {}
 
-    def find(self, slug: str) -> Finding:
+    def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
         if slug not in self._findings:
             found = find(self.participants, self.arms, slug, crossover=self.crossover)
@@ -149,7 +149,7 @@ def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Part
     group = enrollment.allocation.group.split("-")
     planned = [
         (
-            Visit(visit.number, group[visit.period], _is_due(visit, until)),
+            PlannedVisit(visit.number, group[visit.period], _is_due(visit, until)),
             _walked(enrollment, visit),
         )
         for visit in visits
@@ -168,7 +168,7 @@ def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
     return list({visit.number: visit for visit in visits.order_by("number", "attempt")}.values())
 
 
-def _walked(enrollment: Enrollment, visit: StudyVisit) -> Walked | None:
+def _walked(enrollment: Enrollment, visit: StudyVisit) -> CountedSession | None:
     """Return what a visit gave; None of one that does not count, or was corrected away."""
     session = visit.session
     if session is None or session.state != State.FINISHED or session.excluded:
@@ -178,7 +178,7 @@ def _walked(enrollment: Enrollment, visit: StudyVisit) -> Walked | None:
     return read_walked(session)
 
 
-def read_walked(session: TrainingSession) -> Walked:
+def read_walked(session: TrainingSession) -> CountedSession:
     """Return a finished session's strides and metrics."""
     plan = SessionPlan.from_json(session.plan)
     metrics = dict(session.metrics.values_list("slug", "value"))
@@ -188,4 +188,4 @@ def read_walked(session: TrainingSession) -> Walked:
         rows.values_list(*COLUMNS).iterator(),
         higher_is_better=plan.measure.higher_is_better,
     )
-    return Walked(walk, metrics)
+    return CountedSession(walk, metrics)

@@ -1,0 +1,1 @@
+"""A study's results: read from the logs, told to who may look, and drawn."""

@@ -1,0 +1,133 @@
+"""Floods, silence, strange addresses and headers: an error with a cure, and no harm to others."""
+
+from __future__ import annotations
+
+import asyncio
+
+from rehab.sessions.live.consumers import base
+from tests.support.callers import (
+    Caller,
+    MonitorPage,
+    PatientPage,
+    RobotCaller,
+    SourceCaller,
+    a_step,
+    numbers,
+    sign_in,
+)
+
+# --- too much, too little -------------------------------------------------------------------------
+
+
+async def test_a_flood_of_frames(place, begun, bystander, monkeypatch):
+    monkeypatch.setattr(base, "FRAME_BURST", 50.0)
+    monkeypatch.setattr(base, "FRAMES_PER_S", 1.0)
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0)
+    for _ in range(60):
+        await source.say(a_step(1))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4029, "flood")
+    assert "frames a second" in error["message"]
+    assert await numbers(session) == [1]
+
+
+async def test_a_flood_of_unacknowledged_steps(place, begun, bystander, stall):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    stall.begin()
+    await source.say({"type": "steps", "steps": [a_step(n) for n in range(1, 257)]})
+    assert await source.overhear() == []
+    await source.say(a_step(257))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4029, "flood")
+    assert "256" in error["message"]
+    stall.end()
+    again = await place.source().dial()
+    await again.hello()
+    await again.acked(256)
+    assert await numbers(session) == list(range(1, 257))
+
+
+async def test_silence_after_the_connection(place, monkeypatch, bystander):
+    monkeypatch.setattr(base.Socket, "first_frame_s", 0.01)
+    for caller in (SourceCaller(), place.source(), RobotCaller(), place.robot()):
+        await caller.dial()
+        code, error = await caller.sent_away()
+        assert (code, error["code"]) == (4400, "silent")
+        assert "hello" in error["message"]
+
+
+async def test_hello_ends_the_wait_for_it(place, begun, monkeypatch):
+    monkeypatch.setattr(base.Socket, "first_frame_s", 0.2)
+    await begun(place)
+    source, robot = await place.source().dial(), await place.robot().dial()
+    await source.hello()
+    await robot.hello()
+    await asyncio.sleep(0.3)
+    await source.walk(4.0)
+    await robot.hear("step")
+
+
+async def test_an_unknown_address(live_path):
+    for path in (
+        "/",
+        "/ws/",
+        "/ws/source",
+        "/ws/sources/",
+        "/ws/session/x/patient/",
+        "/ws/session/-1/patient/",
+        "/ws/session/" + "9" * 5000 + "/patient/",
+        "/ws/session/1/",
+        "/ws/source/%00/",
+    ):
+        caller = await Caller(path).dial()
+        code, error = await caller.sent_away()
+        assert (code, error["code"]) == (4004, "no_address"), path
+        assert "protocol.md" in error["message"]
+
+
+async def test_a_session_that_does_not_exist(place):
+    for number in (0, 999_999, 10**30):
+        for page in (
+            MonitorPage(number, user=place.pt),
+            PatientPage(number, token=place.tokens["tablet"]),
+        ):
+            await page.dial()
+            assert (await page.sent_away())[0] == 4004
+
+
+# --- strange headers and addresses ----------------------------------------------------------------
+
+
+async def test_a_strange_place_to_go_on_from(place, begun):
+    session = await begun(place)
+    for after in ("", "x", "-1", "1.5", "%00", "9" * 30, "9" * 5000, "²", "1&after=2"):
+        tablet = place.tablet(session, f"?after={after}")
+        assert (await tablet.watch())["number"] == 0
+
+
+async def test_a_strange_origin(place, begun):
+    session = await begun(place)
+    for origin in ("http://[", "null", "", "//", "http://[::1", "é", "http://a:b@"):
+        page = MonitorPage(session.pk, user=place.pt, origin=origin)
+        await page.dial()
+        assert (await page.sent_away())[0] == 4001, origin
+
+
+async def test_strange_cookies_beside_ours(place, begun):
+    session = await begun(place)
+    ours = f"sessionid={sign_in(place.pt)}".encode()
+    for cookie in (b"a/b=1; ", b"=; ", b"\xff=\xff; ", b'"; ', b"a[b]=1; "):
+        await MonitorPage(session.pk, headers=[(b"cookie", cookie + ours)]).watch()
+
+
+async def test_a_strange_authorization(place, begun):
+    session = await begun(place)
+    for kind in (b"Basic eDp5", b"Bearer", b"Bearer ", b"", b"\xff\xff"):
+        page = PatientPage(session.pk, headers=[(b"authorization", kind)])
+        await page.dial()
+        assert (await page.sent_away())[0] == 4001, kind

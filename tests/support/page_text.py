@@ -1,0 +1,23 @@
+"""What stands on a page: its text and its data."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from typing import Any
+
+
+def plain(page: str) -> str:
+    """Return a page with ordinary spaces only."""
+    return page.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def words(markup: str) -> str:
+    """Return the text of some markup."""
+    return html.unescape(" ".join(re.sub(r"<[^>]+>", " ", markup).split()))
+
+
+def read_json(page: str, name: str) -> Any:
+    """Return the data that a page holds for its scripts by that name."""
+    return json.loads(re.search(rf'<script id="{name}"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
