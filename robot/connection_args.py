@@ -79,11 +79,20 @@ def add_connection_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
 def find_token_store(
     options: Namespace, notify: Callable[[str], None]
 ) -> Callable[[str], bool] | None:
-    """Return what stores the next token in the command line's file; None where there is none."""
+    """Return what stores the next token in the command line's file; None where there is none.
+
+    Nor is there one where the file cannot be written, of which ``notify`` tells.
+    """
     if options.token_file is None:
         return None
     file = TokenFile(options.token_file, notify)
-    return file.keep if file.is_writable else None
+    if file.is_writable:
+        return file.keep
+    notify(
+        f"The token in {options.token_file} stays as it is, and expires 90 days after the server "
+        "has last replaced it: this account cannot write the file or its folder. Let it write both."
+    )
+    return None
 
 
 def find_token(options: Namespace, variable: str, whose: str) -> str:

@@ -10,6 +10,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
 from rehab.people.models import User
+from rehab.people.row_values import read_values, save_changes
 from rehab.stations.models import Device, Station
 from rehab.stations.pins import MAX_LENGTH, set_pin
 
@@ -29,6 +30,17 @@ class PinForm(forms.ModelForm):
         ),
     )
     no_pin = forms.BooleanField(label=_("No PIN: leaving asks a plain question"), required=False)
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._before = read_values(self.instance)
+
+    def save(self, commit: bool = True) -> Station:
+        """Save a new station; of another one what was changed: its robot may be stopped now."""
+        if self.instance.pk is None or not commit:
+            return super().save(commit)
+        save_changes(self.instance, self._before)
+        return self.instance
 
     def clean(self) -> dict[str, Any] | None:
         """Set the PIN; only its hash is stored."""

@@ -10,6 +10,7 @@ from django.utils.translation import gettext as _
 
 from rehab.people.audit.audit_log import Act, AuditEntry, truncate_address
 from rehab.people.random_codes import random_code
+from rehab.people.row_values import read_values, save_changes
 from rehab.people.sign_in.tokens import hash_token
 from rehab.stations.models import Device, Pairing, Station
 
@@ -120,6 +121,7 @@ def claim_token(pairing: Pairing) -> str | None:
     deleted, _ = Pairing.everywhere.filter(pk=pairing.pk).delete()
     if not deleted:  # another request claimed it
         return None
+    before = read_values(device)
     token = device.new_token()
-    device.save()
+    save_changes(device, before)  # not that it is valid: somebody may revoke it at this moment
     return token

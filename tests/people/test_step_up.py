@@ -78,7 +78,9 @@ def calls(lead: User, pt: User) -> dict[str, tuple[str, str, dict[str, Any]]]:
     renew = {"action": "renew_tokens", "_selected_action": token.pk}
     remove = {"action": "remove_second_factors", "_selected_action": pt.pk}
     password = reverse("admin:auth_user_password_change", args=[pt.pk])
+    account = reverse("admin:rehab_user_change", args=[pt.pk])
     erasing = {"reason": "asked", "code": "E1"}
+    first_tablet = f"{reverse('first-steps')}?step=tablet"
     return {
         "choosing a factor": ("get", reverse("set-up-second-factor"), {}),
         "adding an app": ("get", reverse("add-app"), {}),
@@ -88,6 +90,11 @@ def calls(lead: User, pt: User) -> dict[str, tuple[str, str, dict[str, Any]]]:
         "a device's token": ("get", reverse("admin:rehab_device_add"), {}),
         "another's password": ("get", password, {}),
         "another's factors": ("post", reverse("admin:rehab_user_changelist"), remove),
+        "a new account": ("get", reverse("admin:rehab_user_add"), {}),
+        "another's role": ("post", account, {"username": "rosa", "role": "lead"}),
+        "letting a tablet in": ("get", reverse("pair"), {}),
+        "letting the first tablet in": ("post", first_tablet, {"code": "XXXXXX"}),
+        "a family's link": ("get", reverse("family-links", args=[patient.pk]), {}),
         "a patient's file": ("get", reverse("patient-data", args=[patient.pk]), {}),
         "the export's page": ("get", reverse("export"), {}),
         "the export": ("get", reverse("export-sessions"), {}),

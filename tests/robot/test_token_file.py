@@ -4,9 +4,11 @@ import asyncio
 import json
 import os
 import stat
+from argparse import Namespace
 
 import pytest
 
+from robot.connection_args import find_token_store
 from robot.link import Link
 from robot.token_file import TokenFile
 from tests.support.running_client import QUICK, serving
@@ -37,6 +39,22 @@ def test_a_disk_that_refuses_leaves_the_old_one(tmp_path, monkeypatch):
     assert not TokenFile(path, said.append).keep("new")
     assert path.read_text() == "old\n"
     assert "No space left on device" in said[0]
+
+
+@pytest.mark.parametrize("closed", ["the file", "its folder", None])
+def test_a_file_that_cannot_be_written_is_told_of(closed, tmp_path, monkeypatch):
+    path = tmp_path / "token"
+    path.write_text("old\n")
+    said: list[str] = []
+    # Root may write everything, whatever the mode.
+    refused = {"the file": path, "its folder": tmp_path}.get(closed)
+    monkeypatch.setattr(os, "access", lambda place, _mode: place != refused)
+    store = find_token_store(Namespace(token_file=path), said.append)
+    assert (store is None) == bool(closed)
+    assert len(said) == bool(closed)
+    assert all(str(path) in line and "Let it write both" in line for line in said)
+    assert find_token_store(Namespace(token_file=None), said.append) is None
+    assert len(said) == bool(closed)
 
 
 @pytest.mark.parametrize("is_kept", [True, False])

@@ -191,3 +191,15 @@ def test_a_revoked_tablet_shows_a_code_again(pt, station):
     device = paired(tablet, pt, station)
     Device.everywhere.filter(pk=device.pk).update(revoked_at=timezone.now())
     assert len(shown_code(tablet)) == 6
+
+
+def test_a_tablet_that_is_revoked_while_it_claims_its_token_stays_revoked(pt, station):
+    tablet = Client()
+    pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
+    secret = tablet.cookies["garry_pairing"].value
+    found = pairing.find_pairing(secret, timezone.now())
+    assert found is not None
+    Device.everywhere.filter(station=station).update(revoked_at=timezone.now())
+    token = pairing.claim_token(found)
+    assert token is not None
+    assert tablets.find_tablet(token, timezone.now()) is None

@@ -30,6 +30,7 @@ from rehab.people.access import for_roles, public, user_of
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.people.sign_in.gate import AddressLimit
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
@@ -75,6 +76,7 @@ def show_family(request: HttpRequest, token: str) -> HttpResponse:
 
 
 @for_roles(Role.LEAD, Role.PT)
+@step_up.required
 @require_http_methods(["GET", "HEAD", "POST"])
 def show_links(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Show a patient's links; a POST gives a new one, which this answer alone shows."""

@@ -54,6 +54,9 @@ def _act(request: HttpRequest, slug: str, context: dict[str, Any]) -> HttpRespon
     """Do what a step's form asks for. Return where that leads; None to show the step."""
     user, sent = user_of(request), request.POST if request.method == "POST" else None
     there = f"{reverse('first-steps')}?step={slug}"
+    gives_a_token = slug in {"tablet", "sensor"}
+    if gives_a_token and sent is not None and not step_up.is_confirmed(request, timezone.now()):
+        return step_up.ask(request)
     if slug == "tablet" and sent is not None:
         context["problem"] = let_in(request)
         return None if context["problem"] else redirect(there)
@@ -70,8 +73,6 @@ def _act(request: HttpRequest, slug: str, context: dict[str, Any]) -> HttpRespon
         del device.fields["kind"]
         device.instance.kind = Device.Kind.SOURCE
         context["form"] = device
-        if sent is not None and not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
         if sent is not None and device.is_valid():
             return show_token(request, device.instance, device.issue())
     return None

@@ -99,6 +99,18 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
             messages.warning(request, message % {"count": removed})
         return None
 
+    def changeform_view(
+        self,
+        request: HttpRequest,
+        object_id: str | None = None,
+        form_url: str = "",
+        extra_context: Any = None,
+    ) -> HttpResponse:
+        """Show an account or the form of a new one, which could let a stranger stay in: ask."""
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        return super().changeform_view(request, object_id, form_url, extra_context)
+
     def user_change_password(
         self,
         request: HttpRequest,

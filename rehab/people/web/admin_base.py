@@ -20,9 +20,12 @@ from rehab.people.access import user_of
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
+from rehab.people.row_values import read_values, save_changes
 from rehab.people.scope import ScopedModel, visible_rows
 from rehab.people.web.row_forms import ClinicForm
 from rehab.people.web.row_keys import read_key
+
+AS_READ = "values of a row as they were read"
 
 
 def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:
@@ -141,7 +144,17 @@ class TrackedAdmin(admin.ModelAdmin):
 
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
         """Return a row; by its key where ``from_field`` is empty, on which Django fails."""
-        return super().get_object(request, object_id, from_field or None)
+        row = super().get_object(request, object_id, from_field or None)
+        if row is not None:
+            vars(row)[AS_READ] = read_values(row)
+        return row
+
+    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
+        """Save a new row; of another one what the form changed, as others may change the rest."""
+        if change:
+            save_changes(obj, vars(obj)[AS_READ])
+        else:
+            super().save_model(request, obj, form, change)
 
     def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
         """Show the list with the model's name as title."""

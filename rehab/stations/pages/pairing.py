@@ -14,6 +14,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import actor_of, clinic_of, for_roles, tablet_of, user_of
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.people.web.row_keys import read_key
 from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
@@ -24,6 +25,7 @@ from rehab.stations.tablets import COOKIE
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)
+@step_up.required
 @require_http_methods(["GET", "HEAD", "POST"])
 def pair(request: HttpRequest) -> HttpResponse:
     """Approve the tablet that shows a code, for a station of the person's own clinic."""
