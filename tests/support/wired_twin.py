@@ -16,7 +16,7 @@ from robot.bases.twin.process import Twin
 from robot.port.client import ReceivedBytes
 from tests.support.twin_bench import Wire
 
-GREETS_S = 0.5
+GREETS_S = 1.0
 
 
 class NoPort:
@@ -48,8 +48,11 @@ class WiredTwin(KobukiBase):
         self._twin = Twin(Firmware(body, Faults(), chance=chance), self._wire)
         self._client: Any = NoPort(self._wire)
         self._lived_s = monotonic() - GREETS_S
-        self.stop()  # which asks for its firmware's version
-        self.read()
+        self._monotonic = lambda: self._lived_s + FRAME_S
+        while self._lived_s < monotonic() - FRAME_S:
+            self.stop()  # which asks for its firmware's version until it is known
+            self.read()
+        self._monotonic = monotonic
 
     def read(self) -> BaseState:
         now_s = self._monotonic()

@@ -74,11 +74,11 @@ def hold(stage):
 
 
 def push_over_the_edge(stage):
-    stage.base.do("edge", ahead_m=0.2)
+    stage.base.do("edge", ahead_m=0.15)
 
 
 def bump_into_a_wall(stage):
-    stage.base.do("wall", ahead_m=0.19)
+    stage.base.do("wall", ahead_m=0.178)
 
 
 @pytest.mark.parametrize(
