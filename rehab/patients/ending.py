@@ -1,8 +1,8 @@
 """The end of a session in the patient's words: today beside last time, and one honest sentence.
 
 What is told follows the rules of the feedback type: a row of steps at the goal only where hits earn
-points, and under the explicit type the value without a verdict. Fewer is never blamed, and a goal
-that was moved is said before steps at the goal are compared.
+points, and under the explicit type the value without a verdict or a milestone. Fewer is never
+blamed, and a goal that was moved is said before steps at the goal are compared.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
+from django.db.models import Max, QuerySet
 from django.utils.translation import gettext as _
 
 from rehab.patients.visits import Visit
@@ -22,6 +23,7 @@ from rehab.training.changes import State
 
 SAME_RATE = 0.05  # hit rates of sessions that differ by less are called as many steps
 SAME_GOAL = 0.02  # of the goal
+MILESTONES = (5, 10, 25, 50)  # sessions, and each further hundred
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,14 @@ class SessionResult:
     hit_rate: float
     mean: float | None
     goal: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A figure that is told by itself."""
+
+    label: str
+    value: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +60,8 @@ def describe_ending(actor: Any, session: TrainingSession) -> dict[str, Any]:
     plan = session.to_plan()
     today, last = _find_walked(actor, session)
     if session.patient.blinded or today is None:
-        return {"title": "", "bars": [], "streak": "", "sentence": ""}
-    streak = SessionMetric.objects.visible_to(actor).filter(session=session, slug="best_streak")
-    best = streak.values_list("value", flat=True).first() if plan.valence.rewards else None
+        return {"title": "", "bars": [], "facts": [], "sentence": ""}
+    facts: list[Fact] = []
     if not plan.valence.has_points:
         title, bars = _("Your push, on average"), _mean_bars(today, last, plan.measure.unit)
         if plan.measure.slug != "a2":
@@ -61,12 +70,8 @@ def describe_ending(actor: Any, session: TrainingSession) -> dict[str, Any]:
     else:
         title, bars = _("Steps at the goal"), _hit_bars(today, last)
         sentence = describe_change(today, last)
-    return {
-        "title": title,
-        "bars": bars,
-        "streak": format_number(best, 0) if best else "",
-        "sentence": sentence,
-    }
+        facts = _find_facts(actor, session, rewards=plan.valence.rewards)
+    return {"title": title, "bars": bars, "facts": facts, "sentence": sentence}
 
 
 def describe_change(today: SessionResult, last: SessionResult | None) -> str:
@@ -88,18 +93,20 @@ def describe_change(today: SessionResult, last: SessionResult | None) -> str:
     return _("As many steps at the goal as last time.")
 
 
+def is_milestone(sessions: int) -> bool:
+    """Return whether so many sessions are a number to be told."""
+    return sessions in MILESTONES or (sessions > 0 and sessions % 100 == 0)
+
+
 def next_visit(actor: Any, session: TrainingSession, today: date) -> Visit | None:
     """Return the visit that the patient is expected for next, after today."""
     visits = Visit.objects.visible_to(actor).filter(patient=session.patient_id, day__gt=today)
     return visits.order_by("day").first()
 
 
-def _find_walked(
-    actor: Any, session: TrainingSession
-) -> tuple[SessionResult | None, SessionResult | None]:
-    """Return this session and the one before that compares: same measure, walked alike, counted."""
-    seen = TrainingSession.objects.visible_to(actor)
-    before = seen.filter(
+def _sessions_before(actor: Any, session: TrainingSession) -> QuerySet[TrainingSession]:
+    """Return the earlier sessions that compare: same measure, walked alike, counted."""
+    return TrainingSession.objects.visible_to(actor).filter(
         patient=session.patient_id,
         measure=session.measure_id,
         trained_side=session.trained_side,
@@ -108,7 +115,31 @@ def _find_walked(
         excluded=False,
         created_at__lt=session.created_at,
         metrics__slug="hit_rate",
-    ).order_by("-created_at", "-pk")
+    )
+
+
+def _find_facts(actor: Any, session: TrainingSession, *, rewards: bool) -> list[Fact]:
+    """Return the longest row of hits where hits earn points, and a round number of sessions."""
+    before = _sessions_before(actor, session)
+    facts = []
+    rows = SessionMetric.objects.visible_to(actor).filter(slug="best_streak")
+    row = rows.filter(session=session).values_list("value", flat=True).first()
+    if rewards and row:
+        earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
+        label = _("Most in a row so far") if earlier and row > earlier else _("Most in a row")
+        facts.append(Fact(label, format_number(row, 0)))
+    count = before.count() + 1
+    if is_milestone(count):
+        facts.append(Fact(_("Sessions so far"), format_number(count, 0)))
+    return facts
+
+
+def _find_walked(
+    actor: Any, session: TrainingSession
+) -> tuple[SessionResult | None, SessionResult | None]:
+    """Return this session and the newest one before that compares."""
+    seen = TrainingSession.objects.visible_to(actor)
+    before = _sessions_before(actor, session).order_by("-created_at", "-pk")
     wanted = [session.pk, *before.values_list("pk", flat=True)[:1]]
     found: dict[int, SessionResult] = {}
     for point in load_trend(actor, seen.filter(pk__in=wanted)):

@@ -109,6 +109,9 @@ class Body:
         found = self.safety.check(now_s, state, ordered, performing=player.is_busy)
         if found:
             self.stop_for(found)
+        elif self.safety.may_recover(now_s):
+            self.base.set_home()  # as a person would carry it back
+            self.safety.recover(now_s, self.senses.read())
         was, placed = player.gesture, self.placing.twist(now_s)
         if placed.is_still or not (may_be_placed and self._can_be_placed(state)):
             self.ordered = self.base.drive(player.step(now_s, state.pose))

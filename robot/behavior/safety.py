@@ -1,8 +1,9 @@
 """Whether a robot may move, and what stops it. Time is a parameter; nothing here reads or waits.
 
 A *latch* stops the base at once and holds until a person arms it again: a hazard that the base
-detected, a motion that was not ordered, a person's stop. An *obstacle* keeps the next gesture from
-starting as long as it lasts. Numbers without a source of their own are those of
+detected, a motion that was not ordered, a person's stop. A simulated base, beside which nobody
+stands, is put back and armed by itself, unless a person stopped it. An *obstacle* keeps the next
+gesture from starting as long as it lasts. Numbers without a source of their own are those of
 docs/reference/kobuki.md#beside-a-person; no standard gives any for a base of this size
 (docs/reference/kobuki.md#standards).
 """
@@ -162,6 +163,20 @@ class Safety:
         self._gestures_started = 0
         self._since.clear()
         return ""
+
+    def may_recover(self, now_s: float) -> bool:
+        """Whether a base is to be put back that stopped itself so long ago: a simulated one is."""
+        since_s = self._fault_s if self.latch not in ("", BUTTON) else None
+        return (
+            self._abilities.simulated and since_s is not None and now_s - since_s >= REARM_AFTER_S
+        )
+
+    def recover(self, now_s: float, state: BaseState) -> None:
+        """Arm a base that was put back; where something is wrong still, it waits anew."""
+        if self._base_fault(state):
+            self._fault_s = now_s
+        else:
+            self.arm(now_s, state)
 
     def start_gesture(self, now_s: float, state: BaseState) -> None:
         """Store where and when a gesture begins."""

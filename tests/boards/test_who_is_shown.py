@@ -65,6 +65,16 @@ def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clin
     assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
 
 
+def test_a_type_that_nobody_walked_with_keeps_no_session_away(clinic):
+    board = board_of(clinic, types="same", metric="score")
+    people = people_of(clinic, 6)
+    walk_down(people[1:])
+    by_mistake = [Change(ChangeKind.VALENCE_NOW, slug) for slug in ("negative", "positive")]
+    session = walk(people[0], "positive", [*strides(5, 0), *by_mistake, *strides(5, 0)])
+    assert session.changed_to == ""
+    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists()
+
+
 @pytest.mark.parametrize("language", ["en", "es"])
 def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic, language):
     person = patient_of(clinic, "A", language=language)

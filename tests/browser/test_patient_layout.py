@@ -133,3 +133,15 @@ def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
         assert tablet.locator(".actions button:visible").count() == 0
         page.click("[data-ask=end]")
         look_everywhere(page)
+
+
+def test_words_are_as_large_on_a_wall_as_on_a_laptop(server: Server, browser: Browser) -> None:
+    (walk,) = make_walks(server, {"screen": {"screen_text": "largest", "language": "es"}})
+    fits = []
+    with page_of(browser, server, walk, alone=False) as page:
+        page.wait_for_selector("body[data-look=ready]")
+        for screen in ("low-laptop", "wall"):  # of one shape
+            set_screen(page, screen)
+            page.evaluate(DRAWN)
+            fits.append(page.get_attribute(".phrase", "data-fit"))
+    assert fits[0] == fits[1]

@@ -9,10 +9,11 @@ from datetime import time, timedelta
 import pytest
 from django.urls import reverse
 
-from rehab.patients.ending import SessionResult, describe_change
+from rehab.patients.ending import SessionResult, describe_change, is_milestone
 from rehab.patients.visits import plan_visit
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
+from rehab.training.valences import VALENCES
 from tests.support.walks import HIT, MISS, walk
 from tests.support.world import NOW, World, client_of
 
@@ -62,6 +63,28 @@ def test_today_stands_beside_last_time(world, patient):
     assert "Most in a row 5" in words
     assert f"{day:%A} {day.day} {day:%B}, 2:15 p.m." in words
     assert "More steps at the goal than last time." in words
+
+
+def test_a_longer_row_than_ever_is_told_as_one(world, patient):
+    walk(patient, "binary", [HIT] * 4 + [MISS], days_ago=9)
+    walk(patient, "negative", [HIT] * 3 + [MISS] * 9, days_ago=7)
+    words = read(world, walk(patient, "positive", [HIT] * 4 + [MISS], days_ago=5))
+    assert "Most in a row 4" in words
+    words = read(world, walk(patient, "positive", [HIT] * 6 + [MISS]))
+    assert "Most in a row so far 6" in words
+
+
+@pytest.mark.parametrize("valence", list(VALENCES))
+def test_a_round_number_of_sessions_is_told_but_in_the_explicit_type(world, patient, valence):
+    for ago in range(9, 5, -1):
+        walk(patient, valence, [HIT, MISS], days_ago=ago)
+    told = "Sessions so far 5" in read(world, walk(patient, valence, [HIT, MISS]))
+    assert told == (valence != "explicit")
+    assert "so far" not in read(world, walk(patient, valence, [HIT, MISS], days_ago=-1))
+
+
+def test_round_numbers_become_rarer():
+    assert [n for n in range(1, 301) if is_milestone(n)] == [5, 10, 25, 50, 100, 200, 300]
 
 
 def test_a_type_that_only_takes_points_praises_no_row(world, patient):

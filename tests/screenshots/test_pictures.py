@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from rehab.sessions.setup.defaults import PROTOCOLS
 from tests.support.browsers import SIZES, chromium
 from tests.support.servers import ROOT, clean_environment, serve
 
@@ -25,8 +26,8 @@ PAGES = {
     "session": "/admin/rehab/trainingsession/12/change/",
     "protocols": "/admin/rehab/protocol/",
     "protocol": "/admin/rehab/protocol/2/change/",
-    "own-protocol": "/admin/rehab/protocol/4/change/",
-    "delete-protocol": "/admin/rehab/protocol/4/delete/",
+    "own-protocol": f"/admin/rehab/protocol/{len(PROTOCOLS) + 1}/change/",
+    "delete-protocol": f"/admin/rehab/protocol/{len(PROTOCOLS) + 1}/delete/",
     "presets": "/admin/rehab/preset/",
     "preset": "/admin/rehab/preset/1/change/",
     "stations": "/admin/rehab/station/",
@@ -72,8 +73,24 @@ PAGES = {
     "export": "/export/",
     "audit-log": "/admin/rehab/auditentry/",
     "changes": "/admin/rehab/patient/2/history/",
-    "therapist": "/sessions/13/monitor/",  # last: by then there is something to see
+    "ending-largest": "/sessions/14/ending/",  # of a patient who reads German
+    "scores-largest": "/sessions/14/scores/",
+    "therapist": "/sessions/15/monitor/",  # last: by then there is something to see
 }
+# How else some of them are looked at: width, height, language, and whether in the dark.
+LOOKS = {
+    "low-laptop": (1366, 768, "", False),
+    "wall": (3840, 2160, "", False),
+    "dark": (1440, 900, "", True),
+    "es": (800, 1280, "es", False),
+    "de": (390, 844, "de", True),
+}
+LOOKED_AT = (
+    *("home", "account", "admin", "start", "patient", "new-patient", "screen", "set-up", "records"),
+    *("past-sessions", "session-details", "insight", "replay", "report", "stations-and-devices"),
+    *("pair", "first-steps", "check-recording", "protocol", "ending", "ending-largest"),
+    *("scores-points", "scores-kept", "scores-largest", "take-home", "therapist"),
+)
 
 # A gesture, patient 2 with the sessions 4 to 12, walked over three weeks, and who else is expected.
 VISITS = """
@@ -101,6 +118,13 @@ for index, valence in enumerate(types):
     days_ago = 3 * (len(types) - 1 - index)
     last = visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
 lead = User.everywhere.get(username="pt")
+jutta = Patient.everywhere.create(
+    clinic=first_clinic(), code="K7-260", nickname="Jutta", paretic_side="left", language="de",
+    screen_text="largest",
+)
+for days_ago in (7, 1):
+    visit(jutta, "positive", 20 + days_ago, days_ago, 360, timezone.now())
+plan_visit(jutta, timezone.now().date() + timedelta(2), time(14, 15))
 excluded = TrainingSession.everywhere.get(pk=11)
 changes = {
     CorrectedField.COUNTS: "no",
@@ -207,8 +231,38 @@ def signed_in(tmp_path_factory):
 @pytest.mark.parametrize("name", PAGES)
 def test_picture(signed_in, name, size):
     width, height = SIZES[size]
-    page = signed_in.new_page()
+    take(signed_in, name, size, width, height)
+
+
+@pytest.fixture(scope="module", params=LOOKS)
+def look(request, signed_in):
+    """The name of a look; what is shown has its language."""
+    language = LOOKS[request.param][2]
+    speak(signed_in, language)
+    yield request.param
+    if language:
+        speak(signed_in, "")
+
+
+@pytest.mark.parametrize("name", LOOKED_AT)
+def test_look(signed_in, name, look):
+    width, height, _language, dark = LOOKS[look]
+    take(signed_in, name, look, width, height, dark=dark)
+
+
+def speak(context, language):
+    page = context.new_page()
+    page.goto("/account/")
+    page.select_option("#language", language)
+    page.click("form:has(#language) button")
+    page.close()
+
+
+def take(context, name, size, width, height, *, dark=False):
+    """Take a picture of a page; fail where it complains or scrolls sideways."""
+    page = context.new_page()
     page.set_viewport_size({"width": width, "height": height})
+    page.emulate_media(color_scheme="dark" if dark else "light", reduced_motion="reduce")
     complaints: list[str] = []
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)

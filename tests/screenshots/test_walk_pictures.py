@@ -59,6 +59,10 @@ class Screens:
         assert self.complaints == []
 
 
+# Where a patient's page is seldom shown: a wall, a low laptop, and a phone for the therapist.
+ELSEWHERE = {"wall": (3840, 2160), "low-laptop": (1366, 768), "phone": (390, 844)}
+
+
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
     with serve(tmp_path / "data") as running:
@@ -69,6 +73,38 @@ def server(tmp_path: Path) -> Iterator[Server]:
 def stack() -> Iterator[ExitStack]:
     with ExitStack() as running:
         yield running
+
+
+def open_screens(
+    server: Server, stack: ExitStack, cookie: str, sizes: dict[str, tuple[int, int]]
+) -> Screens:
+    """Open a page of each size for the person of a cookie."""
+    browser = stack.enter_context(chromium())
+    pages = {}
+    for name, (width, height) in sizes.items():
+        size = ViewportSize(width=width, height=height)
+        context = browser.new_context(base_url=server.url, viewport=size)
+        context.add_cookies([{"name": "sessionid", "value": cookie, "url": server.url}])
+        pages[name] = context.new_page()
+    return Screens(pages)
+
+
+def test_pictures_in_the_largest_words_of_two_languages(server: Server, stack: ExitStack) -> None:
+    FOLDER.mkdir(exist_ok=True)
+    languages = ("es", "de")
+    wanted = [{"screen": {"screen_text": "largest", "language": each}} for each in languages]
+    walks = make_walks(server, *wanted)
+    screens = open_screens(server, stack, walks[0].cookie, ELSEWHERE)
+    for language, walk in zip(languages, walks, strict=True):
+        screens.show(walk)
+        screens.take(f"{language}-ready", "ready")
+        screens.tap("[data-change=start]")
+        with feet_of(server, walk) as feet:
+            feet.walk(*PAST, 0.83)
+            screens.take(f"{language}-miss", "feedback")
+        screens.take(f"{language}-lost", "lost")
+        screens.tap("button.pause")
+        screens.take(f"{language}-paused", "paused")
 
 
 def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
@@ -86,14 +122,8 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
         catch,
     ]
     *walks, left, center, large, calm = make_walks(server, *wanted)
-    browser = stack.enter_context(chromium())
-    pages = {}
-    for name, (width, height) in SIZES.items():
-        size = ViewportSize(width=width, height=height)
-        context = browser.new_context(base_url=server.url, viewport=size)
-        context.add_cookies([{"name": "sessionid", "value": calm.cookie, "url": server.url}])
-        pages[name] = context.new_page()
-    screens = Screens(pages)
+    screens = open_screens(server, stack, calm.cookie, SIZES)
+    pages = screens.pages
     for valence, walk in zip(valences, walks, strict=True):
         screens.show(walk)
         if valence == "positive":

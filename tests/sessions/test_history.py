@@ -81,6 +81,15 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
     ]
 
 
+def test_only_a_type_that_changed_is_pointed_out(client, patient):
+    cancelled = [Change(ChangeKind.VALENCE, "binary"), Change(ChangeKind.VALENCE_NOW, "positive")]
+    switched = Change(ChangeKind.VALENCE_NOW, "negative")
+    phases = (make_phase("training", strides=9), make_phase("training", "Later"))
+    session = walk(patient, "positive", [2.3, *cancelled, 2.3, switched, 2.3], phases=phases)
+    marks = read_json(detail(client, session), "session")["marks"]
+    assert [(mark["after"], mark["kind"]) for mark in marks] == [(1, "valence"), (2, "valence_now")]
+
+
 def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
     from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.services import SessionRequest, create_session

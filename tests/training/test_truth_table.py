@@ -176,6 +176,24 @@ def test_a_type_changed_at_once_holds_from_the_next_step_of_the_same_phase(
     )
 
 
+def test_a_type_counts_as_changed_to_only_once_a_step_may_have_come() -> None:
+    plan = make_plan(
+        make_phase("training"), valence="explicit", alternatives=others_than("explicit")
+    )
+    fold = start(plan)
+    walk(fold, [HIT, MISS])
+    fold.change(Change(ChangeKind.VALENCE_NOW, "binary"))
+    assert fold.valences.changed_to == ("binary",)
+    fold.change(Change(ChangeKind.VALENCE_NOW, "explicit"))
+    assert (fold.valences.changed_to, fold.valences.have_points) == ((), False)
+    walk(fold, [HIT])
+    fold.change(Change(ChangeKind.VALENCE_NOW, "binary"))
+    fold.change(Change(ChangeKind.VALENCE_NOW, "negative"))
+    walk(fold, [HIT])
+    fold.change(Change(ChangeKind.VALENCE_NOW, "explicit"))
+    assert fold.valences.changed_to == ("negative",)
+
+
 def test_only_explicit_has_no_score(valence: str) -> None:
     fold = start(make_plan(valence=valence))
     assert fold.score == (None if valence == "explicit" else 0)

@@ -1,13 +1,14 @@
-"""The PT's page of a running session."""
+"""The PT's page of a running session, and the notes that are typed there."""
 
 from __future__ import annotations
 
 from django.contrib import messages
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
 from django.utils.text import capfirst
 from django.utils.translation import gettext as _
-from django.views.decorators.http import require_safe
+from django.views.decorators.http import require_POST, require_safe
 
 from rehab.people.access import for_roles, user_of
 from rehab.people.consent.services import is_remote_view_allowed
@@ -15,12 +16,14 @@ from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.sessions.control_text import chart_marks
+from rehab.sessions.corrections import add_note
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
 from rehab.sessions.log import EVENTS, REMARK_RANGES, FallSeverity, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.answers import ADAPTATIONS
 from rehab.training.plans import ROBOT_LEVELS
 
+NOTE_MAX_CHARS = 500
 # The icon of each remark that is noted and no more, in the order of the buttons. A fall does more.
 ICONS = {
     Remark.REST: "rest",
@@ -68,3 +71,17 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
         ],
     }
     return render(request, "sessions/monitor.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def write_note(request: HttpRequest, session_id: int) -> JsonResponse:
+    """Add a line to a session's note; who it names is erased with the patient."""
+    user = user_of(request)
+    session = get_object_or_404(TrainingSession.objects.visible_to(user), pk=session_id)
+    line = request.POST.get("note", "").strip()
+    if not 0 < len(line) <= NOTE_MAX_CHARS:
+        message = _("Write a note of up to %(count)s letters.") % {"count": NOTE_MAX_CHARS}
+        return JsonResponse({"message": message}, status=400)
+    add_note(session, line, user, timezone.now())
+    return JsonResponse({"message": _("Noted: %(what)s") % {"what": line}})

@@ -139,7 +139,7 @@ def stride_chart(
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
     phases = [(plan.phases[index], [number for _, number in run]) for index, run in runs]
-    marked = {*marked_kinds(), ChangeKind.VALENCE_NOW}  # live, its mark comes with the switch
+    marked = marked_kinds()
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
@@ -156,9 +156,18 @@ def stride_chart(
         "marks": [
             {"after": entry.event.after_number, "kind": entry.event.kind, "words": entry.text}
             for entry in events
-            if entry.event.kind in marked
+            if entry.event.kind in marked or _is_switch(entry.event, fold)
         ],
     }
+
+
+def _is_switch(event: SessionEvent, fold: SessionFold) -> bool:
+    """Return whether the type changed at once; live, its mark comes with the switch.
+
+    The request may also have taken a scheduled type back, which changes nothing that is walked.
+    """
+    asked = event.after_number, event.data.get("value")
+    return event.kind == ChangeKind.VALENCE_NOW and asked in fold.valences.switches
 
 
 def _valences_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:

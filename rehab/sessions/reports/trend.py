@@ -165,7 +165,7 @@ def summarize_trend(
         else "",
         "change": format_change(change),
         "means": means,
-        "measure": last.session.measure.name if last else "",
+        "measure": gettext(last.session.measure.name) if last else "",
         "duration": format_duration(sum(group["active_s"] for group in counted)),
         "count": sum(group["pk__count"] for group in counted),
         "excluded": 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 
 from rehab.training.bands import bands_from_json
 from rehab.training.changes import NotAllowed
@@ -42,8 +43,14 @@ class ValenceCourse:
 
     @property
     def changed_to(self) -> tuple[str, ...]:
-        """The valences that the session was changed to, in that order, each once."""
-        others = dict.fromkeys(slug for _, slug in self.switches)
+        """The valences that the session was changed to, in that order, each once.
+
+        One that was changed again before a step came is none of them: nobody walked with it.
+        """
+        steps = [after for after, _ in self.switches]
+        others = dict.fromkeys(
+            slug for (after, slug), until in zip_longest(self.switches, steps[1:]) if after != until
+        )
         others.pop(self.plan.valence.slug, None)
         return tuple(others)
 

@@ -29,6 +29,7 @@ export function draw(element, { data, series, xAxis, yAxis, under, paint, onCurs
     legend: { show: false },
     hooks,
     ...more,
+    cursor: { ...more.cursor, move: (_chart, ...place) => place.map((part) => part / (element.currentCSSZoom ?? 1)) },
   };
   const chart = new uPlot(options, data, element);
   new ResizeObserver(() => chart.setSize(size())).observe(element);

@@ -7,7 +7,7 @@ const VIBRATION_MS = [300, 120, 300];
 
 let audio;
 
-// A browser plays nothing before its page was touched.
+// A browser plays nothing, and does not vibrate, before its page was touched.
 function wake() {
   audio ??= new AudioContext();
   audio.resume().catch(() => {});
@@ -25,7 +25,7 @@ function play(hz, at_s) {
 }
 
 export function soundAlarm() {
-  navigator.vibrate?.(VIBRATION_MS);
+  if (navigator.userActivation?.hasBeenActive !== false) navigator.vibrate?.(VIBRATION_MS);
   if (audio?.state !== "running") return;
   TONES_HZ.forEach((hz, index) => play(hz, audio.currentTime + index * APART_S));
 }

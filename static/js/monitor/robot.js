@@ -31,6 +31,7 @@ const NOTABLE = new Set([
 
 // In these a person has to look at it, and let it move.
 const WAITING_STATES = new Set(["stopped", "disarmed", "away"]);
+const BY_PERSON = new Set(["stopped", "button"]); // reasons that nothing but a person lifts
 
 export class RobotPanel {
   #page;
@@ -177,9 +178,16 @@ export class RobotPanel {
     return this.#isConnected && isReal && !this.#isHeld && this.#page.state.session?.state !== "running";
   }
 
+  // Whether it is simulated and stopped itself: it is put back by itself in a moment.
+  get #isRecovering() {
+    const { state, reason, simulated } = this.#status ?? {};
+    return !this.#isStopped && simulated === true && state === "stopped" && !BY_PERSON.has(reason);
+  }
+
   // Whether a person has to arm it before it moves.
   get #isHeld() {
     if (this.#isStopped) return true;
+    if (this.#isRecovering) return false;
     const { state, reason } = this.#status ?? {};
     return this.#isConnected && (WAITING_STATES.has(state) || reason === "place_unknown");
   }
@@ -213,7 +221,8 @@ export class RobotPanel {
 
   // Return why it stands although somebody walks, with the cure; "" where it does not.
   get alarm() {
-    if (!this.#isConnected || !(this.#isStopped || this.#status?.state === "stopped")) return "";
+    if (!this.#isConnected || this.#isRecovering) return "";
+    if (!this.#isStopped && this.#status?.state !== "stopped") return "";
     const why = describeReason(this.#status?.reason || "stopped");
     const cure = cureOf(this.#status?.reason);
     const again = _("“Let it move” is in its panel.");

@@ -1,6 +1,7 @@
 // On a calm screen large text takes the room above the figure, and shrinks where it needs more.
 
 const SIZES = 4; // as walk.css has them for data-fit
+const OVERHANG = 0.02; // of its height: what letters reach beyond their lines, at any size
 
 export function createFitting(body) {
   const phrase = body.querySelector(".phrase");
@@ -8,7 +9,8 @@ export function createFitting(body) {
   const sizes = new Map(); // of texts that were fitted before
   addEventListener("resize", () => sizes.clear());
 
-  const overflows = () => phrase.scrollHeight > phrase.clientHeight + 2 || phrase.scrollWidth > phrase.clientWidth + 2;
+  const overflows = () =>
+    phrase.scrollHeight > phrase.clientHeight * (1 + OVERHANG) + 2 || phrase.scrollWidth > phrase.clientWidth + 2;
 
   return function fit() {
     const text = `${body.dataset.look} ${words.textContent} ${sub.textContent}`;
