@@ -15,8 +15,10 @@ log = logging.getLogger(__name__)
 # Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
 # them rare.
 GC_THRESHOLDS = (50_000, 50, 100)
-# How long the event loop may keep the interpreter's lock while the writer wants it (default 5 ms).
-SWITCH_S = 0.002
+# How long a thread may keep the interpreter's lock while another one wants it (default 5 ms). The
+# event loop of daphne gives it up at each system call: while a thread computes a page, each step
+# takes so long several times (docs/performance.md#while-strangers-try-to-sign-in).
+SWITCH_S = 0.0002
 STOP_S = 30.0  # more than a stuck database may hold up the writer
 
 

@@ -29,10 +29,14 @@ CLOSE_S = 2.0  # how long clients have to answer our close frame
 class BoundedRequest(http_protocol.WebRequest):  # type: ignore[misc]
     """Closes the connection of a request whose body is longer than any page accepts.
 
-    Twisted would write all of it to the disk before Django could refuse it.
+    Twisted would write all of it to the disk before Django could refuse it. It would also read a
+    form that Django reads again.
     """
 
     too_long = False
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, parsePOSTFormSubmission=False, **options)
 
     def handleContentChunk(self, data: bytes) -> None:  # noqa: N802
         """Receive a part of the body."""
