@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from rehab.training.adaptation import AdaptationMode
@@ -41,10 +40,6 @@ from rehab.training.valences import Valence
 # (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
 ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
-
-
-def _suggest_nothing() -> None:
-    """Return None: goals may not follow."""
 
 
 class SessionFold:
@@ -120,13 +115,9 @@ class SessionFold:
 
         Nothing while goals may not follow: in a phase without feedback, and while the mode is off.
         """
-        return self.suggestion()()
-
-    def suggestion(self) -> Callable[[], float | None]:
-        """Return what computes, later, the goal that is suggested now."""
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
-            return _suggest_nothing
-        return self.following.suggestion(self.gain)
+            return None
+        return self.following.suggest(self.gain)
 
     @property
     def score(self) -> int | None:
@@ -215,7 +206,9 @@ class SessionFold:
             self.phases[self.phase_index].add(step)
             valence = self.valences.current.slug if self.phase.feedback else ""
             block = Block(self.phase_index, self.gain, valence)
-            self.blocks.setdefault(block, Tally()).add(step)
+            if (tally := self.blocks.get(block)) is None:
+                tally = self.blocks[block] = Tally()
+            tally.add(step)
             if self.phase.feedback:
                 self.feedback.add(step)
                 self.telling.add(step, self.feedback.judged)

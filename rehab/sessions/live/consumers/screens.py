@@ -30,6 +30,7 @@ from rehab.sessions.live.protocol.messages import (
     read_frame,
     read_order,
     read_remark,
+    read_seen,
 )
 from rehab.sessions.live.servers.following import FollowedSession
 from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
@@ -144,6 +145,19 @@ class ScreenConsumer(Socket):
                 await subscriber.send_backlog(texts)
             after = steps[-1].number
 
+    def handle_now(self, text: str) -> bool:
+        """Note what the page has seen, as most frames say; all else takes its turn."""
+        frame = read_seen(text)
+        if frame is not None:
+            self._confirm(frame)
+        return frame is not None
+
+    def _confirm(self, frame: int) -> None:
+        if self.subscriber is not None:
+            self.subscriber.confirm(frame)
+        if isinstance(self.actor, Device) and self.live is not None:
+            self.live.tablet_heard_at = timezone.now()
+
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame of a page."""
         await self.on_message(read_frame(text))
@@ -152,10 +166,7 @@ class ScreenConsumer(Socket):
         """Handle a message of a page."""
         match message.get("type"):
             case "seen":
-                if self.subscriber is not None:
-                    self.subscriber.confirm(read_whole(message, "frame", low=0))
-                if isinstance(self.actor, Device) and self.live is not None:
-                    self.live.tablet_heard_at = timezone.now()
+                self._confirm(read_whole(message, "frame", low=0))
             case "change":
                 await self._change(message)
             case "robot" if message.get("order") == "drive":
