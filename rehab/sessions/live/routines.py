@@ -15,9 +15,9 @@ from rehab.people.audit.seals import SEALED_AFTER, seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.database.trouble import WORDS, Trouble
-from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.process import move_database_log
 from rehab.sessions.live.servers.servers import Servers
+from rehab.sessions.live.session.instruments import LATE_S
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.writer import Writer
 from rehab.training.controls import Audience

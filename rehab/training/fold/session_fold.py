@@ -82,20 +82,17 @@ class SessionFold:
     @property
     def activation_threshold(self) -> float:
         """Mean performance of a window from which on the robot celebrates."""
-        threshold: float = self.settings[ChangeKind.ACTIVATION_THRESHOLD]
-        return threshold
+        return float(self.settings[ChangeKind.ACTIVATION_THRESHOLD])
 
     @property
     def robot_intensity(self) -> float:
         """Share of its gestures' size that the robot moves with; 0 for none."""
-        intensity: float = self.settings[ChangeKind.ROBOT_INTENSITY]
-        return intensity
+        return float(self.settings[ChangeKind.ROBOT_INTENSITY])
 
     @property
     def words_shown(self) -> bool:
         """Whether the patient's page shows words."""
-        shown: bool = self.settings[ChangeKind.WORDS_SHOWN]
-        return shown
+        return bool(self.settings[ChangeKind.WORDS_SHOWN])
 
     @property
     def chart_style(self) -> ChartStyle:
@@ -111,10 +108,7 @@ class SessionFold:
 
     @property
     def suggested_goal(self) -> float | None:
-        """The goal that the latest strides would have reached as often as is wanted, if any.
-
-        Nothing while goals may not follow: in a phase without feedback, and while the mode is off.
-        """
+        """The goal that the latest strides would have reached as often as wanted; None without."""
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
             return None
         return self.following.suggest(self.gain)

@@ -7,7 +7,7 @@ is plain, and their own for all else (websockets.py, uvicorn_server.py).
 
 from __future__ import annotations
 
-from websockets.frames import apply_mask  # in C
+from websockets.frames import apply_mask  # type: ignore[attr-defined]  # in C where it can be
 
 MAX_WAITING_BYTES = 256 * 1024  # received of a client, and not handled yet
 MESSAGE_BYTES = 512  # what a message takes beside its text

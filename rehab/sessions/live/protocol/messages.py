@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar
+from urllib.parse import parse_qs
 
 import msgspec
 
@@ -84,6 +85,12 @@ def read_seen(text: str) -> int | None:
         return _decode_seen(text).frame
     except (msgspec.MsgspecError, RecursionError, UnicodeError):
         return None
+
+
+def read_after(query: bytes) -> int | None:
+    """Return which step a page has already, as its address says; None for a new page."""
+    words = parse_qs(query.decode("latin-1")).get("after", [])
+    return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None
 
 
 def read_hello(message: Message) -> Hello:
