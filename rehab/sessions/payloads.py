@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from django.utils.translation import gettext, override
 
@@ -19,37 +18,7 @@ from rehab.training.valences import VALENCES, Valence
 Message = dict[str, Any]
 
 
-class Standing(NamedTuple):
-    """How a session stands: kept with an event, whose texts are built when they are asked for."""
-
-    active_s: float
-    phase_s: float
-    phase_strides: int
-    score: int | None
-    streak: int
-    hit_rate: float | None
-    hits: int
-    judged: int
-    close: int
-
-    @classmethod
-    def of(cls, fold: SessionFold) -> Standing:
-        """Return how a session stands now."""
-        tally = fold.feedback
-        return cls(
-            fold.active_s,
-            fold.phase_s,
-            fold.phase_strides,
-            fold.score,
-            tally.streak,
-            tally.hit_rate,
-            tally.hits,
-            tally.judged,
-            tally.close,
-        )
-
-
-def describe_walked(walked: SessionFold | Standing) -> Message:
+def describe_walked(walked: SessionFold) -> Message:
     """Return how far the session and its phase have come."""
     return {
         "active_s": round(walked.active_s, 2),
@@ -58,7 +27,7 @@ def describe_walked(walked: SessionFold | Standing) -> Message:
     }
 
 
-def describe_rates(tally: Tally | Standing) -> Message:
+def describe_rates(tally: Tally) -> Message:
     """Return the share of hits, and what it is counted from."""
     return {
         "hit_rate": tally.hit_rate,
@@ -152,23 +121,12 @@ def describe_coaching(fold: SessionFold) -> Message:
 
     ``suggested_goal`` is rounded as buttons round goals; ``baseline`` is there while it is walked.
     """
-    return coaching_of(fold)()
-
-
-def coaching_of(fold: SessionFold) -> Callable[[], Message]:
-    """Return what describes later how a goal can be set now: not every step has a PT's page."""
-    suggest, measure, wanted = fold.suggestion(), fold.plan.measure, fold.following.wanted_hit_rate
-    baseline = _describe_baseline(fold) if fold.phase.kind == "baseline" else None
-
-    def describe() -> Message:
-        goal = suggest()
-        return {
-            "wanted_hit_rate": wanted,
-            "suggested_goal": None if goal is None else round(goal, measure.goal_places),
-            "baseline": baseline,
-        }
-
-    return describe
+    goal = fold.suggested_goal
+    return {
+        "wanted_hit_rate": fold.following.wanted_hit_rate,
+        "suggested_goal": None if goal is None else round(goal, fold.plan.measure.goal_places),
+        "baseline": _describe_baseline(fold) if fold.phase.kind == "baseline" else None,
+    }
 
 
 def _describe_baseline(fold: SessionFold) -> Message:

@@ -15,9 +15,10 @@ from django.conf import settings
 from django.core.management import get_commands, load_command_class
 from prometheus_client import generate_latest
 
-from rehab.sessions.live import instruments, runtime
+from rehab.sessions.live import runtime
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
+from rehab.sessions.live.session import instruments
 from rehab.sources import load_source
 from rehab.sources.arguments import make_parser as make_source_parser
 from robot.__main__ import make_parser

@@ -14,7 +14,8 @@ import signal
 import ssl
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from tests.support.servers import ROOT, clean_environment, free_port
 
 GONE = (ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError)
 
+STUCK_S = 60.0  # without any progress something hangs; a busy machine is only slow
 RETRY_S = 0.25  # less would be a flood, which the proxy refuses
 PASSING = {"elsewhere", "not_stored", "server_error"}  # errors after which one dials in again
 
@@ -66,6 +68,11 @@ class Walk:
     seen: list[int] = field(default_factory=list)
     stopping: bool = False
     server: str = ""  # of several: the one that has the session, as another one said
+
+    @property
+    def has_seen_all(self) -> bool:
+        """Whether the viewer has seen all that the source has made."""
+        return bool(self.seen) and self.seen[-1] >= self.made
 
     def dial(self, path: str, token: str) -> connect:
         chosen = {"GARRY-Server": self.server} if self.server and "source" in path else {}
@@ -170,6 +177,7 @@ class Torture:
         self.serve = serve
         self.rate = rate
         self.walks: list[Walk] = []
+        self.resumed = 0  # sessions, by their PTs
         self.environment = clean_environment(folder, self.port) | {
             "DJANGO_SETTINGS_MODULE": "garry_site.settings"
         }
@@ -211,9 +219,9 @@ class Torture:
 
         The page dials until a proxy lets it through, as pages do.
         """
-        async with asyncio.timeout(30):
-            while not await self._resume(walk):  # noqa: ASYNC110
-                await asyncio.sleep(RETRY_S)
+        while not await self._resume(walk):  # noqa: ASYNC110
+            await asyncio.sleep(RETRY_S)
+        self.resumed += 1
 
     async def _resume(self, walk: Walk) -> bool:
         cookie = f"sessionid={walk.row['cookie']}"
@@ -241,38 +249,47 @@ class Torture:
         self.walks = [Walk(row, self.entrance, self.rate) for row in rows]
         senders = [asyncio.create_task(walk.send()) for walk in self.walks]
         watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
-        async with asyncio.timeout(60):  # until the server has all of them
-            while not all(walk.acknowledged for walk in self.walks):  # noqa: ASYNC110
-                await asyncio.sleep(0.05)
+        await self._until(lambda: all(walk.acknowledged for walk in self.walks))
         kills, statuses = 0, []
         for _ in range(rounds):
             await asyncio.sleep(self.random.uniform(0.2, 1.5))
             is_orderly = self.random.random() < orderly
             server.send_signal(signal.SIGTERM if is_orderly else signal.SIGKILL)
-            status = await asyncio.wait_for(server.wait(), 30)
+            status = await server.wait()  # which ends itself in time (process.end_in_time)
             server = await self.start_server()
             if is_orderly:
                 statuses.append(status)
             else:
                 kills += 1
-                await asyncio.gather(*(self.resume(walk) for walk in self.walks))
+                resuming = asyncio.gather(*(self.resume(walk) for walk in self.walks))
+                await self._until(resuming.done)
+                await resuming
         await asyncio.sleep(1.0)
         for walk in self.walks:
             walk.stopping = True
-        await asyncio.wait_for(asyncio.gather(*senders), 60)
-        await self._until_seen()
+        sending = asyncio.gather(*senders)
+        await self._until(sending.done)
+        await sending
+        with suppress(TimeoutError):  # what they have not seen is told as a fault
+            await self._until(lambda: all(walk.has_seen_all for walk in self.walks))
         for watcher in watchers:
             watcher.cancel()
         server.send_signal(signal.SIGTERM)
-        statuses.append(await asyncio.wait_for(server.wait(), 20))
+        statuses.append(await server.wait())
         ids = ",".join(str(row["session"]) for row in rows)
         log = json.loads(self.run_python("-m", "tests.support.live_log", ids))
         return {"statuses": statuses, "kills": kills, "log": log}
 
-    async def _until_seen(self) -> None:
-        for _ in range(200):
-            if all(walk.seen and walk.seen[-1] >= walk.made for walk in self.walks):
-                return
+    async def _until(self, is_done: Callable[[], bool]) -> None:
+        """Wait until it is done. Raises TimeoutError where nothing happens any more."""
+        before, since_s = -1, 0.0
+        while not is_done():
+            happened = self.resumed + sum(one.acknowledged + len(one.seen) for one in self.walks)
+            now_s = asyncio.get_running_loop().time()
+            if happened != before:
+                before, since_s = happened, now_s
+            if now_s - since_s > STUCK_S:
+                raise TimeoutError(f"nothing has happened for {STUCK_S:g} s")
             await asyncio.sleep(0.05)
 
     def find_faults(self, ended: dict[str, Any]) -> list[str]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rehab.sessions.events.change import change_event, phase_event
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.events.step import StepContext, step_event
 from rehab.training.changes import Change, ChangeKind, State
+from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 from rehab.training.steps import ScoredStep
 
@@ -20,7 +22,7 @@ class Before(NamedTuple):
     goal: float | None
     obstacle: str
     switches: int
-    is_running: bool
+    state: State
 
     @classmethod
     def of(cls, fold: SessionFold) -> Before:
@@ -31,8 +33,12 @@ class Before(NamedTuple):
             fold.goal,
             fold.obstacle,
             len(fold.valences.switches),
-            fold.state is State.RUNNING,
+            fold.state,
         )
+
+    def is_still_so(self, fold: SessionFold) -> bool:
+        """Return whether a step has changed nothing of this, as most do."""
+        return fold.state is self.state and not self.has_moved(fold)
 
     def has_moved(self, fold: SessionFold) -> bool:
         """Return whether phase, goal or what is in the plan's way are others since then."""
@@ -44,9 +50,9 @@ class Before(NamedTuple):
 
     def changed_by_step(self, fold: SessionFold) -> list[str]:
         """Return what a step has changed by the plan's own rules, as kinds of changes."""
-        has_paused = self.is_running and fold.state is not State.RUNNING
-        if not (has_paused or self.has_moved(fold)):
-            return []  # as after most steps
+        if self.is_still_so(fold):
+            return []
+        has_paused = self.state is State.RUNNING and fold.state is not State.RUNNING
         changed = {
             ChangeKind.PHASE: fold.phase_index != self.phase_index,
             ChangeKind.GOAL: fold.goal != self.goal,
@@ -56,10 +62,17 @@ class Before(NamedTuple):
 
 
 def events_of_step(
-    fold: SessionFold, before: Before, step: ScoredStep, *, live: bool
+    fold: SessionFold,
+    before: Before,
+    step: ScoredStep,
+    audiences: Iterable[Audience],
+    *,
+    live: bool,
 ) -> list[LiveEvent]:
-    """Return the events of a step that was just scored; see `step_event` for ``live``."""
-    events = [step_event(fold, before.context, step, live=live)]
+    """Return the events of a step that was just scored; see `step_event` for who is told."""
+    events = [step_event(fold, before.context, step, audiences, live=live)]
+    if before.is_still_so(fold):
+        return events
     only_adapted = fold.following.moved and fold.phase_index == before.phase_index
     if before.has_moved(fold) and not only_adapted:
         events.append(phase_event(fold, switched=len(fold.valences.switches) > before.switches))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.payloads import (
     Message,
-    Standing,
-    coaching_of,
+    describe_coaching,
     describe_rates,
     describe_walked,
 )
@@ -63,35 +62,59 @@ class StepContext(NamedTuple):
     @classmethod
     def of(cls, fold: SessionFold) -> StepContext:
         """Return the context of the next step."""
-        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style.value)
+        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style)
 
 
 def step_event(
-    fold: SessionFold, context: StepContext, step: ScoredStep, *, live: bool
+    fold: SessionFold,
+    context: StepContext,
+    step: ScoredStep,
+    audiences: Iterable[Audience],
+    *,
+    live: bool,
 ) -> LiveEvent:
-    """Return the event of a step that was just scored.
+    """Return the event of a step that was just scored, for these audiences and no other.
 
     ``live`` is False for a step that came too late to be shown as one.
     """
-    plan, standing, coaching = fold.plan, Standing.of(fold), coaching_of(fold)
-    answer = fold.telling.answer
+    messages = {
+        audience: MESSAGES[audience](fold, context, step, live)
+        for audience in audiences
+        if audience in MESSAGES
+    }
+    return LiveEvent(step.number, messages.__getitem__)
 
-    def build(audience: Audience) -> Message | None:
-        score, streak = standing.score, standing.streak
-        match audience:
-            case Audience.PATIENT:
-                shown = patient_step(plan, context, step, score, streak, live=live, answer=answer)
-                return None if shown is None else shown | describe_walked(standing)
-            case Audience.MONITOR:
-                totals = {"score": score, "streak": streak, **describe_rates(standing)}
-                totals |= describe_walked(standing)
-                return _monitor_step(step, live=live) | totals | coaching()
-            case Audience.ROBOT:
-                return _robot_step(context.phase, step, live=live)
-            case Audience.SOURCE:
-                return None
 
-    return LiveEvent(step.number, build)
+def _for_patient(
+    fold: SessionFold, context: StepContext, step: ScoredStep, live: bool
+) -> Message | None:
+    score, streak, answer = fold.score, fold.feedback.streak, fold.telling.answer
+    shown = patient_step(fold.plan, context, step, score, streak, live=live, answer=answer)
+    return None if shown is None else shown | describe_walked(fold)
+
+
+def _for_monitor(fold: SessionFold, _: StepContext, step: ScoredStep, live: bool) -> Message:
+    return {
+        **_monitor_step(step, live=live),
+        "score": fold.score,
+        "streak": fold.feedback.streak,
+        **describe_rates(fold.feedback),
+        **describe_walked(fold),
+        **describe_coaching(fold),
+    }
+
+
+def _for_robot(
+    _: SessionFold, context: StepContext, step: ScoredStep, live: bool
+) -> Message | None:
+    return _robot_step(context.phase, step, live=live)
+
+
+MESSAGES: dict[Audience, Callable[[SessionFold, StepContext, ScoredStep, bool], Message | None]] = {
+    Audience.PATIENT: _for_patient,
+    Audience.MONITOR: _for_monitor,
+    Audience.ROBOT: _for_robot,
+}
 
 
 def patient_step(

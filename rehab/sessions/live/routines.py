@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Protocol
 
 from channels.db import database_sync_to_async
@@ -15,9 +15,9 @@ from rehab.people.audit.seals import SEALED_AFTER, seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.database.trouble import WORDS, Trouble
-from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.process import move_database_log
 from rehab.sessions.live.servers.servers import Servers
+from rehab.sessions.live.session.instruments import LATE_S
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.writer import Writer
 from rehab.training.controls import Audience
@@ -29,6 +29,8 @@ log = logging.getLogger(__name__)
 SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
 SEAL = round(600 / ROBOT_HEARTBEAT_S)
+CHECKED_SOCKETS = 100  # sign-ins that are checked at once
+CHECK_PAUSE_S = 0.1  # between these: 4,000 sockets within 4 s
 HEARTBEAT = to_text({"type": "heartbeat"})
 
 
@@ -132,8 +134,17 @@ class Routines:
         await database_sync_to_async(seal_logs)(timezone.now() - SEALED_AFTER)
 
     async def check_sign_ins(self) -> None:
-        """Extend sign-ins at a running session; close sockets that are no longer authorized."""
+        """Extend sign-ins at a running session; close sockets that are no longer authorized.
+
+        A few sockets at a time: steps wait while another thread has the interpreter.
+        """
         sockets = [socket for socket in self._process.sockets if socket.actor is not None]
+        for first in range(0, len(sockets), CHECKED_SOCKETS):
+            if first:
+                await asyncio.sleep(CHECK_PAUSE_S)
+            await self._check_sign_ins(sockets[first : first + CHECKED_SOCKETS])
+
+    async def _check_sign_ins(self, sockets: Sequence[Any]) -> None:
         running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
         await extend_sign_ins(running, timezone.now())
         admitted = [(one.actor, one.scope) for one in sockets]

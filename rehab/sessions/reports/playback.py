@@ -120,7 +120,7 @@ def _events(fold: SessionFold, row: Row) -> list[LiveEvent]:
     before = Before.of(fold)
     try:
         if isinstance(row, Measurement):
-            return events_of_step(fold, before, fold.step(row), live=True)
+            return events_of_step(fold, before, fold.step(row), AUDIENCES, live=True)
         change = to_change(row)
         fold.change(change)
         return events_of_change(fold, before, change)

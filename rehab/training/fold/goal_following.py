@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rehab.training.adaptation import (
@@ -43,13 +42,10 @@ class GoalFollowing:
         wanted = self.plan.target.hit_rate
         return DEFAULT_HIT_RATE if wanted is None else wanted
 
-    def suggestion(self, gain: float) -> Callable[[], float | None]:
-        """Return what computes, later, the goal that is suggested now.
-
-        The latest strides would have reached it as often as is wanted.
-        """
-        measure, latest, wanted = self.plan.measure, tuple(self.latest), self.wanted_hit_rate
-        return lambda: suggest_goal(measure, [gain * value for value in latest], wanted)
+    def suggest(self, gain: float) -> float | None:
+        """Return the goal that the latest strides would have reached as often as is wanted."""
+        shown = [gain * value for value in self.latest]
+        return suggest_goal(self.plan.measure, shown, self.wanted_hit_rate)
 
     def move(self, step: ScoredStep) -> float | None:
         """Return the goal from the next step on, if the staircase moves it after this one."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from rehab.training.adaptation import AdaptationMode
@@ -41,10 +40,6 @@ from robot.marking import Marked, gettext_noop
 # (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
 ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
-
-
-def _suggest_nothing() -> None:
-    """Return None: goals may not follow."""
 
 
 class SessionFold:
@@ -87,20 +82,17 @@ class SessionFold:
     @property
     def activation_threshold(self) -> float:
         """Mean performance of a window from which on the robot celebrates."""
-        threshold: float = self.settings[ChangeKind.ACTIVATION_THRESHOLD]
-        return threshold
+        return float(self.settings[ChangeKind.ACTIVATION_THRESHOLD])
 
     @property
     def robot_intensity(self) -> float:
         """Share of its gestures' size that the robot moves with; 0 for none."""
-        intensity: float = self.settings[ChangeKind.ROBOT_INTENSITY]
-        return intensity
+        return float(self.settings[ChangeKind.ROBOT_INTENSITY])
 
     @property
     def words_shown(self) -> bool:
         """Whether the patient's page shows words."""
-        shown: bool = self.settings[ChangeKind.WORDS_SHOWN]
-        return shown
+        return bool(self.settings[ChangeKind.WORDS_SHOWN])
 
     @property
     def chart_style(self) -> ChartStyle:
@@ -116,17 +108,10 @@ class SessionFold:
 
     @property
     def suggested_goal(self) -> float | None:
-        """The goal that the latest strides would have reached as often as is wanted, if any.
-
-        Nothing while goals may not follow: in a phase without feedback, and while the mode is off.
-        """
-        return self.suggestion()()
-
-    def suggestion(self) -> Callable[[], float | None]:
-        """Return what computes, later, the goal that is suggested now."""
+        """The goal that the latest strides would have reached as often as wanted; None without."""
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
-            return _suggest_nothing
-        return self.following.suggestion(self.gain)
+            return None
+        return self.following.suggest(self.gain)
 
     @property
     def score(self) -> int | None:
@@ -215,7 +200,9 @@ class SessionFold:
             self.phases[self.phase_index].add(step)
             valence = self.valences.current.slug if self.phase.feedback else ""
             block = Block(self.phase_index, self.gain, valence)
-            self.blocks.setdefault(block, Tally()).add(step)
+            if (tally := self.blocks.get(block)) is None:
+                tally = self.blocks[block] = Tally()
+            tally.add(step)
             if self.phase.feedback:
                 self.feedback.add(step)
                 self.telling.add(step, self.feedback.judged)

@@ -12,7 +12,7 @@ import pytest
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.consumers.base import Outbox
+from rehab.sessions.live.protocol.outgoing import Outbox
 from rehab.sessions.live.session.hub import MAX_UNCONFIRMED, RING, EventFeed, Lagged, Subscriber
 from rehab.training.controls import Audience
 
@@ -198,7 +198,7 @@ async def test_a_robot_gets_each_event_once():
 async def test_an_ack_covers_the_ones_before_it():
     page = Page()
     outbox = Outbox(page.send, page.write)
-    running = asyncio.create_task(outbox.run())
+    running = asyncio.create_task(outbox.pump())
     await asyncio.sleep(0)
     outbox.acknowledge(1)
     outbox.acknowledge(2)

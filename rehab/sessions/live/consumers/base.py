@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import logging
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Coroutine
 from typing import Any
 
 from channels.exceptions import StopConsumer
@@ -18,6 +18,7 @@ from rehab.sessions.live.auth import Actor
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.protocol.outgoing import Outbox
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from robot.wire.close_codes import CloseCode
@@ -42,71 +43,6 @@ class CloseSocket(Exception):
         self.code = code
         self.error = error
         self.more = more
-
-
-class Outbox:
-    """Queued messages of one socket: callers never wait.
-
-    What can be written at once is, at the end of the event loop's turn; a task sends the rest.
-    """
-
-    def __init__(
-        self,
-        send: Callable[[str], Awaitable[None]],
-        write: Callable[[str], bool] = lambda _: False,
-    ) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._send = send
-        self._write = write
-        self._texts: list[str] = []
-        self._ends_with_ack = False
-        self._is_due = False  # to be flushed at the end of this turn
-        self._is_waiting = False  # the task has sent all there was
-        self._awake = asyncio.Event()
-
-    def tell(self, message: Message) -> None:
-        """Queue a message."""
-        self._texts.append(to_text(message))
-        self._ends_with_ack = False
-        self._wake()
-
-    def acknowledge(self, number: int) -> None:
-        """Queue an ack; a newer one replaces it, since an ack covers all steps before."""
-        if self._ends_with_ack:
-            self._texts.pop()
-        self._texts.append(f'{{"type":"ack","number":{number}}}')
-        self._ends_with_ack = True
-        self._wake()
-
-    def _wake(self) -> None:
-        if not self._is_due:
-            self._is_due = True
-            self._loop.call_soon(self._flush)
-
-    def _flush(self) -> None:
-        """Write what there is; wake the task for what has to wait."""
-        self._is_due = False
-        texts = self._texts
-        if self._is_waiting:
-            while texts and self._write(texts[0]):
-                del texts[0]
-        if texts:
-            self._awake.set()
-        else:
-            self._ends_with_ack = False
-
-    async def run(self) -> None:
-        """Send until cancelled."""
-        while True:
-            self._is_waiting = True
-            try:
-                await self._awake.wait()
-            finally:
-                self._is_waiting = False
-            self._awake.clear()
-            texts, self._texts, self._ends_with_ack = self._texts, [], False
-            for text in texts:
-                await self._send(text)
 
 
 class Socket(AsyncWebsocketConsumer):
@@ -161,7 +97,7 @@ class Socket(AsyncWebsocketConsumer):
                     if self.runtime.draining:
                         await self.close_now(CloseCode.RESTARTING)
                     else:
-                        self.start(self.outbox.run())
+                        self.start(self.outbox.pump())
                         await self._guard(self.on_connect())
                 case "websocket.receive":
                     if not self.is_closed:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Awaitable
 from typing import ClassVar
-from urllib.parse import parse_qs
 
 from channels.db import database_sync_to_async
 from django.conf import settings
@@ -26,10 +24,12 @@ from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.protocol.backlog import read_backlog
 from rehab.sessions.live.protocol.messages import (
+    read_after,
     read_change,
     read_frame,
     read_order,
     read_remark,
+    read_seen,
 )
 from rehab.sessions.live.servers.following import FollowedSession
 from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
@@ -93,7 +93,7 @@ class ScreenConsumer(Socket):
         if self.audience is Audience.MONITOR and isinstance(self.actor, User):
             theirs = await database_sync_to_async(language_of)(self.actor)
             self.language = theirs or settings.LANGUAGE_CODE
-        self.start(self._pump(live, _after(self.scope["query_string"])))
+        self.start(self._pump(live, read_after(self.scope["query_string"])))
         self.runtime.audit_queue.add(Act.VIEW, self.actor, session_id, self.scope, timezone.now())
 
     @classmethod
@@ -144,6 +144,19 @@ class ScreenConsumer(Socket):
                 await subscriber.send_backlog(texts)
             after = steps[-1].number
 
+    def handle_now(self, text: str) -> bool:
+        """Note what the page has seen, as most frames say; all else takes its turn."""
+        frame = read_seen(text)
+        if frame is not None:
+            self._confirm(frame)
+        return frame is not None
+
+    def _confirm(self, frame: int) -> None:
+        if self.subscriber is not None:
+            self.subscriber.confirm(frame)
+        if isinstance(self.actor, Device) and self.live is not None:
+            self.live.tablet_heard_at = timezone.now()
+
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame of a page."""
         await self.on_message(read_frame(text))
@@ -152,10 +165,7 @@ class ScreenConsumer(Socket):
         """Handle a message of a page."""
         match message.get("type"):
             case "seen":
-                if self.subscriber is not None:
-                    self.subscriber.confirm(read_whole(message, "frame", low=0))
-                if isinstance(self.actor, Device) and self.live is not None:
-                    self.live.tablet_heard_at = timezone.now()
+                self._confirm(read_whole(message, "frame", low=0))
             case "change":
                 await self._change(message)
             case "robot" if message.get("order") == "drive":
@@ -167,16 +177,19 @@ class ScreenConsumer(Socket):
             case _:
                 raise BadFrame('A page sends "seen", "change", "remark" and "robot".')
 
+    def _open_session(self) -> LiveSession:
+        if self.live is None:
+            raise CloseSocket(
+                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
+            )
+        return self.live
+
     async def _change(self, message: Message) -> None:
         request_id = read_name(message, "id")
         kind, value = read_change(message)
         if kind == ChangeKind.PAUSE:
             value = self.pause_reason.value
-        live, by = self.live, self.actor if isinstance(self.actor, User) else None
-        if live is None:
-            raise CloseSocket(
-                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
-            )
+        live, by = self._open_session(), self.actor if isinstance(self.actor, User) else None
         if (self.requester if by else Requester.TABLET) not in CONTROLS[kind].requesters:
             await self._refuse(request_id, "refused", "That is changed on the therapist's page.")
             return
@@ -185,11 +198,7 @@ class ScreenConsumer(Socket):
     async def _remark(self, message: Message) -> None:
         request_id = read_name(message, "id")
         what, value = read_remark(message)
-        live, by = self.live, self.actor
-        if live is None:
-            raise CloseSocket(
-                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
-            )
+        live, by = self._open_session(), self.actor
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
             await self._refuse(request_id, "refused", "That is noted on the therapist's page.")
             return
@@ -217,11 +226,7 @@ class ScreenConsumer(Socket):
     async def _order_robot(self, message: Message) -> None:
         """Stop the robot for anyone; let it move again for people only."""
         order = read_order(message, *self.robot_orders)
-        live, by = self.live, self.actor if isinstance(self.actor, User) else None
-        if live is None:
-            raise CloseSocket(
-                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
-            )
+        live, by = self._open_session(), self.actor if isinstance(self.actor, User) else None
         device_id = self.actor.pk if isinstance(self.actor, Device) else None
         if isinstance(live, FollowedSession):
             self.run_to_end(self._ask_owner(live, order, by, device_id))
@@ -292,8 +297,3 @@ class MonitorConsumer(ScreenConsumer):
     requester = Requester.MONITOR
     pause_reason = PauseReason.THERAPIST
     robot_orders = ("stop", "arm")
-
-
-def _after(query: bytes) -> int | None:
-    words = parse_qs(query.decode("latin-1")).get("after", [])
-    return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None

@@ -7,6 +7,8 @@ is plain, and their own for all else (websockets.py, uvicorn_server.py).
 
 from __future__ import annotations
 
+from websockets.frames import apply_mask  # type: ignore[attr-defined]  # in C where it can be
+
 MAX_WAITING_BYTES = 256 * 1024  # received of a client, and not handled yet
 MESSAGE_BYTES = 512  # what a message takes beside its text
 TEXT = 0x81  # a whole message, not a part of one
@@ -42,9 +44,7 @@ def read_text_frame(data: bytes) -> bytes | None:
         return None  # longer than any frame may be
     if not 0 < size == len(data) - begin:
         return None
-    mask = data[begin - 4 : begin] * (size // 4 + 1)
-    plain = int.from_bytes(data[begin:]) ^ int.from_bytes(mask[:size])
-    return plain.to_bytes(size)
+    return apply_mask(data[begin:], data[begin - 4 : begin])
 
 
 class FrameEdges:

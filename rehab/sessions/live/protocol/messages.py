@@ -11,7 +11,8 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
+from urllib.parse import parse_qs
 
 import msgspec
 
@@ -57,6 +58,12 @@ class Hello:
     clock_pauses: bool = False  # its clock stands while the session is paused
 
 
+class _Seen(msgspec.Struct):
+    type: Literal["seen"]
+    frame: Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
+
+
+_decode_seen = msgspec.json.Decoder(_Seen).decode
 _decode = msgspec.json.Decoder().decode
 
 
@@ -70,6 +77,20 @@ def read_frame(text: str | None) -> dict[str, Any]:
         return read_object(text)  # says why, or reads what is rare (half a pair of surrogates)
     is_one = isinstance(message, dict) and isinstance(message.get("type", ""), str)
     return message if is_one else read_object(text)
+
+
+def read_seen(text: str) -> int | None:
+    """Return which frame a page has seen; None for any other message."""
+    try:
+        return _decode_seen(text).frame
+    except (msgspec.MsgspecError, RecursionError, UnicodeError):
+        return None
+
+
+def read_after(query: bytes) -> int | None:
+    """Return which step a page has already, as its address says; None for a new page."""
+    words = parse_qs(query.decode("latin-1")).get("after", [])
+    return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None
 
 
 def read_hello(message: Message) -> Hello:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from datetime import UTC, datetime
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import msgspec
 from django.db import connection, transaction
-from django.db.backends.base.operations import BaseDatabaseOperations
 
 from rehab.sessions.live.session.aggregate import Row, StepRow, Summary
 from rehab.sessions.log import (
@@ -61,15 +61,20 @@ LOG_ENDS = (
 IN_ONE_ROW = "SELECT json_group_array(json_array(id, epoch, last)) FROM ({select})"
 
 
-def _step_values(row: StepRow, ops: BaseDatabaseOperations) -> tuple[Any, ...]:
+def _sqlite_time(at: datetime) -> str:
+    """Return a time as Django's backend writes it, which asks for the zone with each row."""
+    return str(at.astimezone(UTC).replace(tzinfo=None))
+
+
+def _step_values(row: StepRow, adapt_time: Callable[[datetime], Any]) -> tuple[Any, ...]:
     """Return the values of a row, in the order of ``STEP_COLUMNS``."""
     session_id, step, received_at = row
     return (
         session_id,
         step.number,
         step.time_s,
-        ops.adapt_datetimefield_value(received_at),
-        step.side.value,
+        adapt_time(received_at),
+        str(step.side),
         step.value,
         step.gain,
         step.shown,
@@ -212,8 +217,9 @@ def _insert_steps(rows: Sequence[StepRow]) -> None:
     """
     if not rows:
         return
-    ops = connection.ops  # looked up once, not for each row
-    mark = "?" if connection.vendor == "sqlite" else "%s"
+    is_sqlite = connection.vendor == "sqlite"
+    mark = "?" if is_sqlite else "%s"
+    adapt_time = _sqlite_time if is_sqlite else connection.ops.adapt_datetimefield_value
     if connection.vendor == "postgresql" and len(rows) >= COPIED_ROWS:
         columns = ", ".join(STEP_COLUMNS)
         with (
@@ -222,10 +228,10 @@ def _insert_steps(rows: Sequence[StepRow]) -> None:
             cursor.copy(f"COPY rehab_step ({columns}) FROM STDIN") as copy,
         ):
             for row in rows:
-                copy.write_row(_step_values(row, ops))
+                copy.write_row(_step_values(row, adapt_time))
         return
     with connection.wrap_database_errors, closing(connection.connection.cursor()) as cursor:
         for first in range(0, len(rows), STEPS_A_STATEMENT):
             chunk = rows[first : first + STEPS_A_STATEMENT]
-            values = [value for row in chunk for value in _step_values(row, ops)]
+            values = [value for row in chunk for value in _step_values(row, adapt_time)]
             cursor.execute(_insert_statement(len(chunk), mark), values)

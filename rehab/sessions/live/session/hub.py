@@ -11,8 +11,10 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Awaitable, Callable
+from operator import attrgetter
 
 from rehab.sessions.events.event import LiveEvent
+from rehab.sessions.live.protocol.outgoing import Outgoing
 from rehab.training.controls import Audience
 
 RING = 512  # events a session; at two steps a second four minutes
@@ -20,6 +22,7 @@ MAX_UNCONFIRMED = 32  # frames that may be on their way to a page
 MAX_UNCONFIRMED_BACKLOG = 4  # of these, frames of past steps
 CONFIRM_TIMEOUT_S = 15.0  # how long a page may take to confirm one
 INATTENTIVE_S = 5.0  # a page that confirms nothing for so long is not watched
+_POSITION = attrgetter("position")
 
 
 class Lagged(Exception):
@@ -38,6 +41,11 @@ class EventFeed:
         self.subscribers: set[Subscriber] = set()
         self._ring: deque[LiveEvent] = deque(maxlen=RING)
 
+    @property
+    def audiences(self) -> set[Audience]:
+        """Who is told of events."""
+        return {one.audience for one in self.subscribers}
+
     def publish(self, event: LiveEvent) -> None:
         """Add a committed event and wake the subscribers."""
         self.head += 1
@@ -50,7 +58,7 @@ class EventFeed:
 
     def trim(self) -> None:
         """Forget the events that every subscriber has been sent."""
-        slowest = min((one.position for one in self.subscribers), default=self.head)
+        slowest = min(map(_POSITION, self.subscribers), default=self.head)
         while len(self._ring) > self.head - slowest:
             self._ring.popleft()
 
@@ -64,16 +72,10 @@ class EventFeed:
         return list(self._ring)[len(self._ring) - missing :]
 
 
-class Subscriber:
+class Subscriber(Outgoing):
     """One page or robot: gets the events it has not had, as fast as it confirms them.
 
-    What can be written at once is, at the end of the event loop's turn; ``pump`` sends what must
-    wait. To wake a task for each frame would cost as much as the frame does.
-
-    Parameters
-    ----------
-    send, write
-        Send a text once the socket takes it; send it now, or return False.
+    Its ``pump`` raises Lagged or Stalled if the subscriber must start again.
     """
 
     tablets = 0  # that it stands for: those of another server
@@ -85,27 +87,16 @@ class Subscriber:
         send: Callable[[str], Awaitable[None]],
         write: Callable[[str], bool] = lambda _: False,
     ) -> None:
+        super().__init__(send, write)
         self.feed = feed
         self.audience = audience
         self.frame = 0
-        self._loop = asyncio.get_running_loop()
-        self._send = send
-        self._write = write
-        self._is_due = False  # to be flushed at the end of this turn
-        self._is_waiting = False  # the pump has sent all there was
         self._confirmed_frame = 0
         self.position = feed.head
         self._unconfirmed_since_s = 0.0  # when the oldest unconfirmed frame was sent
         self._sent_s = -math.inf  # when the last frame was
         self._heartbeat: str | None = None
-        self._awake = asyncio.Event()
         self._confirmed = asyncio.Event()
-
-    def wake(self) -> None:
-        """Send what there is at the end of the event loop's turn, all of it at once."""
-        if not self._is_due:
-            self._is_due = True
-            self._loop.call_soon(self._flush)
 
     def queue_heartbeat(self, text: str) -> None:
         """Queue a heartbeat, which is sent before anything else."""
@@ -149,22 +140,14 @@ class Subscriber:
             await self._wait_for_confirmation()
         await self.send_frame("steps", texts)
 
-    async def pump(self) -> None:
-        """Send until cancelled. Raises Lagged or Stalled if the subscriber must start again."""
-        while True:
-            self._is_waiting = True
-            try:
-                await self._awake.wait()
-            finally:
-                self._is_waiting = False
-            self._awake.clear()
-            if self._heartbeat is not None:
-                heartbeat, self._heartbeat = self._heartbeat, None
-                await self._send(heartbeat)
-            while self.position < self.feed.head:
-                if self._must_wait:
-                    await self._wait_for_confirmation()
-                await self._send_pending()
+    async def _send_all(self) -> None:
+        if self._heartbeat is not None:
+            heartbeat, self._heartbeat = self._heartbeat, None
+            await self._send(heartbeat)
+        while self.position < self.feed.head:
+            if self._must_wait:
+                await self._wait_for_confirmation()
+            await self._send_pending()
 
     @property
     def _must_wait(self) -> bool:
@@ -172,18 +155,7 @@ class Subscriber:
         unconfirmed = self.frame - self._confirmed_frame
         return unconfirmed >= MAX_UNCONFIRMED and self.audience is not Audience.ROBOT
 
-    def _flush(self) -> None:
-        """Write what there is; wake the pump for what has to wait."""
-        self._is_due = False
-        try:
-            written = self._is_waiting and self._write_pending()
-        except Exception:  # whatever it was, the pump meets it too, and its socket says so
-            written = False
-        if not written:
-            self._awake.set()
-
     def _write_pending(self) -> bool:
-        """Write what the subscriber has not had; return whether it has all now."""
         if self._heartbeat is not None:
             if not self._write(self._heartbeat):
                 return False

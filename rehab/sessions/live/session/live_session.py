@@ -120,10 +120,10 @@ class LiveSession:
         fold = self.aggregate.fold
         before = Before.of(fold)
         row = self.aggregate.record_step(measurement, received_at)
-        rows: list[Row] = [row]
         if late:
             self.late.append(row.step.number)
-        events = events_of_step(fold, before, row.step, live=not late)
+        events = events_of_step(fold, before, row.step, self.feed.audiences, live=not late)
+        rows: list[Row] = [row]
         changed = before.changed_by_step(fold)
         if fold.following.moved:
             followed = RuleEntry.GOAL_FOLLOWED

@@ -21,8 +21,8 @@ from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, conne
 
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.database.trouble import Trouble, classify_failure, concerns_all
-from rehab.sessions.live.instruments import COMMIT_S, STEPS, WRITE_FAILURES
 from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
+from rehab.sessions.live.session.instruments import COMMIT_S, STEPS, WRITE_FAILURES
 
 log = logging.getLogger(__name__)
 

@@ -19,7 +19,7 @@ from prometheus_client.registry import Collector
 from rehab.people.access import public
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import Trouble
-from rehab.sessions.live.instruments import REGISTRY
+from rehab.sessions.live.session.instruments import REGISTRY
 
 
 class LiveSessions(Collector):
