@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from django.core.management import call_command
@@ -34,8 +36,7 @@ def woken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return calls
 
 
-@pytest.fixture
-def sessions(db: None, woken: list[bool]) -> list[TrainingSession]:
+def _walk_all() -> list[TrainingSession]:
     clinic = Clinic.everywhere.create(name="Elm")
     people = [
         agreeing(
@@ -50,6 +51,17 @@ def sessions(db: None, woken: list[bool]) -> list[TrainingSession]:
         for n in range(PEOPLE)
     ]
     return [walk(one, "positive", strides(20 - n, n)) for n, one in enumerate(people)]
+
+
+@pytest.fixture(scope="class")
+def _walked(keep: Callable[[Any], Any]) -> Callable[[], list[TrainingSession]]:
+    made: Callable[[], list[TrainingSession]] = keep(_walk_all)
+    return made
+
+
+@pytest.fixture
+def sessions(_walked: Callable[[], list[TrainingSession]], db: None, woken: list[bool]) -> Any:
+    return _walked()
 
 
 def make_board(session: TrainingSession, **fields: object) -> Leaderboard:

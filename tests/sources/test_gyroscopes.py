@@ -46,7 +46,7 @@ def measure(rows, chunk=20, **more):
     return harness.strides(), harness.said
 
 
-@pytest.mark.parametrize("chunk", [1, 20, 5000])
+@pytest.mark.parametrize("chunk", [pytest.param(1, marks=pytest.mark.wide), 20, 5000])
 def test_strides_of_both_feet_have_times_and_no_a2(chunk):
     found, said = measure(walk(), chunk)
     # The left one is mapped with the wrong sign, which is found.

@@ -18,7 +18,7 @@ def same(stride, other):
     return stride.value == pytest.approx(other.a2_w_kg, rel=0.02)
 
 
-@pytest.mark.parametrize("chunk", [1, 20, 1000])
+@pytest.mark.parametrize("chunk", [pytest.param(1, marks=pytest.mark.wide), 20, 1000])
 def test_strides_are_those_of_the_recording(made, table, chunk):
     harness = IntakeHarness()
     harness.send(rows_of(table), chunk)

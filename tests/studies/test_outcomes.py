@@ -12,7 +12,7 @@ from rehab.studies.analysis.comparison import compare
 from rehab.studies.analysis.curves import CurvePlace, average
 from rehab.studies.analysis.outcomes import OF_STRIDES, channel_changes, describe_phases
 from rehab.studies.analysis.participants import (
-    PlannedVisit,
+    ParticipantVisit,
     curves_by_arm,
     find,
     flow,
@@ -195,7 +195,7 @@ def test_the_flow_counts_who_came_who_left_and_who_is_missing():
     whole = people()
     left = make_participant(
         "099",
-        [(PlannedVisit(1, "A"), None), (PlannedVisit(2, "A", is_due=False), None)],
+        [(ParticipantVisit(1, "A"), None), (ParticipantVisit(2, "A", is_due=False), None)],
         has_left=True,
     )
     mine = sum("A" in one.arms for one in whole)

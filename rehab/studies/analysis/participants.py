@@ -15,7 +15,7 @@ CHANNEL = "channel:"  # begins the slug of a further channel's change: never reg
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedVisit:
+class ParticipantVisit:
     """A planned visit: in which arm, and what it gave.
 
     Attributes
@@ -47,7 +47,7 @@ class Participant:
     """One participant: code, visits in their order, whether they count, a curve for each arm."""
 
     code: str
-    visits: tuple[PlannedVisit, ...]
+    visits: tuple[ParticipantVisit, ...]
     has_left: bool = False
     is_analyzed: bool = True
     curves: dict[str, Curve] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Participant:
 
 
 @dataclass(frozen=True, slots=True)
-class CountedSession:
+class AnalyzedSession:
     """A session that counts: its strides, and the metrics that it stores of itself."""
 
     walk: Walk
@@ -77,13 +77,13 @@ class CountedSession:
 
 def make_participant(
     code: str,
-    planned: Sequence[tuple[PlannedVisit, CountedSession | None]],
+    planned: Sequence[tuple[ParticipantVisit, AnalyzedSession | None]],
     *,
     has_left: bool = False,
     is_analyzed: bool = True,
 ) -> Participant:
     """Return a participant from the planned visits and what was walked of them."""
-    visits: list[PlannedVisit] = []
+    visits: list[ParticipantVisit] = []
     walks: dict[str, list[Walk | None]] = {}
     before: Walk | None = None
     for visit, walked in planned:
@@ -95,7 +95,7 @@ def make_participant(
         outcomes = compute_outcomes(walked.walk, before, walked.metrics)
         outcomes |= {f"{CHANNEL}{name}": value for name, value in channels.items()}
         phases = tuple(describe_phases(walked.walk))
-        visits.append(PlannedVisit(visit.number, visit.arm, True, outcomes, phases))
+        visits.append(ParticipantVisit(visit.number, visit.arm, True, outcomes, phases))
         before = walked.walk
     curves = {arm: curve_of(of_arm) for arm, of_arm in walks.items()}
     return Participant(code, tuple(visits), has_left, is_analyzed, curves)

@@ -20,10 +20,10 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.studies.analysis.curves import Point
 from rehab.studies.analysis.participants import (
-    CountedSession,
+    AnalyzedSession,
     OutcomeResult,
     Participant,
-    PlannedVisit,
+    ParticipantVisit,
     curves_by_arm,
     find,
     make_participant,
@@ -149,7 +149,7 @@ def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Part
     group = enrollment.allocation.group.split("-")
     planned = [
         (
-            PlannedVisit(visit.number, group[visit.period], _is_due(visit, until)),
+            ParticipantVisit(visit.number, group[visit.period], _is_due(visit, until)),
             _walked(enrollment, visit),
         )
         for visit in visits
@@ -168,7 +168,7 @@ def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
     return list({visit.number: visit for visit in visits.order_by("number", "attempt")}.values())
 
 
-def _walked(enrollment: Enrollment, visit: StudyVisit) -> CountedSession | None:
+def _walked(enrollment: Enrollment, visit: StudyVisit) -> AnalyzedSession | None:
     """Return what a visit gave; None of one that does not count, or was corrected away."""
     session = visit.session
     if session is None or session.state != State.FINISHED or session.excluded:
@@ -178,7 +178,7 @@ def _walked(enrollment: Enrollment, visit: StudyVisit) -> CountedSession | None:
     return read_walked(session)
 
 
-def read_walked(session: TrainingSession) -> CountedSession:
+def read_walked(session: TrainingSession) -> AnalyzedSession:
     """Return a finished session's strides and metrics."""
     plan = SessionPlan.from_json(session.plan)
     metrics = dict(session.metrics.values_list("slug", "value"))
@@ -188,4 +188,4 @@ def read_walked(session: TrainingSession) -> CountedSession:
         rows.values_list(*COLUMNS).iterator(),
         higher_is_better=plan.measure.higher_is_better,
     )
-    return CountedSession(walk, metrics)
+    return AnalyzedSession(walk, metrics)

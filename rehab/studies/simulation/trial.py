@@ -13,9 +13,9 @@ from rehab.studies.allocation.groups import Allocated, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
 from rehab.studies.analysis.comparison import Difference, compare
 from rehab.studies.analysis.participants import (
-    CountedSession,
+    AnalyzedSession,
     Participant,
-    PlannedVisit,
+    ParticipantVisit,
     by_arm,
     make_participant,
 )
@@ -111,7 +111,7 @@ def walkable(plan: SessionPlan) -> SessionPlan:
     return replace(plan, phases=tuple(replace(phase, rest_s=None) for phase in plan.phases))
 
 
-def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> CountedSession:
+def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> AnalyzedSession:
     """Return one session, scored by the rules alone."""
     fold = SessionFold(plan)
     fold.change(Change(ChangeKind.START))
@@ -119,7 +119,7 @@ def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> CountedSession:
     fold.change(Change(ChangeKind.FINISH))
     rows = (of_columns(step) for step in steps if step.side is plan.trained_side)
     better = plan.measure.higher_is_better
-    return CountedSession(
+    return AnalyzedSession(
         read_walk(plan.phases, rows, higher_is_better=better), compute_metrics(fold)
     )
 
@@ -130,7 +130,7 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
     participants = []
     for number, (person, group) in enumerate(trial.allocate(seed), start=1):
         arms = group.split("-")
-        planned: list[tuple[PlannedVisit, CountedSession | None]] = []
+        planned: list[tuple[ParticipantVisit, AnalyzedSession | None]] = []
         for visit in visit_plan.plan(len(arms), A_DAY):
             arm = arms[visit.period]
             has_left = 0 < person.leaves_before <= visit.number
@@ -139,7 +139,7 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
                 kept = trial.population.kept
                 walker = person.at_visit(visit.number, trial.effects[arm], kept)
                 walked = walk_by_fold(trial.plans[arm], walker)
-            planned.append((PlannedVisit(visit.number, arm), walked))
+            planned.append((ParticipantVisit(visit.number, arm), walked))
         participants.append(
             make_participant(f"{number:03}", planned, has_left=person.leaves_before > 0)
         )

@@ -91,6 +91,7 @@ def test_wheels_that_roll_too_far_are_taken_back():
     assert walk.odometry.pose.x_m == pytest.approx(0.5)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("drift_deg_min", [3.0, 30.0, -30.0])
 def test_twenty_celebrations_keep_their_heading(drift_deg_min):
     played = play_in_a_row(

@@ -40,7 +40,7 @@ def recompute(times_s, performances):
     return decisions
 
 
-@pytest.mark.parametrize("phase", ["SSWS_85A2", "SSWS_90A2"])
+@pytest.mark.parametrize("phase", ["SSWS_85A2", pytest.param("SSWS_90A2", marks=pytest.mark.wide)])
 def test_two_minutes_at_true_speed(phase):
     walk = read_recording(recording("HEBB_03_Session_1.csv"))
     index = [one.name for one in walk.phases].index(phase)

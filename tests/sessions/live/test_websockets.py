@@ -88,6 +88,7 @@ def said(tmp_path_factory) -> list[Any]:
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
+@pytest.mark.server
 def test_a_stranger_fills_no_memory_while_being_looked_up(said):
     sent, limit, is_reading, told = said[1]
     assert limit < sent < limit + 2 * 60_000
@@ -95,6 +96,7 @@ def test_a_stranger_fills_no_memory_while_being_looked_up(said):
     assert told == 2
 
 
+@pytest.mark.server
 def test_frames_of_every_length_are_whole(said):
     """They are built here, not by autobahn."""
     reader = StreamReader()

@@ -16,6 +16,8 @@ from rehab.training.steps import Measurement
 from tests.sources.synthetic.protocols import SESSION_1, usable
 from tests.support.data import recording
 
+pytestmark = pytest.mark.wide
+
 SEEDS = range(60)
 GOAL = GOOD.baseline_w_kg
 TARGET = 3.908  # of session 1, in W/kg
