@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
-from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.db.models import Exists, Q
 from django.utils.translation import gettext_lazy as _
@@ -24,6 +23,7 @@ from rehab.boards.choices import (
 )
 from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import BoardsConsent, Clinic, Patient
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 
 # How rows are shown, and when. All other fields decide what a board's rows are.
@@ -85,7 +85,7 @@ class Leaderboard(ClinicModel):
         _("a row is"), max_length=16, choices=Aggregation.choices, default=Aggregation.EACH
     )
     mean_of = models.PositiveSmallIntegerField(
-        _("sessions in the mean"), default=3, validators=[MinValueValidator(1)]
+        _("sessions in the mean"), default=3, validators=between(1)
     )
     types = models.CharField(
         _("feedback types"), max_length=16, choices=CountedTypes.choices, default=CountedTypes.SAME
@@ -123,13 +123,13 @@ class Leaderboard(ClinicModel):
     top_n = models.PositiveSmallIntegerField(
         _("how many of the best"),
         default=10,
-        validators=[MinValueValidator(1), MaxValueValidator(50)],
+        validators=between(1, 50),
     )
     total_goal = models.PositiveIntegerField(
         _("goal of the total"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(1)],
+        validators=between(1),
         help_text=_("Draws a bar that fills up to it."),
     )
     show_ranks = models.BooleanField(_("show places"), default=True)
@@ -149,7 +149,7 @@ class Leaderboard(ClinicModel):
     min_participants = models.PositiveSmallIntegerField(
         _("fewest patients"),
         default=5,
-        validators=[MinValueValidator(5)],
+        validators=between(5),
         help_text=_("With fewer, everyone sees the own sessions only."),
     )
     occasion = models.CharField(

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from django.core.exceptions import ValidationError
-from django.core.validators import MaxValueValidator
 from django.db import models
 from django.dispatch import Signal
 from django.utils.text import format_lazy
@@ -14,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.translation import SOURCE_LANGUAGE, pick_words
 from rehab.people.models import Clinic
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.training.bands import Band, Confetti
@@ -102,7 +102,7 @@ class FeedbackBand(ScopedModel):
         verbose_name=_("feedback type"),
     )
     from_percent = models.PositiveSmallIntegerField(
-        _("from, % of the goal"), validators=[MaxValueValidator(1000)]
+        _("from, % of the goal"), validators=between(most=1000, unit="%")
     )
     words = models.JSONField(_("words"), default=dict, blank=True)
     confetti = models.CharField(

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django import forms
 from django.core.exceptions import ValidationError
 from django.db import IntegrityError, transaction
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Patient
+from rehab.people.ranges import say_ranges
 
 
 class PatientFieldsForm(forms.ModelForm):
     """Fields of a patient. Of one who is stored already it saves its own fields alone."""
 
     instance: Patient
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        say_ranges(self)
 
     def save(self, commit: bool = True) -> Patient:
         """Store the patient. Raises PatientErased, and IntegrityError where a code is taken."""

@@ -13,9 +13,9 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Patient, User
+from rehab.people.ranges import NumberField, say_ranges
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import format_source
-from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.services import check_station_is_free
 from rehab.sessions.setup.answers import USUAL_ANSWERS
@@ -91,6 +91,7 @@ class StudyForm(forms.ModelForm):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
+        say_ranges(self)
         study: Study = self.instance
         if study.is_draft:
             del self.fields["reason"]
@@ -156,6 +157,7 @@ class ArmForm(forms.ModelForm):
 
     def __init__(self, *args: Any, by: User, is_fixed: bool, **options: Any) -> None:
         super().__init__(*args, **options)
+        say_ranges(self)
         fields: dict[str, Any] = self.fields
         fields["measure"].queryset = MeasureDefinition.objects.visible_to(by)
         fields["protocol"].queryset = Protocol.objects.visible_to(by)

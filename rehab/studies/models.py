@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from django.core.validators import MaxValueValidator, MinValueValidator, RegexValidator
+from django.core.validators import RegexValidator
 from django.db import models
 from django.db.models import Q
 from django.utils import timezone
@@ -12,6 +12,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_schedule
 from rehab.sessions.setup.answers import SCHEDULES, USUAL_ANSWERS, read_schedule
@@ -87,7 +88,7 @@ class Study(ClinicModel):
     sealed = models.TextField(editable=False)
     commitment = models.CharField(max_length=64, editable=False)
     participants = models.PositiveIntegerField(
-        _("participants planned"), validators=[MinValueValidator(2), MaxValueValidator(10_000)]
+        _("participants planned"), validators=between(2, 10_000)
     )
     months_since_stroke = models.PositiveSmallIntegerField(
         _("least months since the stroke"),
@@ -101,7 +102,7 @@ class Study(ClinicModel):
     goal_percent = models.FloatField(
         _("goal (% of baseline)"),
         default=100,
-        validators=[MinValueValidator(50), MaxValueValidator(200)],
+        validators=between(50, 200, "%"),
     )
     primary_outcome = models.CharField(_("primary outcome"), max_length=32, choices=OUTCOMES)
     secondary_outcomes = models.JSONField(_("secondary outcomes"), default=list, blank=True)
@@ -211,12 +212,12 @@ class Arm(ScopedModel):
     schedule_steps = models.PositiveSmallIntegerField(
         _("steps between feedback"),
         default=USUAL_ANSWERS["schedule_steps"],
-        validators=[MinValueValidator(1), MaxValueValidator(INTERVAL_MAX)],
+        validators=between(1, INTERVAL_MAX),
     )
     schedule_band = models.PositiveSmallIntegerField(
         _("band without feedback, ± % of the goal"),
         default=USUAL_ANSWERS["schedule_band"],
-        validators=[MinValueValidator(1), MaxValueValidator(50)],
+        validators=between(1, 50, "%"),
     )
     measure = models.ForeignKey(
         MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")

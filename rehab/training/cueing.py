@@ -28,7 +28,9 @@ class CueRule(StrEnum):
 def check_activation_threshold(threshold: float) -> float:
     """Return the threshold as a float. Raises InvalidSetting outside (0, 2]."""
     if not 0 < threshold <= 2:
-        raise InvalidSetting("The activation threshold lies above 0 and up to 2 (0.9 for 90 %).")
+        raise InvalidSetting(
+            "The robot acts from more than 0 and up to 200 % of the goal (0.9 for 90 %)."
+        )
     return float(threshold)
 
 

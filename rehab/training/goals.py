@@ -91,7 +91,9 @@ class Target:
 
     def __post_init__(self) -> None:
         if self.hit_rate is not None and not 0 < self.hit_rate <= 1:
-            raise InvalidSetting("The wanted hit rate lies above 0 and up to 1 (0.6 for 60 %).")
+            raise InvalidSetting(
+                "Wanted hits are more than 0 and up to 100 % of the steps (0.6 for 60 %)."
+            )
         if self.duration_s is not None and not (
             math.isfinite(self.duration_s) and self.duration_s > 0
         ):

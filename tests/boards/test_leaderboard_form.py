@@ -81,7 +81,7 @@ def test_the_defaults_are_safe():
         ({"types": "chosen", "valences": ["kind"]}, "positive, negative, binary, explicit"),
         ({"valences": "positive"}, "Give a list"),
         ({"among": "clinic"}, "one row for each"),
-        ({"min_participants": 3}, "greater than or equal to 5"),
+        ({"min_participants": 3}, "Give 5 or more"),
         ({"period": "dates"}, "Give both dates"),
         ({"aggregation": "best"}, "Choose “Each session”"),
         ({"metric": "attended"}, "Compare with other patients"),
@@ -100,7 +100,7 @@ def test_the_defaults_are_safe():
         ),
         ({"among": "across", "aggregation": "best"}, "the host's"),
         ({"among": "across", "aggregation": "best", "names": "code"}, "animal names only"),
-        ({"top_n": 0}, "greater than or equal to 1"),
+        ({"top_n": 0}, "Give 1 to 50"),
         ({"tie_breaker": "luck"}, "not a valid choice"),
     ],
 )

@@ -105,7 +105,7 @@ def test_days_are_the_clinics_own(world, walked):
         ({"last": "9999-12-31"}, "Give a day of the years 1900 to 2999."),
         ({"first": "2026-11-02", "last": "2026-11-01"}, "It ends before it begins."),
         ({"who": "999999"}, "Select a valid choice"),
-        ({"hits_max": "101"}, "less than or equal to 100"),
+        ({"hits_max": "101"}, "Give 0 to 100 %"),
     ],
 )
 def test_what_cannot_be_looked_for_is_said_and_finds_nothing(world, walked, asked, words):

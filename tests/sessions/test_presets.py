@@ -76,7 +76,7 @@ def filled(page: str) -> dict[str, str]:
         if "checked" in tag:
             name = re.search(r'name="(\w+)"', tag)[1]
             found[name] = re.search(r'value="([^"]*)"', tag)[1]
-    for tag in re.findall(r"<input type=\"number\"[^>]*>", page):
+    for tag in re.findall(r"<input type=\"text\"[^>]*inputmode=[^>]*>", page):
         given = re.search(r'value="([^"]*)"', tag)
         found[re.search(r'name="(\w+)"', tag)[1]] = given[1] if given else ""
     for name, options in re.findall(r'<select name="(\w+)"[^>]*>(.*?)</select>', page, re.DOTALL):

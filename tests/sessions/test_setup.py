@@ -143,8 +143,8 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
         ("goal_value", "16", "above 0 and up to 15 W/kg"),
         ("goal_value", "nan", "Goal value: Enter a number"),
         ("goal_value", "", "either as a value or as percent"),
-        ("wanted_hits", "101", "less than or equal to 100"),
-        ("minutes", "-1", "greater than or equal to 1"),
+        ("wanted_hits", "101", "Give 1 to 100 %"),
+        ("minutes", "-1", "Give 1 to 240 minutes"),
         ("valence", "kind", "Select a valid choice"),
         ("source", "recording ../../etc/passwd", "Select a valid choice"),
         ("station", "999999", "Select a valid choice"),
@@ -375,12 +375,12 @@ def test_patients_are_found_by_name_or_code(pt, patient):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"robot_threshold": "0"}, "greater than or equal to 1"),
-        ({"robot_window": "1"}, "greater than or equal to 2"),
-        ({"robot_rest": "900"}, "less than or equal to 600"),
+        ({"robot_threshold": "0"}, "Give 1 to 200 %"),
+        ({"robot_window": "1"}, "Give 2 to 60 s"),
+        ({"robot_rest": "900"}, "Give 0 to 600 s"),
         ({"robot_answers": "dances"}, "not one of the available choices"),
         ({"schedule": "summary"}, "A summary is about at least 2 steps."),
-        ({"schedule_band": "80"}, "less than or equal to 50"),
+        ({"schedule_band": "80"}, "Give 1 to 50 %"),
         ({"goal_follows": "automatic", "wanted_hits": "95"}, "wanted hits of 30 to 90 %"),
     ],
 )

@@ -44,8 +44,8 @@ class WiredTwin(KobukiBase):
         super().__init__(monotonic)
         self._wire = Wire()
         chance = random.Random(5)
-        body = make_body(body, lambda _notice: None)
-        self._twin = Twin(Firmware(body, Faults(), chance=chance), self._wire)
+        firmware = Firmware(make_body(body, lambda _notice: None), Faults(), chance=chance)
+        self._twin = Twin(firmware, self._wire)
         self._client: Any = NoPort(self._wire)
         self._lived_s = monotonic() - GREETS_S
         self._monotonic = lambda: self._lived_s + FRAME_S

@@ -7,12 +7,12 @@ from zoneinfo import available_timezones
 
 from django.conf import settings
 from django.core.exceptions import ValidationError
-from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.db.models import Q
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.networks import validate_networks
+from rehab.people.ranges import between
 from rehab.people.scope import Scope, ScopedModel
 
 LANGUAGES = settings.LANGUAGES
@@ -85,7 +85,7 @@ class Clinic(ScopedModel):
         _("keep patients (months)"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(1), MaxValueValidator(1200)],
+        validators=between(1, 1200, _("months")),
         help_text=_(
             "So long after the last session a patient's name, code and all that leads to the "
             "person are erased for good. Empty: never."
@@ -94,7 +94,7 @@ class Clinic(ScopedModel):
     log_retention_months = models.PositiveSmallIntegerField(
         _("keep the logs (months)"),
         default=36,
-        validators=[MinValueValidator(12), MaxValueValidator(1200)],
+        validators=between(12, 1200, _("months")),
         help_text=_("How long it is kept who looked at, changed and took out what."),
     )
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from django.core.exceptions import NON_FIELD_ERRORS, ValidationError
-from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models, transaction
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
 from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.random_codes import random_code
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 from rehab.training.steps import Side
 
@@ -106,7 +106,7 @@ class Patient(ClinicModel):
         _("body mass (kg)"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(10), MaxValueValidator(300)],
+        validators=between(10, 300, "kg"),
         help_text=_("Needed when sensors send raw signals: A2 is power per kilogram."),
     )
     paretic_side = models.CharField(_("paretic side"), max_length=8, choices=SIDES, blank=True)
@@ -114,7 +114,7 @@ class Patient(ClinicModel):
         _("year of birth"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(1900), MaxValueValidator(2100)],
+        validators=between(1900, 2100),
         help_text=_("Researchers see the ten years of age alone."),
     )
     stroke_month = models.DateField(

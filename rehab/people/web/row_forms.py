@@ -6,6 +6,8 @@ from typing import Any, ClassVar
 
 from django import forms
 
+from rehab.people.ranges import say_ranges
+
 
 class LabeledFormSet(forms.BaseInlineFormSet):
     """Rows of a tabular inline whose fields are labeled for screen readers."""
@@ -26,6 +28,7 @@ class ClinicForm(forms.ModelForm):
         super().__init__(*args, **kwargs)
         if self.instance.pk is None and hasattr(self.instance, "clinic_id"):
             self.instance.clinic_id = self.new_clinic_id
+        say_ranges(self)
 
     def _get_validation_exclusions(self) -> set[str]:
         # The clinic is not in the form, but "once per clinic" must be checked all the same.

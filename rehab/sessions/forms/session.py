@@ -11,9 +11,10 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
+from rehab.people.ranges import NumberField, WholeNumberField
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
-from rehab.sessions.forms.answers import AnswerFields, NumberField
+from rehab.sessions.forms.answers import AnswerFields
 from rehab.sessions.forms.initial import usual_measure
 from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.models import TrainingSession
@@ -54,9 +55,9 @@ class SessionForm(WalkingFields, AnswerFields):
     )
     goal_by = forms.ChoiceField(choices=[("value", _("value")), ("percent", _("% of baseline"))])
     goal_value = NumberField(required=False)
-    goal_percent = NumberField(min_value=50, max_value=200, required=False)
-    wanted_hits = forms.IntegerField(min_value=1, max_value=100, required=False)
-    minutes = forms.IntegerField(min_value=1, max_value=240, required=False)
+    goal_percent = NumberField(least=50, most=200, unit="%", required=False)
+    wanted_hits = WholeNumberField(least=1, most=100, unit="%", required=False)
+    minutes = WholeNumberField(least=1, most=240, unit=_("minutes"), required=False)
     protocol: forms.ModelChoiceField[Protocol] = forms.ModelChoiceField(
         queryset=None, empty_label=None, widget=forms.RadioSelect
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from django import forms
 from django.utils.translation import gettext_lazy as _
 
-from rehab.sessions.forms.answers import NumberField
+from rehab.people.ranges import NumberField
 from rehab.sessions.setup.walking import (
     BELT_M_S,
     MAX_DEVICE_LETTERS,
@@ -23,12 +23,17 @@ class WalkingFields(forms.Form):
         required=False,
     )
     belt_speed = NumberField(
-        label=_("Belt speed, m/s"), min_value=BELT_M_S[0], max_value=BELT_M_S[1], required=False
+        label=_("Belt speed, m/s"),
+        least=BELT_M_S[0],
+        most=BELT_M_S[1],
+        unit="m/s",
+        required=False,
     )
     weight_support = NumberField(
         label=_("Body-weight support, %"),
-        min_value=SUPPORT_PERCENT[0],
-        max_value=SUPPORT_PERCENT[1],
+        least=SUPPORT_PERCENT[0],
+        most=SUPPORT_PERCENT[1],
+        unit="%",
         required=False,
     )
 

@@ -20,8 +20,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.models import Patient, User
+from rehab.people.ranges import NumberField
 from rehab.people.roles import may_see_names
-from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 
@@ -44,19 +44,16 @@ class SessionSearchForm(forms.Form):
     )
     score_min = NumberField(required=False, label=_("Score from"))
     score_max = NumberField(required=False, label=_("Score to"))
-    hits_min = NumberField(required=False, min_value=0, max_value=100, label=_("Hits from, %"))
-    hits_max = NumberField(required=False, min_value=0, max_value=100, label=_("Hits to, %"))
-    goal_min = NumberField(required=False, min_value=0, label=_("Goal from"))
-    goal_max = NumberField(required=False, min_value=0, label=_("Goal to"))
+    hits_min = NumberField(required=False, least=0, most=100, unit="%", label=_("Hits from, %"))
+    hits_max = NumberField(required=False, least=0, most=100, unit="%", label=_("Hits to, %"))
+    goal_min = NumberField(required=False, least=0, label=_("Goal from"))
+    goal_max = NumberField(required=False, least=0, label=_("Goal to"))
 
     def __init__(self, *args: Any, by: User, **options: Any) -> None:
         super().__init__(*args, **options | {"auto_id": "find_%s"})
         fields: dict[str, Any] = self.fields
         for name in ("first", "last"):
             fields[name].widget = forms.DateInput(attrs={"type": "date"}, format="%Y-%m-%d")
-        for name in RANGES:
-            for end in ("min", "max"):
-                fields[f"{name}_{end}"].widget = forms.TextInput(attrs={"inputmode": "decimal"})
         fields["place"].queryset = Station.objects.visible_to(by)
         if not may_see_names(by.role):
             del fields["place"]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
-from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.utils.text import capfirst
 from django.utils.translation import gettext, gettext_noop
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import (
@@ -74,13 +74,13 @@ class Preset(ClinicModel):
         _("wanted hits, % of the steps"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(1), MaxValueValidator(100)],
+        validators=between(1, 100, "%"),
     )
     minutes = models.PositiveSmallIntegerField(
         _("planned minutes"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(1), MaxValueValidator(240)],
+        validators=between(1, 240, _("minutes")),
     )
     protocol = models.ForeignKey(
         Protocol, on_delete=models.CASCADE, related_name="presets", verbose_name=_("protocol")
@@ -96,7 +96,7 @@ class Preset(ClinicModel):
     robot_threshold = models.PositiveSmallIntegerField(
         _("robot acts from, % of the goal"),
         default=USUAL_ANSWERS["robot_threshold"],
-        validators=[MinValueValidator(1), MaxValueValidator(200)],
+        validators=between(1, 200, "%"),
     )
     robot_answers = models.CharField(
         _("robot answers"), max_length=16, choices=CUE_RULES, default=USUAL_ANSWERS["robot_answers"]
@@ -104,17 +104,17 @@ class Preset(ClinicModel):
     robot_window = models.FloatField(
         _("robot’s window, in seconds"),
         default=USUAL_ANSWERS["robot_window"],
-        validators=[MinValueValidator(WINDOW_MIN_S), MaxValueValidator(WINDOW_MAX_S)],
+        validators=between(WINDOW_MIN_S, WINDOW_MAX_S, "s"),
     )
     robot_count = models.PositiveSmallIntegerField(
         _("steps that the robot answers"),
         default=USUAL_ANSWERS["robot_count"],
-        validators=[MinValueValidator(1), MaxValueValidator(COUNT_MAX)],
+        validators=between(1, COUNT_MAX),
     )
     robot_rest = models.FloatField(
         _("robot’s rest, in seconds"),
         default=USUAL_ANSWERS["robot_rest"],
-        validators=[MinValueValidator(0), MaxValueValidator(REST_MAX_S)],
+        validators=between(0, REST_MAX_S, "s"),
     )
     schedule = models.CharField(
         _("feedback comes"), max_length=16, choices=SCHEDULES, default=USUAL_ANSWERS["schedule"]
@@ -122,12 +122,12 @@ class Preset(ClinicModel):
     schedule_steps = models.PositiveSmallIntegerField(
         _("steps between feedback"),
         default=USUAL_ANSWERS["schedule_steps"],
-        validators=[MinValueValidator(1), MaxValueValidator(INTERVAL_MAX)],
+        validators=between(1, INTERVAL_MAX),
     )
     schedule_band = models.PositiveSmallIntegerField(
         _("band without feedback, ± % of the goal"),
         default=USUAL_ANSWERS["schedule_band"],
-        validators=[MinValueValidator(1), MaxValueValidator(50)],
+        validators=between(1, 50, "%"),
     )
     goal_follows = models.CharField(
         _("the goal"), max_length=16, choices=ADAPTATIONS, default=USUAL_ANSWERS["goal_follows"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from django.core.exceptions import ValidationError
-from django.core.validators import MaxValueValidator, MinValueValidator, RegexValidator
+from django.core.validators import RegexValidator
 from django.db import models
 from django.db.models import F, Q
 from django.utils.translation import gettext
@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.translation import translate
 from rehab.people.models import Clinic
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.training import measures as rules
@@ -135,14 +136,14 @@ class Protocol(ClinicModel):
         _("wanted hits, % of the steps"),
         null=True,
         blank=True,
-        validators=[MinValueValidator(1), MaxValueValidator(100)],
+        validators=between(1, 100, "%"),
         help_text=_("Filled in where a session is set up with it; left empty, it stays."),
     )
     close_percent = models.PositiveSmallIntegerField(
         _("close steps, % beyond the goal"),
         null=True,
         blank=True,
-        validators=[MaxValueValidator(49)],
+        validators=between(most=49, unit="%"),
         help_text=_(
             "A step pays and takes nothing where more than this part of its interval (95 %) lies "
             "beyond the goal. Left empty, each step is a hit or a miss."

@@ -16,8 +16,8 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
+from rehab.people.ranges import NumberField, WholeNumberField
 from rehab.people.roles import Role
-from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.live import runtime
 from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
@@ -33,13 +33,11 @@ USUAL = Population()
 class PowerForm(forms.Form):
     """What is assumed of a study that is simulated: one effect for each arm."""
 
-    participants = forms.IntegerField(label=_("participants"), min_value=2, max_value=2000)
+    participants = WholeNumberField(label=_("participants"), least=2, most=2000)
     sd_percent = NumberField(label=_("people differ by (SD, % of baseline)"))
     kept_percent = NumberField(label=_("share of it that washout keeps (%)"))
     dropout_percent = NumberField(label=_("leave before each visit (%)"))
-    simulations = forms.IntegerField(
-        label=_("simulated studies"), min_value=1, max_value=SIMULATIONS_MAX
-    )
+    simulations = WholeNumberField(label=_("simulated studies"), least=1, most=SIMULATIONS_MAX)
 
     def __init__(self, *args: Any, study: Study, **options: Any) -> None:
         super().__init__(*args, **options)
