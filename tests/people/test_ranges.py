@@ -68,7 +68,7 @@ def test_the_set_up_says_its_ranges(world: World) -> None:
     assert said["schedule_band"] == "Give 1 to 50 %."
     assert said["belt_speed"].endswith("m/s.")
     assert said["weight_support"].endswith("%.")
-    assert said["goal_value"].endswith("up to 15 W/kg.")
+    assert said["goal_value"].endswith("up to 2 m.")  # the unit of its measure
 
 
 @pytest.mark.django_db
