@@ -214,3 +214,33 @@ async def test_an_ack_covers_the_ones_before_it():
     assert told[-1] == 4
     assert told == sorted(set(told))
     running.cancel()
+
+
+async def test_one_call_of_the_loop_writes_to_all(monkeypatch):
+    loop, calls = asyncio.get_running_loop(), []
+    pages = [Page() for _ in range(3)]
+
+    def fail(_: str) -> bool:
+        raise OSError
+
+    monkeypatch.setattr(pages[1], "write", fail)
+    outboxes = [Outbox(page.send, page.write) for page in pages]
+    running = [asyncio.create_task(outbox.pump()) for outbox in outboxes]
+    await asyncio.sleep(0)
+    call_soon = loop.call_soon
+
+    def count(function, *args, **options):
+        calls.append(function)
+        return call_soon(function, *args, **options)
+
+    monkeypatch.setattr(loop, "call_soon", count)
+    for outbox in outboxes:
+        outbox.acknowledge(1)
+        outbox.acknowledge(2)
+    assert len(calls) == 1
+    await asyncio.sleep(0.01)
+    ack = '{"type":"ack","number":2}'
+    assert [page.written for page in pages] == [[ack], [], [ack]]
+    assert pages[1].awaited == [ack]  # what could not be written is sent
+    for one in running:
+        one.cancel()

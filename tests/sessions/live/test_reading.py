@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.source import SourceConsumer
-from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.protocol.messages import read_frame, read_seen
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.log import Step
-from robot.wire.frames import BadFrame, read_object
+from robot.wire.frames import BadFrame, read_object, read_whole
 from tests.support.callers import turns
 from tests.support.json_values import ANYTHING
 
@@ -78,6 +78,28 @@ def test_a_usual_step_is_read_at_once():
     assert step is not None
     assert step.extra == extra
     assert read_single_step(json.dumps({"type": "steps", "steps": [STEP]})) is None
+
+
+@given(
+    st.fixed_dictionaries(
+        {"type": st.just("seen") | ANYTHING}, optional={"frame": st.integers() | ANYTHING}
+    )
+)
+@example({"type": "seen", "frame": True})
+@example({"type": "seen", "frame": 2.0})
+@example({"type": "seen", "frame": -1})
+@example({"type": "seen", "frame": 2**31})
+def test_what_a_page_has_seen_is_read_at_once_as_it_is_in_its_turn(message):
+    text = json.dumps(message)
+    if (at_once := read_seen(text)) is not None:
+        in_turn = read_frame(text)
+        assert in_turn["type"] == "seen"
+        assert at_once == read_whole(in_turn, "frame", low=0)
+
+
+def test_usual_words_of_what_is_seen_are_read_at_once():
+    assert read_seen('{"type":"seen","frame":8}') == 8
+    assert read_seen('{"type":"change","frame":8}') is None
 
 
 def test_binary_frames_are_refused():

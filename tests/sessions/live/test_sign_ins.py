@@ -109,3 +109,16 @@ async def test_a_clinic_that_comes_to_ask_for_a_second_factor_closes_sockets(pla
     assert (await monitor.sent_away())[0] == 4001
     again = await place.monitor(session).dial()
     assert (await again.sent_away())[0] == 4001
+
+
+async def test_all_sign_ins_are_checked_a_few_at_a_time(place, begun, monkeypatch):
+    monkeypatch.setattr(routines, "CHECKED_SOCKETS", 1)
+    monkeypatch.setattr(routines, "CHECK_PAUSE_S", 0.0)
+    session = await begun(place)
+    pages = [place.monitor(session) for _ in range(3)]
+    for page in pages:
+        await page.watch()
+    await pages[0].change("pause")
+    await end_in(sign_in(place.pt), -1)
+    for page in pages:
+        assert (await page.sent_away())[0] == 4001
