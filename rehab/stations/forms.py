@@ -37,10 +37,12 @@ class PinForm(forms.ModelForm):
 
     def save(self, commit: bool = True) -> Station:
         """Save a new station; of another one what was changed: its robot may be stopped now."""
-        if self.instance.pk is None or not commit:
-            return super().save(commit)
-        save_changes(self.instance, self._before)
-        return self.instance
+        station = self.instance
+        if self._before["id"] is None or not commit:
+            super().save(commit)
+        else:
+            save_changes(station, self._before)
+        return station
 
     def clean(self) -> dict[str, Any] | None:
         """Set the PIN; only its hash is stored."""

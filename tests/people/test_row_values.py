@@ -38,7 +38,7 @@ def admin_form(row: Model, **fields: Any) -> Callable[[Any], Any]:
     return lambda client: client.post(url, fields)
 
 
-def renamed(world: World, page: str) -> tuple[Model, Callable[[Any], Any], str, Change]:
+def renamed(world: World, page: str) -> tuple[Any, Callable[[Any], Any], str, Change]:
     """Return a row, what gives it another name on a page, the name's field, and a change of it."""
     device, station = world.rows[Device], world.rows[Station]
     token, pt = world.rows[ApiToken], world.people[Role.PT]
@@ -47,7 +47,7 @@ def renamed(world: World, page: str) -> tuple[Model, Callable[[Any], Any], str, 
     stations_page = reverse("edit-station", args=[station.pk])
     rotated = {"token_hash": "rotated", "rotated_at": NOW}
     role = {"role": "pt", "username": pt.username, "is_active": "on"}
-    return {
+    pages: dict[str, tuple[Any, Callable[[Any], Any], str, Change]] = {
         "a device's token": (device, admin_form(device, name="New", **at), "name", rotated),
         "a token": (token, admin_form(token, name="New"), "name", {"revoked_at": NOW}),
         "an account": (
@@ -62,7 +62,8 @@ def renamed(world: World, page: str) -> tuple[Model, Callable[[Any], Any], str, 
             *(station, lambda client: client.post(stations_page, {"name": "New"}), "name"),
             {"robot_stopped": True, "pin_hash": "x"},
         ),
-    }[page]
+    }
+    return pages[page]
 
 
 @pytest.mark.parametrize(
