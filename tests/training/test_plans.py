@@ -64,7 +64,7 @@ def test_a_goal_out_of_bounds_is_refused_with_the_plan(goal: float) -> None:
 
 
 def test_a_threshold_out_of_bounds_is_refused_with_the_plan() -> None:
-    with pytest.raises(InvalidSetting, match="activation threshold"):
+    with pytest.raises(InvalidSetting, match="robot acts from more than 0"):
         make_plan(activation_threshold=90)
 
 

@@ -244,7 +244,7 @@ async def test_changes_that_cannot_be_are_refused_in_words(place, begun):
         ("gain", 9, "0.5 to 1.5"),
         ("phase", 1, "no phase 1"),
         ("phase", 1e300, "no phase"),
-        ("activation_threshold", -1, "above 0"),
+        ("activation_threshold", -1, "more than 0 and up to 200 %"),
         ("robot_intensity", 0.3, "normal (1), gentle (0.5), off (0)"),
         ("robot_intensity", None, "needs a value"),
         ("resume", None, "must be paused"),
