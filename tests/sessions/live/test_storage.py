@@ -178,7 +178,7 @@ def test_the_writers_connection_is_its_own_and_gives_up(transactional_db):
             cursor.execute("SHOW lock_timeout")
             assert cursor.fetchone() == ("3s",)
             cursor.execute("SHOW statement_timeout")
-            assert cursor.fetchone() == ("10s",)
+            assert cursor.fetchone() == ("10000",)  # ms
             cursor.execute("SELECT 1")
     finally:
         own.close()
@@ -197,6 +197,6 @@ def test_locks_of_a_server_that_is_gone_are_released(transactional_db, monkeypat
             cursor.execute("COMMIT")
         with connection.cursor() as cursor:
             cursor.execute("SHOW tcp_user_timeout")
-            assert cursor.fetchone() == ("10s",)
+            assert cursor.fetchone() == ("10000",)  # ms
     finally:
         gone.close()
