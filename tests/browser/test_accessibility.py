@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
 
 import pytest
@@ -11,7 +9,7 @@ from playwright.sync_api import Browser, BrowserContext, Page
 
 from tests.support.axe import check, go_dark
 from tests.support.browsers import SIZES
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
@@ -98,14 +96,7 @@ def walks(server: Server) -> list[Walk]:
 @pytest.fixture(scope="module")
 def places(server: Server, walks: list[Walk]) -> dict[str, str]:
     """Somebody who has walked before, and where."""
-    told = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", WALKED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout
+    told = server.run_shell(WALKED)
     names = ("station", "protocol", "patient", "session", "kept")
     return dict(zip(names, told.split(), strict=False)) | {"walk": str(walks[0].session)}
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import Server
 from tests.support.walk_seed import make_walks
 
 pytestmark = pytest.mark.browser
@@ -33,14 +31,7 @@ print(blocks.pk)
 
 @pytest.fixture(scope="module")
 def protocol(server: Server) -> str:
-    return subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout.strip()
+    return server.run_shell(SEED).strip()
 
 
 @pytest.fixture

@@ -4,14 +4,11 @@ seen after a session and while the tablet waits, and left by its patient with on
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, can_be_read, go_on_to_scores
-from tests.support.servers import ROOT, clean_environment, serve
+from tests.support.browsers import SIZES, can_be_read, go_on_to_scores, sign_in
+from tests.support.servers import serve
 
 pytestmark = pytest.mark.browser
 
@@ -44,15 +41,7 @@ def choose(page: Page, words: str) -> None:
 @pytest.mark.essential
 def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path, browser: Browser):
     with serve(tmp_path) as server:
-        seeded = subprocess.run(
-            [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
-            cwd=ROOT,
-            env=clean_environment(server.folder, server.port),
-            check=True,
-            capture_output=True,
-            text=True,
-        )
-        names = seeded.stdout.split("\n")
+        names = server.run_shell(SEED).split("\n")
         complaints: list[str] = []
 
         def open_page(size: str) -> Page:
@@ -72,9 +61,7 @@ def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path, browse
 
         pt, tablet = open_page("laptop"), open_page("tablet-portrait")
         pt.goto("/admin/rehab/leaderboard/add/")
-        pt.fill("#id_username", "pt")
-        pt.fill("#id_password", server.password)
-        pt.click("[type=submit]")
+        sign_in(pt, server.password)
         build(pt, names)
 
         tablet.goto("/tablet/")

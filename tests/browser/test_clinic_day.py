@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from rehab.training.valences import VALENCES
 from tests.support.browsers import SIZES
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import Server
 from tests.support.walk_seed import feet_of, make_walks
 
 pytestmark = pytest.mark.browser
@@ -21,15 +19,7 @@ pytestmark = pytest.mark.browser
 
 def run(server: Server, script: str) -> list[str]:
     """Run a script beside the server; return the words that it prints."""
-    done = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", script],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return done.stdout.split()
+    return server.run_shell(script).split()
 
 
 @contextmanager

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import zipfile
 
 import pytest
 from playwright.sync_api import Browser
 
-from tests.support.browsers import SIZES, picture
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.browsers import SIZES, picture, sign_in
+from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
 WALKED = """
@@ -27,20 +25,13 @@ for day in range(3):
 
 
 def test_an_export_is_prepared_left_gone_on_with_and_fetched(server: Server, browser: Browser):
-    subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", WALKED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-    )
+    server.run_shell(WALKED)
     width, height = SIZES["laptop"]
     context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
     context.set_default_timeout(40_000)
     page = context.new_page()
     page.goto("/start/")
-    page.fill("#id_username", "pt")
-    page.fill("#id_password", server.password)
-    page.click("[type=submit]")
+    sign_in(page, server.password)
     page.wait_for_url("**/start/")
     page.goto("/export/")
     if "confirm" in page.url:

@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
+from tests.support.browsers import sign_in
 from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
@@ -17,9 +18,7 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
     context = browser.new_context(base_url=server.url, viewport={"width": 390, "height": 844})
     page = context.new_page()
     page.goto("/start/")
-    page.fill("#id_username", "pt")
-    page.fill("#id_password", server.password)
-    page.press("#id_password", "Enter")
+    sign_in(page, server.password)
     page.wait_for_url("**/start/")
     page.click("text=First steps, one by one")
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import picture
+from tests.support.browsers import picture, sign_in
 from tests.support.layout import set_screen, too_small
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
 
@@ -52,15 +50,7 @@ print(json.dumps({"fell": fell.pk, "noted": noted.pk}))
 
 @pytest.fixture
 def sessions(server: Server) -> dict[str, int]:
-    made = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    stored: dict[str, int] = json.loads(made.stdout)
+    stored: dict[str, int] = json.loads(server.run_shell(SEED))
     return stored
 
 
@@ -80,9 +70,7 @@ def test_sessions_are_compared_and_taken_along(
     page = context.new_page()
     set_screen(page, "laptop")
     page.goto("/start/")
-    page.fill("#id_username", "pt")
-    page.fill("#id_password", server.password)
-    page.press("#id_password", "Enter")
+    sign_in(page, server.password)
     page.wait_for_url("**/start/")
     page.click("text=Insight")
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.support.browsers import SIZES, picture
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import ROOT, Server
 
 pytestmark = pytest.mark.browser
 AXE = ROOT / "node_modules" / "axe-core" / "axe.min.js"
@@ -56,15 +54,7 @@ print(json.dumps({"session": session.pk, "name": COOKIE, "value": token}))
 
 
 def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, browser: Browser):
-    done = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", ENDED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    made = json.loads(done.stdout)
+    made = json.loads(server.run_shell(ENDED))
     width, height = SIZES["tablet-portrait"]
     context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
     context.add_cookies([{"name": made["name"], "value": made["value"], "url": server.url}])

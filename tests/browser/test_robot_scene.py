@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -15,7 +13,7 @@ from websockets.sync.client import ClientConnection, connect
 from robot.wire.incident import pack, read_lines
 from tests.support.browsers import SIZES
 from tests.support.incidents import BUMPED
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import Server
 from tests.support.walk_seed import make_walks
 
 pytestmark = pytest.mark.browser
@@ -154,14 +152,7 @@ def test_a_robot_away_from_home_says_so_and_is_let_go_on_by_a_person(server, bro
 
 
 def test_a_composed_gesture_is_played_with_lights_and_sound(server, browser):
-    made = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout.strip()
+    made = server.run_shell(SEED).strip()
     (walk,) = make_walks(server, {})
     context = browser.new_context(base_url=server.url)
     context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])

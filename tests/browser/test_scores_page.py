@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, can_be_read
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.browsers import SIZES, can_be_read, sign_in
+from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
 
@@ -36,15 +34,7 @@ TABLETS = ("tablet-portrait", "tablet-landscape")
 @pytest.fixture(scope="module")
 def sessions(server) -> tuple[str, str]:
     """The newest positive and the newest negative session."""
-    done = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    positive, negative = done.stdout.split()
+    positive, negative = server.run_shell(SEED).split()
     return positive, negative
 
 
@@ -60,9 +50,7 @@ def tablet(browser: Browser, server: Server, size: str, *, still: bool = False) 
     )
     page = context.new_page()
     page.goto("/admin/")
-    page.fill("#id_username", "pt")
-    page.fill("#id_password", server.password)
-    page.click("[type=submit]")
+    sign_in(page, server.password)
     complaints: list[str] = []
     page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
     yield page

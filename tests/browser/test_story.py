@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -12,9 +10,9 @@ from itertools import product
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, go_on_to_scores
+from tests.support.browsers import SIZES, go_on_to_scores, sign_in
 from tests.support.extent import EVERYTHING
-from tests.support.servers import ROOT, Server, clean_environment, serve
+from tests.support.servers import Server, serve
 
 pytestmark = pytest.mark.browser
 
@@ -59,13 +57,7 @@ class Story:
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with serve(tmp_path_factory.mktemp("data")) as running:
-        subprocess.run(
-            [sys.executable, "manage.py", "shell", "-c", SEED.format(count=len(STORIES))],
-            cwd=ROOT,
-            env=clean_environment(running.folder, running.port),
-            check=True,
-            capture_output=True,
-        )
+        running.run_shell(SEED.format(count=len(STORIES)))
         yield running
 
 
@@ -74,9 +66,7 @@ def stories(server: Server, browser: Browser) -> Iterator[list[Story]]:
     first = browser.new_context(base_url=server.url)
     page = first.new_page()
     page.goto("/start/")
-    page.fill("#id_username", "pt")
-    page.fill("#id_password", server.password)
-    page.click("[type=submit]")
+    sign_in(page, server.password)
     expect(page).to_have_url(f"{server.url}/start/")
     signed_in = first.storage_state()
     first.close()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -14,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browsers import SIZES
-from tests.support.servers import ROOT, Server, clean_environment, serve
+from tests.support.servers import Server, serve
 
 pytestmark = pytest.mark.browser
 
@@ -122,15 +120,7 @@ print(json.dumps([f"{row.act} {row.through} {row.about}" for row in rows]))
 
 def run_inside(server: Server, program: str) -> Any:
     """Run a program with the server's rows; return the JSON that it prints."""
-    done = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", program],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return json.loads(done.stdout)
+    return json.loads(server.run_shell(program))
 
 
 def look_everywhere(page: Page, addresses: list[str]) -> None:

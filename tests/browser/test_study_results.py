@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from typing import Any
 
 import pytest
@@ -13,8 +11,8 @@ from playwright.sync_api import Browser, expect
 
 from rehab.people.sign_in.first_start import FIRST_CLINIC
 from rehab.studies.figures.canvas import COLORS
-from tests.support.browsers import SIZES, picture
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.browsers import SIZES, picture, sign_in
+from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
 CLOSED_STUDY = ("simulatestudy", "--seed", "3", "--participants", "12", "--clinic", FIRST_CLINIC)
@@ -28,34 +26,20 @@ print(json.dumps([study.pk, [row.about for row in exported]]))
 """
 
 
-def manage(server: Server, *arguments: str) -> str:
-    done = subprocess.run(
-        [sys.executable, "manage.py", *arguments],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return done.stdout
-
-
 def tell(server: Server) -> list[Any]:
-    told: list[Any] = json.loads(manage(server, "shell", "-v0", "-c", TELL))
+    told: list[Any] = json.loads(server.run_shell(TELL))
     return told
 
 
 def test_figures_are_given_out_as_svg_and_png_on_the_record(server: Server, browser: Browser):
-    manage(server, *CLOSED_STUDY, "--to", str(server.folder / "simulated"))
+    server.manage(*CLOSED_STUDY, "--to", str(server.folder / "simulated"))
     study, _none = tell(server)
     width, height = SIZES["laptop"]
     context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
     context.set_default_timeout(40_000)
     page = context.new_page()
     page.goto("/start/")
-    page.fill("#id_username", "pt")
-    page.fill("#id_password", server.password)
-    page.click("[type=submit]")
+    sign_in(page, server.password)
     page.wait_for_url("**/start/")
     page.goto(f"/studies/{study}/results/")
     picture(page, "study-results")

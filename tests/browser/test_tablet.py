@@ -7,7 +7,7 @@ import time
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, go_on_to_scores
+from tests.support.browsers import SIZES, go_on_to_scores, sign_in
 from tests.support.servers import serve
 
 pytestmark = pytest.mark.browser
@@ -30,9 +30,7 @@ def test_a_paired_tablet_follows_its_station(tmp_path, browser: Browser):
         pt, tablet = open_page("laptop"), open_page("tablet-portrait")
         tablet.goto("/tablet/")
         pt.goto("/start/")
-        pt.fill("#id_username", "pt")
-        pt.fill("#id_password", server.password)
-        pt.click("[type=submit]")
+        sign_in(pt, server.password)
         pt.click("text=Tablets")
         pt.fill("#code", tablet.inner_text(".code").lower())
         pt.click("text=Let it in")

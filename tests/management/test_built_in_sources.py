@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support.servers import ROOT, Server, clean_environment, serve
+from tests.support.servers import Server, serve
 
 pytestmark = pytest.mark.server
 
@@ -50,13 +48,7 @@ with connect("ws://" + place + "/ws/session/1/monitor/", additional_headers=head
 
 
 def run_inside(server: Server, code: str) -> None:
-    subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", code],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        timeout=60,
-    )
+    server.run_shell(code)
 
 
 def change(server: Server, kind: str, watch: float = 0.0) -> None:

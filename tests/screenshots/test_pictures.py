@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from rehab.sessions.setup.defaults import PROTOCOLS
-from tests.support.browsers import SIZES, chromium
+from tests.support.browsers import SIZES, chromium, sign_in
 from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
@@ -206,18 +206,11 @@ def signed_in(tmp_path_factory):
                 check=True,
                 stdout=subprocess.DEVNULL,
             )
-        subprocess.run(
-            [sys.executable, "manage.py", "shell", "-v0", "-c", VISITS],
-            cwd=ROOT,
-            env=clean_environment(server.folder, server.port),
-            check=True,
-        )
+        server.run_shell(VISITS)
         context = browser.new_context(base_url=server.url, reduced_motion="reduce")
         page = context.new_page()
         page.goto("/admin/")
-        page.fill("#id_username", "pt")
-        page.fill("#id_password", server.password)
-        page.click("[type=submit]")
+        sign_in(page, server.password)
         page.goto("/start/")
         page.click("text=Try a demo")
         page.click(".huge")

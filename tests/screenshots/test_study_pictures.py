@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 
@@ -12,8 +10,8 @@ import pytest
 from playwright.sync_api import BrowserContext
 
 from rehab.people.sign_in.first_start import FIRST_CLINIC
-from tests.support.browsers import SIZES, chromium
-from tests.support.servers import ROOT, clean_environment, serve
+from tests.support.browsers import SIZES, chromium, sign_in
+from tests.support.servers import ROOT, serve
 
 pytestmark = pytest.mark.browser
 
@@ -99,26 +97,13 @@ def signed_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pages]:
     with ExitStack() as stack:
         server = stack.enter_context(serve(tmp_path_factory.mktemp("data")))
 
-        def manage(*arguments: str) -> str:
-            done = subprocess.run(
-                [sys.executable, "manage.py", *arguments],
-                cwd=ROOT,
-                env=clean_environment(server.folder, server.port),
-                check=True,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-            return done.stdout
-
-        manage(*CLOSED_STUDY, "--clinic", FIRST_CLINIC, "--to", str(server.folder / "files"))
-        addresses = json.loads(manage("shell", "-v0", "-c", STUDIES))
+        server.manage(*CLOSED_STUDY, "--clinic", FIRST_CLINIC, "--to", str(server.folder / "files"))
+        addresses = json.loads(server.run_shell(STUDIES))
         browser = stack.enter_context(chromium())
         context = browser.new_context(base_url=server.url, reduced_motion="reduce")
         page = context.new_page()
         page.goto("/start/")
-        page.fill("#id_username", "pt")
-        page.fill("#id_password", server.password)
-        page.click("[type=submit]")
+        sign_in(page, server.password)
         page.wait_for_url("**/start/")
         FOLDER.mkdir(exist_ok=True)
         yield context, addresses

@@ -30,6 +30,13 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
+def sign_in(page: Page, password: str, name: str = "pt") -> None:
+    """Fill in the sign-in that a page shows, and send it."""
+    page.fill("#id_username", name)
+    page.fill("#id_password", password)
+    page.press("#id_password", "Enter")
+
+
 def go_on_to_scores(page: Page) -> None:
     """Go on from the page that ends a walk."""
     page.wait_for_url("**/ending/")

@@ -43,6 +43,22 @@ class Server:
                 written += part
         return written.decode(errors="replace")
 
+    def manage(self, *arguments: str) -> str:
+        """Run a management command on its database; return what that prints."""
+        done = subprocess.run(
+            [sys.executable, "manage.py", *arguments],
+            cwd=ROOT,
+            env=clean_environment(self.folder, self.port),
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        return done.stdout
+
+    def run_shell(self, program: str) -> str:
+        """Run a program with its rows; return what that prints."""
+        return self.manage("shell", "-v0", "-c", program)
+
     @property
     def password(self) -> str:
         """The first account's password, as the server told it."""
