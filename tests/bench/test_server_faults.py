@@ -4,8 +4,7 @@ GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED (GARRY_TEST_FAULT: only th
 acknowledged step lost or doubled, no gap at a viewer, orderly restarts pause nobody, a stop at the
 other server arrives or is refused.
 
-A full disk needs root, which mounts a small one; a clock of the database that jumps needs
-libfaketime (Debian: faketime). Without them these faults are left out, and the report says so.
+What this machine cannot break (tests/support/faulty_set.py) is left out, and the report says so.
 """
 
 from __future__ import annotations
@@ -15,27 +14,18 @@ import os
 import random
 import signal
 import statistics
-import subprocess
-import tempfile
 import time
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import psycopg
 import pytest
 
-from tests.support.cable import Cable, run_cables
-from tests.support.hosted import (
-    REVIVE_POSTGRES,
-    Restarts,
-    find_missing,
-    run_nginx,
-    run_postgres,
-    run_redis,
-)
-from tests.support.pair import Message, Pair, of_type
+from tests.support.faulty_set import FAKE_TIME, FaultySet, run_faulty_set
+from tests.support.hosted import REVIVE_POSTGRES, find_missing, run_nginx
+from tests.support.pair import Message, of_type
 from tests.support.torture import GONE, Entrance, Walk
 
 pytestmark = pytest.mark.skipif(bool(find_missing()), reason=f"faults: {find_missing()}")
@@ -43,54 +33,9 @@ SESSIONS, RATE = 6, 4.0
 RECOVERED_S = 90.0
 CUT_S = 60.0  # a network without a word
 FULL_S = 10.0
-DISK_MB = 256
 JUMPS = ("+3600", "-3600")  # seconds
-FAKE_TIME = next(iter(sorted(Path("/usr/lib").glob("*/faketime/libfaketime.so.1"))), None)
 
 Heal = Callable[[], Awaitable[None]]
-
-
-class Clock:
-    """The clock of a program, which jumps and comes back while it runs."""
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self.jump("+0")
-
-    @property
-    def program(self) -> tuple[str, ...]:
-        """The server that goes by it, in Python's terms."""
-        return ("-m", "tests.support.jumping_server", str(self._file))
-
-    @property
-    def variables(self) -> dict[str, str]:
-        """What the environment of PostgreSQL needs to go by it; its sleeps are not touched."""
-        if FAKE_TIME is None:
-            return {}
-        return {
-            "LD_PRELOAD": str(FAKE_TIME),
-            "FAKETIME_TIMESTAMP_FILE": str(self._file),
-            "FAKETIME_CACHE_DURATION": "1",
-            "FAKETIME_DONT_FAKE_MONOTONIC": "1",
-        }
-
-    def jump(self, seconds: str) -> None:
-        self._file.write_text(seconds)
-        self._file.chmod(0o644)  # also PostgreSQL reads it, as somebody else
-
-
-@contextmanager
-def small_disk(folder: Path) -> Iterator[Path | None]:
-    """Mount a disk of its own, where one may."""
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", f"size={DISK_MB}m,mode=755", "tmpfs", str(folder)]
-    if subprocess.run(command, capture_output=True).returncode != 0:
-        yield None
-        return
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
 
 
 def has_more(walk: Walk, mark: int) -> bool:
@@ -103,19 +48,12 @@ class Faults:
 
     def __init__(
         self,
-        pair: Pair,
-        restarts: Restarts,
+        broken: FaultySet,
         entrance: Entrance,
         seed: int,
-        *,
-        cables: list[list[Cable]],
-        disk: Path | None,
-        clocks: list[Clock],
     ) -> None:
-        self.pair, self.restarts, self.entrance = pair, restarts, entrance
-        self.cables = cables  # of each server: to the database, and to Redis
-        self.disk = disk  # the database's
-        self.clocks = clocks  # of each server, and the database's
+        self.set, self.pair, self.restarts = broken, broken.pair, broken.restarts
+        self.entrance = entrance
         self.began_s = 0.0
         self.random = random.Random(seed)
         self.walks: list[Walk] = []
@@ -139,7 +77,7 @@ class Faults:
             "a server's network": self.cut_network,
             "clock of a server": lambda: self.set_clock(self.random.randrange(2)),
         }
-        if self.disk is not None:
+        if self.set.disk is not None:
             faults["disk full"] = self.fill_disk
         if FAKE_TIME is not None:
             faults["clock of the database"] = lambda: self.set_clock(2)
@@ -179,22 +117,22 @@ class Faults:
     async def cut_network(self) -> Heal:
         """Cut a server off the database and Redis; clients still reach it."""
         place = await asyncio.to_thread(self.find_owner)
-        for cable in self.cables[place]:
+        for cable in self.set.cables[place]:
             cable.cut()
         until_s = time.monotonic() + CUT_S
 
         async def mend() -> None:
             self.went_on_without += time.monotonic() < until_s
             await asyncio.sleep(until_s - time.monotonic())
-            for cable in self.cables[place]:
+            for cable in self.set.cables[place]:
                 cable.mend()
 
         return mend
 
     async def fill_disk(self) -> None:
         """Fill the database's disk; nothing is acknowledged until there is room again."""
-        assert self.disk is not None
-        filler = self.disk / "filler"
+        assert self.set.disk is not None
+        filler = self.set.disk / "filler"
         with suppress(OSError), filler.open("wb", buffering=0) as file:
             while file.write(bytes(4096)):
                 pass
@@ -208,11 +146,11 @@ class Faults:
 
     async def set_clock(self, which: int) -> Heal:
         """Let a clock jump by an hour, and back again when sessions go on."""
-        self.clocks[which].jump(self.random.choice(JUMPS))
+        self.set.clocks[which].jump(self.random.choice(JUMPS))
         await asyncio.sleep(3)
 
         async def put_right() -> None:
-            self.clocks[which].jump("+0")
+            self.set.clocks[which].jump("+0")
             await asyncio.sleep(3)
 
         return put_right
@@ -320,50 +258,18 @@ class Faults:
             watcher.cancel()
 
 
-@contextmanager
-def run_set(
-    folder: Path, restarts: Restarts
-) -> Iterator[tuple[Pair, list[list[Cable]], Path | None, list[Clock]]]:
-    """Run the database and Redis, and name two servers, each with cables and a clock of its own."""
-    cables: list[list[Cable]] = []
-    with ExitStack() as stack:
-        open_folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="garry-faults-")))
-        open_folder.chmod(0o755)  # PostgreSQL runs as somebody else
-        clocks = [Clock(open_folder / f"clock {name}") for name in (0, 1, "database")]
-        disk = stack.enter_context(small_disk(open_folder / "disk"))
-        database = stack.enter_context(
-            run_postgres(restarts, disk=disk, variables=clocks[2].variables)
-        )
-        redis = stack.enter_context(run_redis(restarts))
-        pair = Pair(folder / "garry", database, redis)
-        for place in range(2):
-            urls = {"GARRY_DATABASE_URL": database, "GARRY_REDIS_URL": redis}
-            pair.own_environments[place], its_cables = stack.enter_context(run_cables(urls))
-            cables.append(its_cables)
-            pair.programs[place] = clocks[place].program
-        yield pair, cables, disk, clocks
-
-
 @pytest.mark.timeout(0)
 def test_each_part_fails_under_load_and_nothing_is_lost(tmp_path: Path) -> None:
     seed = int(os.environ.get("GARRY_TEST_SEED", "20261122"))
     times = int(os.environ.get("GARRY_TEST_FAULTS", "20"))
-    restarts: Restarts = {}
     (tmp_path / "garry").mkdir()
-    with run_set(tmp_path, restarts) as (pair, cables, disk, clocks):
-        nginx = run_nginx(tmp_path / "nginx", *pair.ports, restarts=restarts)
+    with run_faulty_set(tmp_path / "garry") as broken:
+        pair = broken.pair
+        nginx = run_nginx(tmp_path / "nginx", *pair.ports, restarts=broken.restarts)
         with nginx as (_, secure, tls):
             print(f"\nlog: {pair.log}")
             print(f"seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s")
-            faults = Faults(
-                pair,
-                restarts,
-                Entrance(secure, tls),
-                seed,
-                cables=cables,
-                disk=disk,
-                clocks=clocks,
-            )
+            faults = Faults(broken, Entrance(secure, tls), seed)
             asyncio.run(run_all(faults, times))
             problems = find_problems(faults)
     report(faults, problems)
@@ -398,7 +304,7 @@ def report(faults: Faults, problems: list[str]) -> None:
             f"{name:26} n {len(took_s):2}  recovered: median {statistics.median(took_s):5.1f} s, "
             f"last {max(took_s):5.1f} s"
         )
-    if faults.disk is None:
+    if faults.set.disk is None:
         print("disk full: left out, mounting needs root")
     if FAKE_TIME is None:
         print("clock of the database: left out, apt-get install faketime")
