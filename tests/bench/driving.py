@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import signal
 import subprocess
 import sys
@@ -41,21 +42,24 @@ def drive(
     viewers: int,
     *,
     seconds: float = 6.0,
+    slices: int = 1,
     seen: Path | None = None,
 ) -> dict[str, Any]:
     """Run the load against a server; add what the server's process spent for each step.
 
-    ``seen``: where a watched server (watched.py) writes what it saw, which is added, too.
+    ``slices``: of that time, each with its latencies and the memory at its end. ``seen``: where a
+    watched server (watched.py) writes what it saw, which is added, too.
     """
     program = [sys.executable, "tests/bench/load.py", mode, str(port), str(rows)]
     process = subprocess.Popen(
-        [*program, f"--viewers={viewers}", f"--seconds={seconds}"],
+        [*program, f"--viewers={viewers}", f"--seconds={seconds}", f"--slices={slices}"],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         text=True,
     )
     assert process.stdout is not None
     server, spent, first_rss, result = psutil.Process(pid), 0.0, 0, {}
+    rss_mb: list[float] = []
     for line in process.stdout:
         times = server.cpu_times()
         used = times.user + times.system
@@ -63,6 +67,8 @@ def drive(
             spent, first_rss = used, server.memory_info().rss
             if seen is not None:
                 server.send_signal(signal.SIGUSR1)
+        elif line == "slice\n":
+            rss_mb.append(server.memory_info().rss / 1e6)
         elif line == "measured\n":
             spent = used - spent
             if seen is not None:
@@ -74,17 +80,38 @@ def drive(
     result["us_per_step"] = 1e6 * spent / result["steps"]
     result["rss_mb"] = server.memory_info().rss / 1e6
     result["first_rss_mb"] = first_rss / 1e6
+    for part, mb in zip(result["slices"], rss_mb, strict=True):
+        part["rss_mb"] = mb
     if seen is not None:
         result |= json.loads(seen.read_text())
     return result
 
 
+def allow_many_files() -> None:
+    """Let this process and its children open as many sockets as the machine allows."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+
+
 @contextmanager
 def relay() -> Iterator[tuple[int, int]]:
     """Run a bare relay, which stores nothing; give its port and process."""
+    with _run_program("tests/bench/relay.py") as running:
+        yield running
+
+
+@contextmanager
+def stock_channels(redis: str) -> Iterator[tuple[int, int]]:
+    """Run the same on stock Channels with the Redis layer; give its port and process."""
+    with _run_program("tests/bench/stock_channels.py", redis) as running:
+        yield running
+
+
+@contextmanager
+def _run_program(program: str, *arguments: str) -> Iterator[tuple[int, int]]:
     port = free_port()
     process = subprocess.Popen(
-        [sys.executable, "tests/bench/relay.py", str(port)],
+        [sys.executable, program, str(port), *arguments],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         text=True,

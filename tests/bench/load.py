@@ -1,7 +1,8 @@
 """The load: so many sources at two steps a second, their viewers, and a clock. Its own process.
 
-Prints one line of JSON: latencies from a step's sending to its arrival at each viewer, how many
-were lost, and how busy this process was itself.
+Prints "measure" and "measured" where that begins and ends, "slice" at the end of each part of it,
+then a line of JSON: latencies from a step's sending to its arrival at each viewer, how many were
+lost, and how busy this process was itself.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ import random
 import re
 import resource
 import time
+from array import array
+from collections.abc import Sequence
 from typing import Any
 
 import uvloop
@@ -31,10 +34,11 @@ class Load:
         self.rows = rows
         self.sent: list[dict[int, float]] = [{} for _ in rows]
         self.acked = [0] * len(rows)
-        self.delays: list[float] = []
+        self.delays = [array("f") for _ in range(options.slices)]  # by when a step was sent
         self.ack_delays: list[float] = []
         self.arrived = 0
         self.measuring = (0.0, 0.0)
+        self.slice_s = options.seconds / options.slices
         self.tasks: list[asyncio.Task[None]] = []
 
     async def open(self, path: str, token: str = "", cookie: str = "") -> ClientConnection:
@@ -59,7 +63,7 @@ class Load:
                 began = self.sent[index].get(int(first or second))
                 if began is not None and self.measuring[0] <= began < self.measuring[1]:
                     self.arrived += 1
-                    self.delays.append(at - began)
+                    self.delays[int((began - self.measuring[0]) / self.slice_s)].append(at - began)
             if confirm and '"frame":' in text[:40]:
                 frames = int(text[: text.index("[")].split('"frame":')[1].split(",", maxsplit=1)[0])
                 if frames % CONFIRM_EVERY == 0:  # as pages do (session_socket.js)
@@ -137,7 +141,9 @@ class Load:
         await asyncio.sleep(self.measuring[0] - now())
         print("measure", flush=True)
         busy = cpu()
-        await asyncio.sleep(self.measuring[1] - now())
+        for place in range(self.options.slices):
+            await asyncio.sleep(self.measuring[0] + (place + 1) * self.slice_s - now())
+            print("slice", flush=True)
         print("measured", flush=True)
         busy = cpu() - busy
         await asyncio.gather(*walks)
@@ -153,7 +159,8 @@ class Load:
             "steps": steps,
             "expected": steps * self.options.viewers,
             "arrived": self.arrived,
-            **percentiles("view", self.delays),
+            **percentiles("view", [delay for part in self.delays for delay in part]),
+            "slices": [percentiles("view", part) for part in self.delays],
             **percentiles("ack", self.ack_delays),
             "own_cpu": busy / self.options.seconds,
         }
@@ -164,7 +171,7 @@ def cpu() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def percentiles(name: str, delays: list[float]) -> dict[str, float]:
+def percentiles(name: str, delays: Sequence[float]) -> dict[str, float]:
     if not delays:
         return {}
     ordered = sorted(delays)
@@ -184,6 +191,7 @@ if __name__ == "__main__":
     parser.add_argument("--rate", type=float, default=2.0)
     parser.add_argument("--warmup", type=float, default=3.0)
     parser.add_argument("--seconds", type=float, default=6.0)
+    parser.add_argument("--slices", type=int, default=1)
     chosen = parser.parse_args()
     with open(chosen.rows) as file:  # noqa: PTH123
         made = json.load(file)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.bench.driving import BUSY_MS, drive, relay, seed
+from tests.bench.driving import BUSY_MS, allow_many_files, drive, relay, seed
 from tests.support.servers import serve
 
 
@@ -27,9 +26,7 @@ MAX_RSS_MB = 400  # of a thousand sessions
 
 @pytest.fixture(autouse=True)
 def many_files():
-    """Let this process and its children open as many sockets as the machine allows."""
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    allow_many_files()
 
 
 def run_ours(
