@@ -115,6 +115,22 @@ def break_into(sql: str) -> None:
         assert run(sql)
 
 
+def test_a_clock_that_was_ahead_keeps_nothing_from_being_sealed_or_counted(logged, monkeypatch):
+    monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
+    who = logged.people[Role.PT]
+    audit_log.record(Act.VIEW, who, about="ahead", now=NOW + timedelta(days=400))
+    audit_log.record(Act.VIEW, who, about="right again", now=NOW)
+    audit_log.record(Act.VIEW, who, about="new", now=LATER)
+    seal_logs(LATER)
+    sealed_to = LogSeal.everywhere.filter(log="AuditEntry").latest("last_id").last_id
+    unsealed = AuditEntry.everywhere.filter(pk__gt=sealed_to)
+    assert [row.about for row in unsealed] == ["new"]
+    for at in (NOW + timedelta(days=400), LATER):
+        audit_log.record_counted(audit_log.build_entry(Act.ROBOT_STOP, who, now=at))
+    assert AuditEntry.everywhere.filter(act=Act.ROBOT_STOP, count=1).count() == 2
+    assert list(find_broken()) == []
+
+
 def test_whole_chains_are_sealed_in_batches_and_hold(logged, monkeypatch):
     monkeypatch.setattr(seals, "BATCH_ROWS", 2)
     build_world("birch")

@@ -196,7 +196,7 @@ class RecentEntries:
         """Return the entry that was added for the same in the last minutes; None without one."""
         with self._lock:
             at, entry_id = self._keys.get(key, (None, None))
-        return entry_id if at is not None and now - at < REPEAT_AFTER else None
+        return entry_id if at is not None and abs(now - at) < REPEAT_AFTER else None
 
     def add(self, key: Hashable, now: datetime, entry_id: int) -> None:
         """Remember an entry, whose repeats are counted for some minutes."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator
 from datetime import datetime, timedelta
-from itertools import groupby
+from itertools import takewhile
 from typing import Any, ClassVar
 
 from django.db import IntegrityError, models, transaction
@@ -103,14 +103,17 @@ def seal_logs(until: datetime) -> int:
 
 
 def _seal_batch(log: str, clinic_id: int | None, until: datetime) -> int:
-    """Seal the next rows of a chain, of one day at most. Return how many."""
+    """Seal the next rows of a chain, of one day at most. Return how many.
+
+    A row that stands before one of that time was added earlier, whatever the clock said.
+    """
     last = LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number").last()
-    rows = list(rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0)[:BATCH_ROWS])
-    days = groupby(rows, key=lambda row: row.at < until and row.at.date())
-    is_due, group = next(days, (False, iter(())))
-    batch = list(group)
-    if not is_due:
+    unsealed = rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0)
+    newest = unsealed.filter(at__lt=until).last()
+    if newest is None:
         return 0
+    rows = unsealed.filter(pk__lte=newest.pk)[:BATCH_ROWS]
+    batch = list(takewhile(lambda row: row.at.date() == rows[0].at.date(), rows))
     seal = LogSeal(
         log=log,
         clinic_id=clinic_id,
