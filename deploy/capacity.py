@@ -16,7 +16,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZES = (10, 100, 1000, 10_000)  # clinics
-MONTH_S = 30.44 * 24 * 3600.0
 GB = 1e9
 
 

@@ -89,6 +89,7 @@ def test_hebb91_needs_its_goal_and_then_agrees():
     assert result["score"] is None
 
 
+@pytest.mark.wide
 def test_one_changed_flag_lowers_the_agreement_by_one(tmp_path):
     rows = list(csv.reader(recording("HEBB_03_Session_1.csv").read_text().splitlines()))
     flag = rows[0].index("iA2_Success")

@@ -124,6 +124,7 @@ def test_no_route_shows_a_clinic_to_others(worlds, who):
     assert counts[who] > 100  # the matrix is not empty
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "who",
     [

@@ -124,7 +124,7 @@ async def test_a_link_names_the_server_that_has_the_session_to_the_proxy():
             await socket.close(4421)
         else:
             await socket.send('{"type": "welcome"}')
-            await asyncio.sleep(5)
+            await socket.wait_closed()
 
     losses = Losses()
     async with serving(handler) as url, dial(url, losses) as link:

@@ -38,6 +38,7 @@ def test_frame_numbers_tell_what_is_late_and_what_is_lost(made, table):
     assert "times lost for up to 25 ms" in line
 
 
+@pytest.mark.wide
 def test_frame_numbers_of_channels_in_rows_of_their_own(made, table):
     """Those of the forces count; the cameras' are another count."""
     harness = IntakeHarness()

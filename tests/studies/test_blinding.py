@@ -70,6 +70,7 @@ def test_enrolling_allocates_blinds_and_plans_the_visits(world):
     assert days[1] - days[0] == timedelta(days=1)
 
 
+@pytest.mark.wide
 def test_allocation_follows_the_sealed_seed_in_blocks(world):
     def run(seed_of: World) -> list[str]:
         study = running_study(seed_of)

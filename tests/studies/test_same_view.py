@@ -179,6 +179,7 @@ def test_an_assessor_sees_the_same_whichever_arm_is_walked(withdrawn):
     assert find_differences(trial, trial.assessor) == []
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("withdrawn", [False, True])
 def test_an_assessors_previews_of_boards_are_the_same(monkeypatch, withdrawn):
     monkeypatch.setitem(globals(), "all_routes", lambda worlds: [])

@@ -43,6 +43,7 @@ def stop_reasons(stage):
     return [report["reason"] for report in stage.of("stop")]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     ("make", "minutes"),
     [
@@ -102,6 +103,7 @@ def test_it_is_put_back_after_whatever_stopped_it(happens, reasons, body):
     assert "started" in [report["phase"] for report in stage.of("gesture")[before:]]
 
 
+@pytest.mark.wide
 def test_somebodys_stop_stays():
     stage = begin_gesture(KinematicBase)
     stage.hear(type="stop")

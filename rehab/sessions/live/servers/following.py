@@ -75,7 +75,6 @@ class FollowedSession(LiveSession):
         super().__init__(aggregate, _Reader(), recent, lambda *_: None, robot_stopped=robot_stopped)
         self.owner = aggregate.session.owner
         self.last_event = last_event
-        self.unused_since: datetime | None = None
         self._presence = NOBODY
         self._late: set[int] = set()
 
