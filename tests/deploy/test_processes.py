@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -51,14 +53,15 @@ class Served(Pair):
 def two_free_ports() -> list[int]:
     for _ in range(100):
         port = free_port()
-        if port < 65535:
+        with socket.socket() as probe, suppress(OSError, OverflowError):
+            probe.bind(("127.0.0.1", port + 1))
             return [port, port + 1]
     raise AssertionError
 
 
 async def story(served: Served, entrance: Entrance) -> tuple[list[Walk], list[Message]]:
-    async with served:
-        try:
+    try:
+        async with served:
             rows = served.seed(3)
             walks = [Walk(row, entrance, 10.0) for row in rows]
             senders = [asyncio.create_task(walk.send()) for walk in walks]
@@ -76,10 +79,10 @@ async def story(served: Served, entrance: Entrance) -> tuple[list[Walk], list[Me
             for watcher in watchers:
                 watcher.cancel()
             logs = [served.read_log(row) for row in rows]
-        finally:
-            served.command.send_signal(signal.SIGTERM)
-            status = await asyncio.to_thread(served.command.wait, 60)
-        assert status == 0
+    finally:
+        served.command.send_signal(signal.SIGTERM)
+        status = await asyncio.to_thread(served.command.wait, 60)
+    assert status == 0
     return walks, logs
 
 
