@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
 from asgiref.sync import sync_to_async
@@ -85,12 +86,17 @@ async def test_a_full_disk_is_said_in_words(place, begun, stall, monkeypatch):
     assert await health() == (200, "ok\n")
 
 
-async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_the_drain(place):
+async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_the_drain(
+    place, monkeypatch
+):
     assert (await health("/readyz"))[0] == 503
     runtime = runtimes.current()
     assert (await health("/readyz"))[0] == 503
     await runtime.recover()
     assert await health("/readyz") == (200, "ok\n")
+    with monkeypatch.context() as cut_off:
+        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True))
+        assert "cut off" in (await health("/readyz"))[1]
     await runtime.drain()
     assert (await health("/readyz"))[0] == 503
 

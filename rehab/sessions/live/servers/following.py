@@ -189,7 +189,7 @@ class Follower(Subscriber):
         """Send a hint, which has who is there."""
         self.wake()
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
         """Send one hint for all that happened in this turn of the event loop."""
         self._is_due = False
         live = self.live

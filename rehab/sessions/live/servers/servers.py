@@ -64,7 +64,7 @@ class Servers:
         self._own = own
         self._entered = own.entered
         self._isolation = Isolation(own)
-        self._was_isolated = False  # when the database was watched last
+        self.is_isolated = False  # cut off from the database, which another server has
         self._addresses: dict[str, str] = {}  # of servers with a valid lease
         self._database = DatabaseThread("garry-follower", READ_TIMEOUT_MS)
         self.followed = FollowedSessions(self._database, self.tell_viewers, owning.close_pages)
@@ -96,11 +96,6 @@ class Servers:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await self.intercom.close()
         self._database.close()
-
-    @property
-    def is_isolated(self) -> bool:
-        """Whether it is cut off from the database, which another server has."""
-        return self._was_isolated and not self._own.is_current
 
     @property
     def deaf_s(self) -> float:
@@ -195,9 +190,11 @@ class Servers:
         """Each second, whatever the database does: close all sockets once only others have it."""
         self._tell_all("lease", {"current": self._own.is_current})
         others = self._addresses.keys() - {self._own.id}
-        was_isolated = self._was_isolated
-        self._was_isolated = self._isolation.applies(others, is_deaf=bool(self.deaf_s))
-        if self._was_isolated and not was_isolated:
+        was_isolated, is_deaf = self.is_isolated, bool(self.deaf_s)
+        # Nobody is let in before the sessions are dropped that others have taken meanwhile.
+        is_behind = was_isolated and self._entered != self._own.entered
+        self.is_isolated = is_behind or self._isolation.applies(others, is_deaf=is_deaf)
+        if self.is_isolated and not was_isolated:
             log.critical("This server is cut off from its database; clients go to another one.")
             for socket in list(self._owning.sockets):
                 socket.close_soon(CloseCode.RESTARTING)

@@ -32,6 +32,8 @@ def readyz(request: HttpRequest) -> HttpResponse:
     live = runtimes.peek()
     if live is None or not live.is_ready:
         return _answer("The server is starting or stopping.", 503)
+    if live.servers is not None and live.servers.is_isolated:
+        return _answer("The server was cut off from its database, which another one has.", 503)
     if (own := lease.held()) is not None and not own.is_current:
         return _answer("The server's lease has expired: the database does not answer.", 503)
     return healthz(request)
