@@ -178,6 +178,7 @@ class Torture:
         self.rate = rate
         self.walks: list[Walk] = []
         self.resumed = 0  # sessions, by their PTs
+        self._server: asyncio.subprocess.Process | None = None
         self.environment = clean_environment(folder, self.port) | {
             "DJANGO_SETTINGS_MODULE": "garry_site.settings"
         }
@@ -208,6 +209,7 @@ class Torture:
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
         )
+        self._server = process
         assert process.stdout is not None
         async for line in process.stdout:
             if line.startswith(b"Ready"):
@@ -244,6 +246,13 @@ class Torture:
         ``orderly``: the share of ends by SIGTERM, after which sessions go on as they were; after a
         kill they come back paused.
         """
+        try:
+            return await self._run(sessions, rounds, orderly)
+        finally:
+            if self._server is not None and self._server.returncode is None:
+                self._server.kill()
+
+    async def _run(self, sessions: int, rounds: int, orderly: float) -> dict[str, Any]:
         server = await self.start_server()
         rows = json.loads(self.run_python("-m", "tests.support.live_seed", str(sessions)))
         self.walks = [Walk(row, self.entrance, self.rate) for row in rows]
