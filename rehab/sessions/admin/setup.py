@@ -19,9 +19,9 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
-from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
 from rehab.sessions.questionnaires import Questionnaire, questionnaire_choices
 from rehab.sessions.setup.gestures import robot_gesture_choices
+from rehab.sessions.setup.outline import STRIDE_S, protocol_minutes
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase, display_name
 
