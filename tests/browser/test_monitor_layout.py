@@ -74,6 +74,20 @@ def safety_is_within_reach(page: Page) -> None:
     assert complaints(page, SAFETY, 44) == []
 
 
+def nothing_overlaps_below_three_alarms(page: Page) -> None:
+    page.evaluate(
+        """() => {
+          const third = document.querySelector("[data-alarm]").cloneNode(true);
+          third.classList.add("third");
+          document.querySelector(".alarms").append(third);
+          document.querySelector(".coach").hidden = false; // advice waits
+        }"""
+    )
+    expect(page.locator(".coach")).to_be_hidden()
+    assert complaints(page, ".panels .card, .remarks button", 44) == []
+    page.evaluate("document.querySelector('.third').remove()")
+
+
 def nothing_is_cut_or_too_small(page: Page) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
@@ -100,6 +114,7 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     monitor.wait_for_selector("[data-alarm=robot]")
     if screen in LAPTOPS:
         assert cut(monitor, ".controls, .side, .last") == []
+        nothing_overlaps_below_three_alarms(monitor)
     monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
     safety_is_within_reach(monitor)
     for question in ("[data-end]", "[data-remark=borg]", "[data-fall]"):
@@ -124,6 +139,8 @@ def test_nothing_is_cut_or_too_small(monitor: Page, screen: str) -> None:
     if screen in LAPTOPS:
         assert cut(monitor, ".panels, .controls, .side") == []
         assert complaints(monitor, ".panels .card", 44) == []
+        monitor.evaluate("document.querySelector('.coach').hidden = false")
+        assert complaints(monitor, ".panels .card, .remarks button", 44) == []
     if screen != "phone":
         (robot,) = boxes(monitor, ".robot.card")
         assert min(robot["width"], robot["height"]) >= 280
