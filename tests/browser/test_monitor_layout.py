@@ -90,7 +90,10 @@ def nothing_overlaps_below_three_alarms(page: Page) -> None:
 
 def nothing_is_cut_or_too_small(page: Page) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    assert cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *, .next-phase *") == []
+    assert (
+        cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *, .next-phase *")
+        == []
+    )
     assert cut(page, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
     assert too_small(page, ".panels button, .panels select, .bar-top .btn", 44) == []
 

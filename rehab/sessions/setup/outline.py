@@ -21,14 +21,16 @@ WIDTH, HEIGHT, LOW = 300.0, 20.0, 6.0  # of the drawing, and of a phase without 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A phase as it is drawn: its place in a picture of 300 by 20, and whether it is open."""
+    """A phase as it is drawn: its place in a picture of 300 by 20.
+
+    ``kind``: with or without feedback, and whether it is open, as the page's styles name it.
+    """
 
     x: float
     y: float
     width: float
     height: float
-    feedback: bool
-    is_open: bool
+    kind: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,7 @@ def _draw_phases(phases: tuple[Phase, ...]) -> list[Block]:
             HEIGHT - height,
             round(max(width - 2, 1), 1),
             height,
-            phase.feedback,
-            length is None,
+            ("with" if phase.feedback else "without") + (" open" if length is None else ""),
         )
         blocks.append(block)
         x += width
