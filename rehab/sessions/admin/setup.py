@@ -163,7 +163,7 @@ class ProtocolAdmin(SharedAdmin):
         fields = list(super().get_fields(request, obj))
         if obj is None or self.has_change_permission(request, obj):
             return fields
-        readable = {"name": "named", "description": "about"}
+        readable: dict[Any, str] = {"name": "named", "description": "about"}
         return [readable.get(field, field) for field in fields]
 
     @admin.display(description=_("description"))
