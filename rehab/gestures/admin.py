@@ -10,7 +10,8 @@ from django.contrib import admin
 from django.core.exceptions import PermissionDenied, ValidationError
 from django.http import HttpRequest, JsonResponse
 from django.urls import path
-from django.utils.text import slugify
+from django.utils.formats import number_format
+from django.utils.text import capfirst, slugify
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -35,7 +36,7 @@ class GestureForm(ClinicForm):
     """A gesture, under a name as people write it: it becomes `slow-wave`."""
 
     name = forms.CharField(
-        label=_("name"), max_length=32, help_text=_("A word or two, such as slow wave.")
+        label=capfirst(_("name")), max_length=32, help_text=_("A word or two, such as slow wave.")
     )
 
     def clean_name(self) -> str:
@@ -115,9 +116,12 @@ def show_steps(data: str, lights: str, notes: str) -> dict[str, Any]:
 def describe_dry_run(run: DryRun) -> str:
     """Return how long a gesture takes and how far it goes, in words."""
     words = gettext(
-        "Takes %(took).1f s, goes up to %(far).2f m from home (tether %(tether).2f m), "
-        "ends at home."
-    ) % {"took": run.took_s, "far": run.farthest_m, "tether": TETHER_M}
+        "Takes %(took)s s, goes up to %(far)s m from home (tether %(tether)s m), ends at home."
+    ) % {
+        "took": number_format(round(run.took_s, 1), 1),
+        "far": number_format(round(run.farthest_m, 2), 2),
+        "tether": number_format(TETHER_M, 2),
+    }
     if run.took_s > WINDOW_S:
         words += " " + gettext("Longer than a window: it may miss the next.")
     return words
@@ -130,7 +134,10 @@ class GestureAdmin(ScopedAdmin):
     list_display = ("name", "simulated")
     search_fields = ("name",)
     form = GestureForm
-    fields = ("name", "lights", "notes")
+    fieldsets = (
+        (None, {"fields": ("name",)}),
+        (_("Lights and sound"), {"fields": ("lights", "notes"), "classes": ("collapse",)}),
+    )
     inlines = (StepInline,)
     change_form_template = "gestures/admin_form.html"
     change_list_template = "gestures/admin_list.html"

@@ -18,7 +18,7 @@ from rehab.patients.visits import Visit
 from rehab.sessions.formatting import format_number, format_quantity
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.trend import load_trend
+from rehab.sessions.reports.trend import load_own_trend
 from rehab.training.changes import State
 
 SAME_RATE = 0.05  # hit rates of sessions that differ by less are called as many steps
@@ -52,13 +52,15 @@ class Bar:
     percent: float
 
 
-def describe_ending(actor: Any, session: TrainingSession) -> dict[str, Any]:
-    """Return what the page at a session's end tells its patient.
+def describe_ending(session: TrainingSession) -> dict[str, Any]:
+    """Return what the page at a session's end tells its patient, of this patient alone.
 
+    A paired tablet sees no earlier session and no visit, and yet tells the patient of them: the
+    caller has checked that this session may be seen.
     Without judged steps, and in a blinded study, there is no figure to tell: `title` is empty.
     """
     plan = session.to_plan()
-    today, last = _find_walked(actor, session)
+    today, last = _find_walked(session)
     if session.patient.blinded or today is None:
         return {"title": "", "bars": [], "facts": [], "sentence": ""}
     facts: list[Fact] = []
@@ -70,7 +72,7 @@ def describe_ending(actor: Any, session: TrainingSession) -> dict[str, Any]:
     else:
         title, bars = _("Steps at the goal"), _hit_bars(today, last)
         sentence = describe_change(today, last)
-        facts = _find_facts(actor, session, rewards=plan.valence.rewards)
+        facts = _find_facts(session, rewards=plan.valence.rewards)
     return {"title": title, "bars": bars, "facts": facts, "sentence": sentence}
 
 
@@ -98,15 +100,15 @@ def is_milestone(sessions: int) -> bool:
     return sessions in MILESTONES or (sessions > 0 and sessions % 100 == 0)
 
 
-def next_visit(actor: Any, session: TrainingSession, today: date) -> Visit | None:
+def next_visit(session: TrainingSession, today: date) -> Visit | None:
     """Return the visit that the patient is expected for next, after today."""
-    visits = Visit.objects.visible_to(actor).filter(patient=session.patient_id, day__gt=today)
+    visits = Visit.everywhere.filter(patient=session.patient_id, day__gt=today)
     return visits.order_by("day").first()
 
 
-def _sessions_before(actor: Any, session: TrainingSession) -> QuerySet[TrainingSession]:
+def _sessions_before(session: TrainingSession) -> QuerySet[TrainingSession]:
     """Return the earlier sessions that compare: same measure, walked alike, counted."""
-    return TrainingSession.objects.visible_to(actor).filter(
+    return TrainingSession.everywhere.filter(
         patient=session.patient_id,
         measure=session.measure_id,
         trained_side=session.trained_side,
@@ -118,11 +120,11 @@ def _sessions_before(actor: Any, session: TrainingSession) -> QuerySet[TrainingS
     )
 
 
-def _find_facts(actor: Any, session: TrainingSession, *, rewards: bool) -> list[Fact]:
+def _find_facts(session: TrainingSession, *, rewards: bool) -> list[Fact]:
     """Return the longest row of hits where hits earn points, and a round number of sessions."""
-    before = _sessions_before(actor, session)
+    before = _sessions_before(session)
     facts = []
-    rows = SessionMetric.objects.visible_to(actor).filter(slug="best_streak")
+    rows = SessionMetric.everywhere.filter(slug="best_streak")
     row = rows.filter(session=session).values_list("value", flat=True).first()
     if rewards and row:
         earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
@@ -135,17 +137,16 @@ def _find_facts(actor: Any, session: TrainingSession, *, rewards: bool) -> list[
 
 
 def _find_walked(
-    actor: Any, session: TrainingSession
+    session: TrainingSession,
 ) -> tuple[SessionResult | None, SessionResult | None]:
     """Return this session and the newest one before that compares."""
-    seen = TrainingSession.objects.visible_to(actor)
-    before = _sessions_before(actor, session).order_by("-created_at", "-pk")
+    before = _sessions_before(session).order_by("-created_at", "-pk")
     wanted = [session.pk, *before.values_list("pk", flat=True)[:1]]
     found: dict[int, SessionResult] = {}
-    for point in load_trend(actor, seen.filter(pk__in=wanted)):
+    for point in load_own_trend(TrainingSession.everywhere.filter(pk__in=wanted)):
         if point.hit_rate is None:  # nobody counted hits there
             continue
-        steps = Step.objects.visible_to(actor).filter(session=point.session, goal__isnull=False)
+        steps = Step.everywhere.filter(session=point.session, goal__isnull=False)
         goal = steps.order_by("-number").values_list("goal", flat=True).first()
         mean = point.with_feedback.mean if point.with_feedback else None
         found[point.session.pk] = SessionResult(point.hit_rate, mean, goal)

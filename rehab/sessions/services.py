@@ -35,7 +35,21 @@ from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):
-    """A session is open at this station, whose tablet and sensor serve one at a time."""
+    """A session is open at this station, whose tablet and sensor serve one at a time.
+
+    Attributes
+    ----------
+    session
+        The open one.
+    """
+
+    def __init__(self, session: TrainingSession) -> None:
+        message = gettext(
+            "%(station)s still has an open session of %(patient)s. End it first, or choose "
+            "another station."
+        )
+        super().__init__(message % {"station": session.station, "patient": session.patient})
+        self.session = session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,12 +92,8 @@ def check_station_is_free(station: Station) -> None:
     taken = TrainingSession.everywhere.filter(
         station=station, clinic=station.clinic_id, state__in=states
     )
-    if (session := taken.select_related("patient").first()) is not None:
-        message = gettext(
-            "%(station)s still has an open session of %(patient)s. End it first, or choose "
-            "another station."
-        )
-        raise StationTaken(message % {"station": station, "patient": session.patient})
+    if (session := taken.select_related("patient", "station").first()) is not None:
+        raise StationTaken(session)
 
 
 def create_session(request: SessionRequest) -> TrainingSession:

@@ -9,7 +9,7 @@ from django.utils.html import format_html, json_script
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
-from rehab.people.web.help_pages import PARTS
+from rehab.people.web.help_pages import find_part
 from rehab.sessions.formatting import (
     ROBOT_LEVEL_LABELS,
     format_duration,
@@ -44,7 +44,7 @@ def wire_limits() -> SafeString:
 def help_address(context: dict[str, Any]) -> str:
     """Return the address of the help on the page that is shown."""
     match = getattr(context.get("request"), "resolver_match", None)
-    part = PARTS.get(match.url_name or "", "") if match else ""
+    part = find_part(match.url_name or "") if match else ""
     return f"{reverse('help')}#{part}" if part else reverse("help")
 
 

@@ -110,3 +110,18 @@ def test_what_is_used_on_a_tablet_is_large_enough_for_a_finger(page, protocol):
               .map((one) => one.outerHTML.slice(0, 120))"""
         )
         assert small == [], path
+
+
+def speak(page: Page, language: str) -> None:
+    page.goto("/account/")
+    page.select_option("#language", language)
+    page.click("form:has(#language) button")
+
+
+def test_djangos_own_scripts_speak_the_language_of_the_page_as_well(page: Page) -> None:
+    speak(page, "de")
+    page.goto("/admin/rehab/patient/")
+    expect(page.locator(".action-counter")).to_contain_text("ausgewählt")
+    page.goto("/admin/rehab/patient/add/")
+    expect(page.locator(".datetimeshortcuts").first).to_contain_text("Heute")
+    speak(page, "")

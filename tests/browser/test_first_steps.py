@@ -20,7 +20,9 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
     page.goto("/start/")
     sign_in(page, server.password)
     page.wait_for_url("**/start/")
-    page.click("text=First steps, one by one")
+    first = page.get_by_text("First steps, one by one")
+    expect(first).to_be_in_viewport(ratio=1)  # on a phone, too
+    first.click()
 
     page.fill("[name=name]", "Treadmill")
     page.click("text=Save")
@@ -32,12 +34,15 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
     page.fill("[name=code]", tablet.locator(".code").inner_text().replace(" ", ""))
     page.click("text=Let it in")
     expect(page.locator("[data-live=tablet]")).to_contain_text("seen just now")
+    expect(page.get_by_text("Next step")).to_be_visible()
+    expect(page.get_by_text("Skip this step")).to_be_hidden()
 
     # The sensor gets a token, and is seen to be connected.
     page.click("[data-step=sensor] a")
     page.fill("[name=name]", "Force plate")
     page.click("text=Save")
     token = page.locator("#token").inner_text().strip()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.click("text=I have copied it")
     expect(page.locator("[data-live=sensor]")).to_contain_text("Not connected: Force plate")
     header = {"Authorization": f"Bearer {token}"}

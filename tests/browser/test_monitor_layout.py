@@ -31,8 +31,8 @@ LAPTOPS = ("tablet-landscape", "low-laptop", "laptop", "wall")  # everything at 
 PHASES = [
     {"kind": "baseline", "name": "Baseline", "strides": 5},
     {"kind": "training", "name": "Training", "seconds": 300},
-    {"kind": "catch", "name": "Catch", "strides": 10},
-    {"kind": "washout", "name": "Washout"},
+    {"kind": "washout", "name": "Washout", "seconds": 60},  # the longest word in German
+    {"kind": "catch", "name": "Catch"},
 ]
 
 
@@ -74,9 +74,26 @@ def safety_is_within_reach(page: Page) -> None:
     assert complaints(page, SAFETY, 44) == []
 
 
+def nothing_overlaps_below_three_alarms(page: Page) -> None:
+    page.evaluate(
+        """() => {
+          const third = document.querySelector("[data-alarm]").cloneNode(true);
+          third.classList.add("third");
+          document.querySelector(".alarms").append(third);
+          document.querySelector(".coach").hidden = false; // advice waits
+        }"""
+    )
+    expect(page.locator(".coach")).to_be_hidden()
+    assert complaints(page, ".panels .card, .remarks button", 44) == []
+    page.evaluate("document.querySelector('.third').remove()")
+
+
 def nothing_is_cut_or_too_small(page: Page) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    assert cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
+    assert (
+        cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *, .next-phase *")
+        == []
+    )
     assert cut(page, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
     assert too_small(page, ".panels button, .panels select, .bar-top .btn", 44) == []
 
@@ -100,6 +117,7 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     monitor.wait_for_selector("[data-alarm=robot]")
     if screen in LAPTOPS:
         assert cut(monitor, ".controls, .side, .last") == []
+        nothing_overlaps_below_three_alarms(monitor)
     monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
     safety_is_within_reach(monitor)
     for question in ("[data-end]", "[data-remark=borg]", "[data-fall]"):
@@ -124,6 +142,8 @@ def test_nothing_is_cut_or_too_small(monitor: Page, screen: str) -> None:
     if screen in LAPTOPS:
         assert cut(monitor, ".panels, .controls, .side") == []
         assert complaints(monitor, ".panels .card", 44) == []
+        monitor.evaluate("document.querySelector('.coach').hidden = false")
+        assert complaints(monitor, ".panels .card, .remarks button", 44) == []
     if screen != "phone":
         (robot,) = boxes(monitor, ".robot.card")
         assert min(robot["width"], robot["height"]) >= 280

@@ -109,6 +109,7 @@ def begin(story: Story) -> None:
     page.tap(f".type[data-theme={story.valence}]")
     page.tap("label:has-text('W/kg')")
     page.tap("label:has-text('Training only')")
+    page.tap(".try summary")
     page.tap("label:has-text('Simulated patient, good')")
     page.tap(f"label:has-text('Place {story.number}')")
     page.tap("text=To the patient’s page")

@@ -10,6 +10,8 @@ import pytest
 from django.test import Client
 
 from rehab.gestures.models import ComposedGesture
+from rehab.people.models import User
+from rehab.people.roles import Role
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from tests.support.forms import gesture_form
@@ -134,6 +136,13 @@ def test_the_floor_is_told_what_steps_would_do(pt):
     refused: list[Any] = [[], [{}], [1], {"a": 1}, [usual | {"turn_deg": "x"}]]
     for broken in refused:
         assert simulate(pt, broken)["problem"]
+
+
+def test_the_floor_writes_numbers_as_the_page_does(world):
+    User.everywhere.filter(pk=world.people[Role.PT].pk).update(language="es")
+    usual = {"turn_deg": 0, "hold_s": 0, "pace": 1, "within_s": None}
+    there_and_back = [usual | {"forward_m": way} for way in (0.12, -0.12)]
+    assert "0,12 m" in simulate(client_of(world, Role.PT), there_and_back)["words"]
 
 
 def test_the_list_shows_those_that_every_robot_knows(pt):

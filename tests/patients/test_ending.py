@@ -7,13 +7,16 @@ import re
 from datetime import time, timedelta
 
 import pytest
+from django.test import Client
 from django.urls import reverse
 
 from rehab.patients.ending import SessionResult, describe_change, is_milestone
 from rehab.patients.visits import plan_visit
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Station
 from rehab.training.valences import VALENCES
+from tests.support.boards import tablet_at
 from tests.support.walks import HIT, MISS, walk
 from tests.support.world import NOW, World, client_of
 
@@ -27,9 +30,10 @@ def patient(world: World) -> Patient:
     )
 
 
-def read(world: World, session: TrainingSession) -> str:
-    """Return the page's words."""
-    page = client_of(world).get(reverse("ending", args=[session.pk])).content.decode()
+def read(world: World, session: TrainingSession, client: Client | None = None) -> str:
+    """Return the page's words; to a therapist, or in another browser."""
+    browser = client or client_of(world)
+    page = browser.get(reverse("ending", args=[session.pk])).content.decode()
     words = html.unescape(re.sub(r"<[^>]+>", " ", page.split("<main")[1]))
     return " ".join(words.replace("\N{NO-BREAK SPACE}", " ").split())
 
@@ -63,6 +67,22 @@ def test_today_stands_beside_last_time(world, patient):
     assert "Most in a row 5" in words
     assert f"{day:%A} {day.day} {day:%B}, 2:15 p.m." in words
     assert "More steps at the goal than last time." in words
+
+
+def test_a_paired_tablet_tells_the_patient_the_same(world, patient):
+    walk(patient, "positive", [HIT] * 4 + [MISS] * 6, days_ago=7)
+    other = Patient.everywhere.create(
+        clinic=world.clinic, code="B-2", nickname="Omar", paretic_side="left"
+    )
+    walk(other, "positive", [HIT] * 10, days_ago=1)
+    session = walk(patient, "positive", [HIT] * 7 + [MISS] * 3)
+    station = Station.everywhere.create(clinic=world.clinic, name="East")
+    TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
+    plan_visit(patient, (NOW + timedelta(days=7)).date(), time(14, 15))
+    words = read(world, session, tablet_at(station))
+    assert "Today 7 of 10 Last time 4 of 10" in words
+    assert "Most in a row so far 7" in words
+    assert "Next visit" in words
 
 
 def test_a_longer_row_than_ever_is_told_as_one(world, patient):

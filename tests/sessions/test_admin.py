@@ -300,6 +300,16 @@ def act(world: World, model: str, action: str, key: int, role: Role = Role.PT):
     return client_of(world, role).post(f"/admin/rehab/{model}/", data)
 
 
+def test_a_shared_protocol_is_read_and_drawn_in_the_pages_language(world):
+    shared = Protocol.everywhere.get(clinic=None, name="Baseline, training, washout")
+    User.everywhere.filter(pk=world.people[Role.LEAD].pk).update(language="es")
+    url = f"/admin/rehab/protocol/{shared.pk}/change/"
+    page = client_of(world, Role.LEAD).get(url).content.decode()
+    for english in ("Baseline", "Washout", "A minute without feedback"):
+        assert english not in page
+    assert page.count("Línea base") >= 3  # in the title, its row and the drawing's data
+
+
 def test_a_shared_protocol_is_copied_and_the_copy_is_the_clinics(world):
     shared = Protocol.everywhere.get(name="Baseline, training, washout", clinic=None)
     page = client_of(world).get(reverse("admin:rehab_protocol_change", args=[shared.pk]))

@@ -22,6 +22,7 @@ from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
 from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
+from tests.support.page_text import plain
 from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -389,3 +390,51 @@ def test_answers_that_make_no_sense_are_refused_with_the_cure(pt, patient, stati
     page = pt.post(f"/patients/{patient.pk}/new/", choices(station, **wrong))
     assert words in page.content.decode()
     assert TrainingSession.everywhere.count() == before
+
+
+def test_the_page_says_what_each_protocol_has_and_how_long_it_takes(pt, patient):
+    page = plain(pt.get(f"/patients/{patient.pk}/new/").content.decode())
+    assert "Baseline 59 s · Training 10 min · Washout 2 min" in page
+    assert "Training until you move on" in page
+    assert "open end" in page
+    lab = re.search(r"<span>Thirty minutes with catch blocks</span>.*?</svg>", page, re.DOTALL)[0]
+    assert "15 phases" in lab
+    assert lab.count("<rect") == 15
+    assert lab.count('class="with"') == 7
+
+
+def test_a_person_is_offered_simulated_steps_only_behind_a_try(pt, patient):
+    tried = re.compile(r'<details class="try" (open)?>.*?</details>', re.DOTALL)
+    page = pt.get(f"/patients/{patient.pk}/new/").content.decode()
+    assert tried.search(page)[1] is None
+    assert 'value="synthetic demo"' in tried.search(page)[0]
+    assert 'value="synthetic' not in tried.sub("", page)
+    patient.simulated = True
+    patient.save()
+    page = pt.get(f"/patients/{patient.pk}/new/").content.decode()
+    assert not tried.search(page)
+    assert 'value="synthetic demo"' in page
+
+
+def test_simulated_steps_that_were_chosen_are_seen_where_something_else_is_refused(
+    pt, patient, station
+):
+    wrong = choices(station, source="synthetic demo", wanted_hits="0")
+    page = pt.post(f"/patients/{patient.pk}/new/", wrong).content.decode()
+    assert '<details class="try" open>' in page
+
+
+def test_who_has_not_walked_is_not_offered_what_was_last_time(pt, patient, station):
+    page = pt.get(f"/patients/{patient.pk}/new/").content.decode()
+    assert "Like last time" not in page
+    assert "Suggested set-up" in page
+    pt.post(f"/patients/{patient.pk}/new/", choices(station))
+    page = pt.get(f"/patients/{patient.pk}/new/").content.decode()
+    assert "Like last time" in page
+
+
+def test_a_taken_station_leads_to_its_session(pt, patient, station):
+    pt.post(f"/patients/{patient.pk}/new/", choices(station))
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(station)).content.decode()
+    problem = re.search(r'<div class="wrong".*?</div>', page, re.DOTALL)[0]
+    assert f'href="/sessions/{newest().pk}/monitor/"' in problem

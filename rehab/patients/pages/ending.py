@@ -34,7 +34,7 @@ def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
         "session": session,
         "tablet": tablet,
         "walked": format_duration(session.active_s),
-        "visit": next_visit(actor, session, clinic_time(timezone.now(), session.clinic).date()),
+        "visit": next_visit(session, clinic_time(timezone.now(), session.clinic).date()),
         "after": page_after(session, actor, tablet=tablet),
-    } | describe_ending(actor, session)
+    } | describe_ending(session)
     return render(request, "patients/ending.html", context)

@@ -38,6 +38,7 @@ PARTS = {
     "new-device": "connect-the-sensor",
     "check-recording": "connect-the-sensor",
     "screen": "the-patients-screen",
+    "family-links": "progress",
     "studies": "studies",
     "study": "studies",
     "plan-study": "studies",
@@ -45,6 +46,26 @@ PARTS = {
     "enroll": "studies",
     "participant": "studies",
 }
+# Of the admin's models.
+ADMIN_PARTS = {
+    "patient": "today",
+    "trainingsession": "the-session-and-its-report",
+    "preset": "start-three-taps",
+    "feedbacktype": "what-the-patient-sees",
+    "protocol": "start-three-taps",
+    "composedgesture": "the-robot",
+    "questionnaire": "questions-after-a-session",
+    "leaderboard": "leaderboards",
+    "station": "stations-and-devices",
+    "device": "stations-and-devices",
+}
+
+
+def find_part(name: str) -> str:
+    """Return the heading that helps on a page, by its address's name; "" where none does."""
+    if name.startswith("rehab_"):  # as Django's admin names them: rehab_protocol_change
+        return ADMIN_PARTS.get(name.split("_")[1], "")
+    return PARTS.get(name, "")
 
 
 def using_guide() -> str:

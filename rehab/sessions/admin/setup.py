@@ -19,9 +19,9 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
-from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
 from rehab.sessions.questionnaires import Questionnaire, questionnaire_choices
 from rehab.sessions.setup.gestures import robot_gesture_choices
+from rehab.sessions.setup.outline import STRIDE_S, protocol_minutes
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase, display_name
 
@@ -93,6 +93,7 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     form = PhaseForm
     formset = PhaseFormSet
     ordering = ("position",)
+    readonly_fields = ("named",)
     fields = (
         "position",
         "kind",
@@ -109,6 +110,16 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
         """Return one empty row for a new protocol."""
         return 0 if obj else 1
+
+    def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fields; names that can only be read are in the page's language."""
+        readable = {} if self.has_change_permission(request, obj) else {"name": "named"}
+        return [readable.get(field, field) for field in self.fields]
+
+    @admin.display(description=_("name"))
+    def named(self, phase: ProtocolPhase) -> str:
+        """Its name."""
+        return str(phase)
 
 
 class ProtocolForm(ClinicForm):
@@ -147,6 +158,14 @@ class ProtocolAdmin(SharedAdmin):
         form.clinic_id = user_of(request).clinic_id
         return form
 
+    def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fields; words that can only be read are in the page's language."""
+        fields = list(super().get_fields(request, obj))
+        if obj is None or self.has_change_permission(request, obj):
+            return fields
+        readable: dict[Any, str] = {"name": "named", "description": "about"}
+        return [readable.get(field, field) for field in fields]
+
     @admin.display(description=_("description"))
     def about(self, protocol: Protocol) -> str:
         """Its description."""
@@ -169,7 +188,8 @@ class ProtocolAdmin(SharedAdmin):
         """Show the form with a drawing of the stored protocol."""
         row: Protocol | None = context.get("original")
         context["stride_s"] = STRIDE_S
-        context["phases"] = [asdict(phase) for phase in (row.to_rules() if row else ())]
+        phases = row.to_rules() if row else ()
+        context["phases"] = [asdict(phase) | {"name": gettext(phase.name)} for phase in phases]
         return super().render_change_form(request, context, *args, **kwargs)
 
     @transaction.atomic

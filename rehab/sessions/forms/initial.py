@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from django.db.models import QuerySet
@@ -13,6 +12,7 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.answers import USUAL_ANSWERS, answers_of
 from rehab.sessions.setup.gestures import DEFAULT_GESTURE, choices_from_cue
+from rehab.sessions.setup.outline import protocol_minutes
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import LIVE, source_choices
 from rehab.stations.models import Station
@@ -26,21 +26,6 @@ from rehab.training.steps import Side
 WANTED_HITS_PERCENT = 60
 PLANNED_MINUTES = 10
 TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
-# Typical stride time of the recordings (docs/reference/gait.md#phases), for the duration of a phase
-# that is limited by strides.
-STRIDE_S = 1.1
-
-
-def protocol_minutes(protocol: Protocol | None) -> int | None:
-    """Return a protocol's duration; None where a phase lasts until the PT moves on."""
-    total_s = 0.0
-    for phase in () if protocol is None else protocol.to_rules():
-        limits = [phase.seconds, phase.strides and phase.strides * STRIDE_S]
-        known = [limit for limit in limits if limit]
-        if not known:
-            return None
-        total_s += min(known)
-    return math.ceil(total_s / 60) or None
 
 
 def _first_free_station(stations: QuerySet[Station]) -> Station | None:

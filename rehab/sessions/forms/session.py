@@ -34,7 +34,7 @@ from rehab.sessions.setup.gestures import (
     robot_gesture_choices,
 )
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
-from rehab.sessions.setup.sources import build_source_args, source_choices
+from rehab.sessions.setup.sources import SIMULATED, build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
@@ -47,7 +47,13 @@ from rehab.training.valences import VALENCES
 
 
 class SessionForm(WalkingFields, AnswerFields):
-    """The set-up of one patient's session. With its initial values it can be sent as it is."""
+    """The set-up of one patient's session. With its initial values it can be sent as it is.
+
+    Attributes
+    ----------
+    taken_by
+        The open session at the chosen station, which was refused for it.
+    """
 
     valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
     measure: forms.ModelChoiceField[MeasureDefinition] = forms.ModelChoiceField(
@@ -76,6 +82,7 @@ class SessionForm(WalkingFields, AnswerFields):
     def __init__(self, *args: Any, patient: Patient, by: User, **options: Any) -> None:
         super().__init__(*args, **options)
         self.patient, self.by = patient, by
+        self.taken_by: TrainingSession | None = None
         fields: dict[str, Any] = self.fields
         fields["measure"].queryset = MeasureDefinition.objects.visible_to(by)
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
@@ -105,6 +112,7 @@ class SessionForm(WalkingFields, AnswerFields):
         try:
             check_station_is_free(station)
         except StationTaken as problem:
+            self.taken_by = problem.session
             raise ValidationError(format_refusal(problem)) from problem
         return station
 
@@ -141,7 +149,7 @@ class SessionForm(WalkingFields, AnswerFields):
                 measure.to_rule().check_goal(goal)
             except InvalidSetting as problem:
                 self.add_error("goal_value", format_refusal(problem))
-        if measure.slug != A2.slug and data.get("source", "").startswith("synthetic "):
+        if measure.slug != A2.slug and data.get("source", "").startswith(SIMULATED):
             message = _("Simulated patients walk with A2 only. Choose another source, or A2.")
             self.add_error("source", message)
         return data
@@ -192,6 +200,7 @@ class SessionForm(WalkingFields, AnswerFields):
         try:
             return self.save()
         except StationTaken as problem:  # since the form was checked
+            self.taken_by = problem.session
             self.add_error("station", format_refusal(problem))
         except InvalidSetting as problem:
             self.add_error(None, format_refusal(problem))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from django.contrib import messages
 from django.core.exceptions import ValidationError
+from django.forms.boundfield import BoundWidget
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
@@ -14,12 +15,15 @@ from rehab.feedback.clinic_valences import valences_of
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.forms.initial import initial_choices, protocol_minutes
+from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.answers import USUAL_ANSWERS
+from rehab.sessions.setup.outline import outline_protocol, protocol_minutes
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.sources import SIMULATED
 from rehab.stations.builtin import first_station
 
 # Where the person who set the session up may go next.
@@ -67,8 +71,17 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         row.pk: {"minutes": protocol_minutes(row), "wanted_hits": row.wanted_hits}
         for row in protocols
     }
+    outlines = {row.pk: outline_protocol(row) for row in protocols}
+    sources, tried = _part_sources(form)
     context = {
         "patient": patient,
+        "walked_before": TrainingSession.objects.visible_to(user).filter(patient=patient).exists(),
+        "protocols": [
+            (choice, outlines[choice.data["value"].value]) for choice in form["protocol"]
+        ],
+        "sources": sources,
+        "tried": tried,
+        "is_trying": any(choice.data["selected"] for choice in tried),
         "form": form,
         "valences": valences_of(patient.clinic_id).values(),
         "targets": targets,
@@ -91,3 +104,12 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         "preset_name": name,
     }
     return render(request, "sessions/setup.html", context)
+
+
+def _part_sources(form: SessionForm) -> tuple[list[BoundWidget], list[BoundWidget]]:
+    """Return the choices of a source, and those that only try: of a person, the simulated ones."""
+    sources: list[BoundWidget] = list(form["source"])
+    if form.patient.simulated:
+        return sources, []
+    tried = [choice for choice in sources if choice.data["value"].startswith(SIMULATED)]
+    return [choice for choice in sources if choice not in tried], tried

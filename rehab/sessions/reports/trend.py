@@ -74,8 +74,14 @@ def metrics_by_session(
     user: User, sessions: Sequence[TrainingSession]
 ) -> dict[int, dict[str, float]]:
     """Return score and hit rate of sessions by their keys."""
+    return _read_figures(SessionMetric.objects.visible_to(user), sessions)
+
+
+def _read_figures(
+    metrics: QuerySet[SessionMetric], sessions: Sequence[TrainingSession]
+) -> dict[int, dict[str, float]]:
     found: dict[int, dict[str, float]] = defaultdict(dict)
-    rows = SessionMetric.objects.visible_to(user).filter(
+    rows = metrics.filter(
         session__in=[session.pk for session in sessions], slug__in=("score", "hit_rate")
     )
     for session_id, slug, value in rows.values_list("session_id", "slug", "value").order_by():
@@ -99,12 +105,33 @@ def load_trend(
 
     ``with_imported``: also those from the original GARRY, which have points alone.
     """
-    rate = SessionMetric.objects.visible_to(user).filter(session=OuterRef("pk"), slug="hit_rate")
+    metrics, steps = SessionMetric.objects.visible_to(user), Step.objects.visible_to(user)
+    return _read_trend(sessions, metrics, steps, with_imported=with_imported)
+
+
+def load_own_trend(sessions: QuerySet[TrainingSession]) -> list[TrendPoint]:
+    """Return the trend of one patient's sessions, for a page that tells this patient of them.
+
+    A tablet sees no earlier session, and shows its figures all the same. The caller has checked
+    that the session at hand may be seen, and that no other patient's is among them.
+    """
+    steps = Step.everywhere.all()
+    return _read_trend(sessions, SessionMetric.everywhere.all(), steps, with_imported=False)
+
+
+def _read_trend(
+    sessions: QuerySet[TrainingSession],
+    metrics: QuerySet[SessionMetric],
+    steps: QuerySet[Step],
+    *,
+    with_imported: bool,
+) -> list[TrendPoint]:
+    rate = metrics.filter(session=OuterRef("pk"), slug="hit_rate")
     wanted = Exists(rate) | Q(legacy_id__isnull=False) if with_imported else Q(Exists(rate))
     counted = sessions.filter(wanted, excluded=False)
     ended = counted.select_related("measure")
     newest = list(ended.order_by("-created_at", "-pk")[:SESSIONS])[::-1]
-    figures, values = metrics_by_session(user, newest), _values_by_phase(user, newest)
+    figures, values = _read_figures(metrics, newest), _values_by_phase(steps, newest)
     points: list[TrendPoint] = []
     for session in newest:
         plan, parts = session.to_plan(), values[session.pk]
@@ -124,15 +151,17 @@ def load_trend(
 Parts = dict[int, tuple[int, float, float]]
 
 
-def _values_by_phase(user: User, sessions: Sequence[TrainingSession]) -> defaultdict[int, Parts]:
+def _values_by_phase(
+    steps: QuerySet[Step], sessions: Sequence[TrainingSession]
+) -> defaultdict[int, Parts]:
     """Return count, mean and mean square of the trained leg's valid values by session and phase."""
     found: defaultdict[int, Parts] = defaultdict(dict)
-    steps = (
-        Step.objects.visible_to(user)
-        .filter(session__in=[session.pk for session in sessions], valid=True)
-        .filter(side=F("session__trained_side"))
+    judged = steps.filter(
+        session__in=[session.pk for session in sessions],
+        valid=True,
+        side=F("session__trained_side"),
     )
-    rows = steps.values_list("session_id", "phase").annotate(
+    rows = judged.values_list("session_id", "phase").annotate(
         Count("value"), Avg("value"), square=Avg(F("value") * F("value"))
     )
     for session_id, phase, count, mean, square in rows.order_by():

@@ -14,6 +14,7 @@ from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 
 LIVE = "live"
+SIMULATED = "synthetic "  # begins the choice of a simulated patient
 
 
 def list_recordings() -> list[Path]:
@@ -24,7 +25,7 @@ def list_recordings() -> list[Path]:
 
 def source_choices() -> list[tuple[str, str]]:
     """Return the sources of steps as (choice, text that a session stores); see `format_source`."""
-    simulated = [(f"synthetic {name}", f"{SIMULATED_PREFIX}{name}") for name in PROFILES]
+    simulated = [(f"{SIMULATED}{name}", f"{SIMULATED_PREFIX}{name}") for name in PROFILES]
     recordings = [
         (f"recording {file.name}", f"{RECORDING_PREFIX}{file.name}") for file in list_recordings()
     ]

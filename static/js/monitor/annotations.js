@@ -2,7 +2,7 @@
 
 import { _, number } from "garry/shared/language";
 import { percent } from "garry/shared/format";
-import { remarkName } from "garry/shared/labels";
+import { remarkName, severityName } from "garry/shared/labels";
 
 // Of each kind of change its badge, label, format and labelled values (rehab/training/controls.py).
 const MARKS = JSON.parse(document.getElementById("chart-marks").textContent);
@@ -18,8 +18,9 @@ export const badgeOf = ({ kind }) => MARKS[kind]?.badge ?? REMARK_BADGE;
 
 export const isRemark = ({ kind }) => !(kind in MARKS);
 
-// Return what a change or remark means: "gain 0.90", "near fall", "borg 4".
+// Return what a change or remark means: "gain 0.90", "near fall", "borg 4", "slightly hurt".
 export function describe({ kind, value }) {
+  if (kind === "fall_severity") return severityName(value);
   const mark = MARKS[kind];
   const name = mark?.label ?? remarkName(kind);
   if (value == null) return name;

@@ -20,7 +20,7 @@ export function drawLastStrides(svg, strides, count) {
     const x = (count - strides.length + index) * dx + dx * 0.16;
     if (performance == null) {
       return valid
-        ? shape("circle", { class: "calm", cx: x + width / 2, cy: goal, r: 5 })
+        ? shape("circle", { class: "calm", cx: x + width / 2, cy: fullHeight - 10, r: 5 })
         : shape("rect", { x, y: goal - 22, width, height: 44, rx: 4, fill: "url(#hatch)" });
     }
     const size = Math.min(Math.max(4, Math.abs(performance - 1) * scale), goal - 22);

@@ -154,10 +154,11 @@ export class RobotPanel {
     const { show } = this.#page;
     const share = this.#decision?.activated_share;
     show("robot-state", this.#describeState());
-    show("share", share == null ? "" : fill(_("%(share)s of windows"), { share: percent(share) }));
+    const isOther = this.#isHeld || this.#orderFailure; // than what it decides
+    show("share", share == null || isOther ? "" : fill(_("%(share)s of windows"), { share: percent(share) }));
     show("robot-why", this.#orderFailure || this.#describeHold());
     show("robot-cure", this.#describeCure());
-    show("robot-last", this.#isHeld || this.#orderFailure ? "" : describeDecision(this.#decision, this.#breakReason));
+    show("robot-last", isOther ? "" : describeDecision(this.#decision, this.#breakReason));
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
     show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));

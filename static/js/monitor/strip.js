@@ -12,6 +12,7 @@ const SPACING = 4; // pixels between strides, at least
 const FEWEST = 60; // strides that the width is made for
 const LETTER = 8; // pixels
 const AXIS = 18; // pixels, for the minutes
+const LANE = 20; // pixels below the scale, for strides that it does not judge
 const MINUTE_S = 60;
 
 const path = (kind, d) => shape("path", { class: kind, d });
@@ -37,7 +38,8 @@ function scaleOf(shown, { goal, unit }) {
     return { range: RANGE, isJudged: true, valueOf: ({ performance }) => performance, lines };
   }
   const valueOf = ({ valid, value }) => (valid ? (value ?? null) : null);
-  const highest = Math.max(1e-9, ...shown.map((stride) => valueOf(stride) ?? 0));
+  const highest = Math.max(0, ...shown.map((stride) => valueOf(stride) ?? 0));
+  if (!highest) return { range: [0, 1], isJudged: false, valueOf, lines: [] };
   const size = 10 ** Math.floor(Math.log10(highest / 2));
   const step = [1, 2, 5, 10].map((n) => n * size).find((one) => highest / one <= 4);
   const top = step * Math.ceil(highest / step);
@@ -58,7 +60,7 @@ export function drawStrip(svg, strides, annotations, session) {
   const x = (index) => 56 + index * dx;
   const y = (value) => {
     const inside = Math.min(Math.max(value, range[0]), range[1]);
-    return floor - 6 - ((inside - range[0]) * (floor - 36)) / (range[1] - range[0]);
+    return floor - LANE - ((inside - range[0]) * (floor - 30 - LANE)) / (range[1] - range[0]);
   };
 
   function drawScale() {

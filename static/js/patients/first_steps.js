@@ -22,6 +22,10 @@ function draw(slug, isDone, words) {
   if (!live) return;
   live.classList.toggle("done", isDone);
   if (live.textContent !== words) live.textContent = words;
+  const next = root.querySelector("[name=skip]");
+  next.classList.toggle("primary", isDone);
+  next.classList.toggle("quiet", !isDone);
+  for (const label of next.children) label.hidden = (label.dataset.when === "done") !== isDone;
 }
 
 setTimeout(look, EVERY_MS);

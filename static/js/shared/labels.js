@@ -27,6 +27,7 @@ const REMARKS = {
   verbal_cue: _("verbal cue"),
   borg: _("Borg"),
 };
+const SEVERITIES = [_("not hurt"), _("slightly hurt"), _("moderately hurt"), _("badly hurt")];
 // Why a stride does not count (rehab/training/steps.py, rehab/gait/strides.py).
 const REASONS = {
   missing: _("no value"),
@@ -82,6 +83,7 @@ const REFUSALS = {
 export const refusal = ({ code, message }) => REFUSALS[code] ?? message;
 export const typeName = (slug, label = slug) => TYPES[slug] ?? label;
 export const phaseName = (name) => PHASES[name] ?? name;
+export const severityName = (severity) => SEVERITIES[severity] ?? REMARKS.fall_severity;
 export const remarkName = (kind) => REMARKS[kind] ?? kind.replaceAll("_", " ");
 export const clockCures = (names) => [...new Set(names.map((name) => CURES[name]).filter(Boolean))];
 export const reasonName = (reason) => REASONS[reason] ?? reason.replaceAll("_", " ");

@@ -5,13 +5,13 @@
 
 export const language = document.documentElement.lang || "en";
 
-const { django } = globalThis;
+const { gettext, ngettext } = globalThis; // not those of `django`, which the admin's jQuery replaces
 
-export const _ = (text) => django?.gettext?.(text) ?? text;
+export const _ = (text) => gettext?.(text) ?? text;
 
 // Return the form that goes with a count, with the count (and `values`) in it.
 export const n_ = (one, many, count, values = {}) =>
-  fill(django?.ngettext?.(one, many, count) ?? (count === 1 ? one : many), { count, ...values });
+  fill(ngettext?.(one, many, count) ?? (count === 1 ? one : many), { count, ...values });
 
 // Replace the placeholders of a text, %(name)s, by values.
 export function fill(text, values) {
