@@ -58,13 +58,13 @@ class ContactFinder:
     ) -> None:
         # The contacts of the buffered samples, and the last one before them.
         self.recent: deque[Contact] = deque()
+        self.current: Contact | None = None  # under way
         self._buffer = buffer
         self._rate_hz = rate_hz
         self._weight_n = weight_n
         self._contact_n = max(contact_n, CERTAIN * weight_n)
         self._release_n = release_n
         self._zero = PlateZero(weight_n, max(3, int(BLOCK_S * rate_hz / 2)))
-        self._current: Contact | None = None
         self._last: Contact | None = None  # the last step
         self._zero_index = 0  # swing samples before this belong to another zero
         self._stuck_index = 0
@@ -79,13 +79,18 @@ class ContactFinder:
         """The plate's zero [N]."""
         return self._zero.offset_n
 
+    @property
+    def certain_n(self) -> float:
+        """The force above which a contact is certain [N]."""
+        return self._zero.offset_n + self._contact_n
+
     def is_quiet(self, start: int, stop: int) -> bool:
         """Return whether new samples ``start:stop`` are of swing or of stance whole, as most."""
         if start == stop:
             return True
         force = self._buffer.channel(FORCE, start, stop)
-        limit = self._zero.offset_n + self._contact_n
-        if self._current is None:
+        limit = self.certain_n
+        if self.current is None:
             return force.item(force.argmax()) <= limit  # false for NaN, too
         if stop < self._stuck_index and force.item(force.argmin()) >= limit:
             self._low_index = None
@@ -104,8 +109,8 @@ class ContactFinder:
         done = 0
         while done < len(force):
             rest = force[done:] if done else force
-            if self._current is None:
-                limit = self.offset_n + self._contact_n
+            if self.current is None:
+                limit = self.certain_n
                 if rest[rest.argmax()] <= limit:  # false for NaN, too
                     break
                 loaded = rest > limit
@@ -129,10 +134,10 @@ class ContactFinder:
 
     def _find_end(self, rest: Floats, start: int, ended: list[Contact]) -> int | None:
         """End the contact if it ends in these samples; return the sample from which to go on."""
-        if not len(rest) or rest[rest.argmin()] >= self.offset_n + self._contact_n:
+        if not len(rest) or rest[rest.argmin()] >= self.certain_n:
             self._low_index = None
             return None
-        low = ~(rest >= self.offset_n + self._contact_n)
+        low = ~(rest >= self.certain_n)
         done = 0
         while done < len(rest):
             if self._low_index is None:
@@ -170,7 +175,7 @@ class ContactFinder:
 
     def _find_drag_end(self, low: int, last: int, least_n: float) -> tuple[int, float] | None:
         """Return at which sample and when [s] a stance ended whose foot drags on, if it did."""
-        contact = self._current
+        contact = self.current
         assert contact is not None  # noqa: S101 (for mypy)
         if not self._is_step(contact, low):
             return None
@@ -191,7 +196,7 @@ class ContactFinder:
 
     def truncate(self) -> Contact | None:
         """Return the step under way, as if it ended with the last sample, if there is one."""
-        contact, self._current = self._current, None
+        contact, self.current = self.current, None
         stop = self._buffer.samples.end
         if contact is None or not contact.is_onset_seen or contact.is_bounce:
             return None
@@ -218,9 +223,9 @@ class ContactFinder:
         bounce = last is not None and last.end_s is not None and 0 <= time_s - last.end_s < BOUNCE_S
         if seen and not bounce:
             self._learn_zero(at)
-        self._current = Contact(at, time_s, self.offset_n, seen, bounce)
+        self.current = Contact(at, time_s, self.offset_n, seen, bounce)
         self._drop_before(index - self._buffer.samples.keep)
-        self.recent.append(self._current)
+        self.recent.append(self.current)
         self._stuck_index = index + int(STUCK_S * self._rate_hz)
         self._low_index = None
 
@@ -231,11 +236,11 @@ class ContactFinder:
 
     def _end(self, index: int, time_s: float, known: int, ended: list[Contact]) -> None:
         """End the contact at a sample and time [s], known at another sample."""
-        contact = self._current
+        contact = self.current
         assert contact is not None  # noqa: S101 (for mypy)
         contact.end_index, contact.known_index = index, known
         contact.end_s, self._end_index = time_s, index
-        self._current = self._low_index = None
+        self.current = self._low_index = None
         if not self._is_step(contact, index):
             self.recent.pop()  # it is the newest
         elif math.isfinite(contact.begin_s) and math.isfinite(contact.end_s):
@@ -287,7 +292,7 @@ class ContactFinder:
         self._zero_index = index
         if force[-1] > lowest + self._contact_n:
             return  # in stance now; its end will be seen with the new zero
-        if self._current is not None:
-            self._current.end_index = self._current.known_index = index
-        self._current = self._low_index = None
+        if self.current is not None:
+            self.current.end_index = self.current.known_index = index
+        self.current = self._low_index = None
         self._last = None
