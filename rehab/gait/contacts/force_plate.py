@@ -8,10 +8,10 @@ from collections import deque
 import numpy as np
 
 from rehab.gait.contacts.contact import Contact
-from rehab.gait.contacts.drag import QUIET_S, REST_N, average, find_edge
+from rehab.gait.contacts.drag import REST_N, find_edge
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, find_finite_maximum, find_minimum
+from rehab.gait.signals.filters import Floats, find_finite_maximum, find_last
 from rehab.gait.signals.samples import FORCE, TIME
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
@@ -64,7 +64,8 @@ class ContactFinder:
         self._weight_n = weight_n
         self._contact_n = max(contact_n, CERTAIN * weight_n)
         self._release_n = release_n
-        self._zero = PlateZero(weight_n, max(3, int(BLOCK_S * rate_hz / 2)))
+        self._zero = PlateZero(weight_n, rate_hz)
+        self._around = math.ceil(AROUND_S * rate_hz)
         self._last: Contact | None = None  # the last step
         self._zero_index = 0  # swing samples before this belong to another zero
         self._stuck_index = 0
@@ -84,34 +85,16 @@ class ContactFinder:
         """The force above which a contact is certain [N]."""
         return self._zero.offset_n + self._contact_n
 
-    def is_quiet(self, start: int, stop: int) -> bool:
-        """Return whether new samples ``start:stop`` are of swing or of stance whole, as most."""
-        if start == stop:
-            return True
-        force = self._buffer.channel(FORCE, start, stop)
-        limit = self.certain_n
-        if self.current is None:
-            return force.item(force.argmax()) <= limit  # false for NaN, too
-        if stop < self._stuck_index and force.item(force.argmin()) >= limit:
-            self._low_index = None
-            return True
-        return False
-
     def advance(self, start: int, stop: int) -> list[Contact]:
         """Process new samples ``start:stop`` and return the steps that ended in them."""
-        if self.is_quiet(start, stop):
-            return []
-        return self._search(self._buffer.channel(FORCE, start, stop), start)
-
-    def _search(self, force: Floats, start: int) -> list[Contact]:
-        """Return the steps that ended in samples from ``start`` on."""
+        force = self._buffer.channel(FORCE, start, stop)
         ended: list[Contact] = []
         done = 0
         while done < len(force):
             rest = force[done:] if done else force
             if self.current is None:
                 limit = self.certain_n
-                if rest[rest.argmax()] <= limit:  # false for NaN, too
+                if rest.item(rest.argmax()) <= limit:  # false for NaN, too
                     break
                 loaded = rest > limit
                 step = int(loaded.argmax())
@@ -134,10 +117,11 @@ class ContactFinder:
 
     def _find_end(self, rest: Floats, start: int, ended: list[Contact]) -> int | None:
         """End the contact if it ends in these samples; return the sample from which to go on."""
-        if not len(rest) or rest[rest.argmin()] >= self.certain_n:
+        certain_n, release_n = self.certain_n, self.offset_n + self._release_n
+        if not len(rest) or rest.item(rest.argmin()) >= certain_n:
             self._low_index = None
             return None
-        low = ~(rest >= self.certain_n)
+        low = ~(rest >= certain_n)
         done = 0
         while done < len(rest):
             if self._low_index is None:
@@ -151,7 +135,7 @@ class ContactFinder:
             stop = len(rest) if low[done + again] else done + again
             due = self._look_index - start
             part = rest[done : min(stop, due + 1)]
-            free = part < self.offset_n + self._release_n
+            free = part < release_n
             step = int(free.argmax()) if len(free) else 0
             if len(free) and free[step]:
                 at = start + done + step
@@ -211,12 +195,12 @@ class ContactFinder:
         before = buffer.channel(FORCE, first, index)
         loading = buffer.channel(FORCE, first, index + 1)[::-1]
         edge = find_edge(loading, self._rate_hz, self.offset_n, self._release_n, REST_N)
-        below = np.flatnonzero(before <= self.offset_n + self._release_n)
-        seen = edge is not None or len(below) > 0
+        below = find_last(before <= self.offset_n + self._release_n)
+        seen = edge is not None or below >= 0
         if edge is not None:
             at, time_s = self._find_place(max(index - edge, first))
         elif seen:
-            at, time_s = self._find_crossing(first + int(below[-1]) + 1)
+            at, time_s = self._find_crossing(first + below + 1)
         else:
             at, time_s = index, float(buffer.channel(TIME, index, index + 1)[0])
         last = self._last
@@ -262,19 +246,13 @@ class ContactFinder:
         begin = max(begin, self._zero_index, index - self._buffer.samples.keep // 2)
         margin = (index - begin) // 5
         swing = self._buffer.channel(FORCE, begin + margin, index - margin)
-        least_n = math.inf
-        if last is not None and last.end_index == begin:
-            least_n = min(
-                self._find_least_around(begin, index), self._find_least_around(index, index)
-            )
-        self._zero.learn(swing, least_n)
+        middles = (begin, index) if last is not None and last.end_index == begin else ()
+        self._zero.learn(swing, [self._find_around(at, index) for at in middles])
 
-    def _find_least_around(self, middle: int, stop: int) -> float:
-        """Return the least force around a contact, its noise averaged, before sample ``stop``."""
-        around = math.ceil(AROUND_S * self._rate_hz)
-        first = max(middle - around, self._buffer.samples.first)
-        force = self._buffer.channel(FORCE, first, min(middle + around, stop) + 1)
-        return find_minimum(average(force, max(1, min(len(force), round(QUIET_S * self._rate_hz)))))
+    def _find_around(self, middle: int, stop: int) -> Floats:
+        """Return the force around a contact, before sample ``stop``."""
+        first = max(middle - self._around, self._buffer.samples.first)
+        return self._buffer.channel(FORCE, first, min(middle + self._around, stop) + 1)
 
     def _recover_from_drift(self, index: int) -> None:
         """Reset the plate's zero where it has drifted so far that a contact does not end.
