@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
-from rehab.gait.one_leg import KEEP_S, LONGEST_CHUNK_S, SHORTEST_STEP_S, LegDetector
+from rehab.gait.contacts.patience import Patience
+from rehab.gait.one_leg import KEEP_S, LONGEST_CHUNK_S, LegDetector
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
 from rehab.gait.signals.clock import SampleClock
@@ -16,6 +17,8 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import FrameClock, read_frames
 from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import Stride
+
+LONGEST_WAIT_S = 0.3  # of samples for others
 
 
 class Detector:
@@ -26,8 +29,8 @@ class Detector:
     goes on after any samples; strides that cannot be trusted carry reasons. Samples that come late
     are put back to when they were taken, and lost ones are found (``signals.clock``).
 
-    Small chunks wait for others while no step can end in them, so that no valid stride waits: while
-    each leg swings, has just landed or still stands.
+    Small chunks wait for others while no step can have ended in them, so that no valid stride waits
+    (``contacts.patience``).
 
     Parameters
     ----------
@@ -89,9 +92,9 @@ class Detector:
         self._waiting: list[Floats] = []  # tables of the same rows that are not looked at yet
         self._numbers: list[Floats] = []  # and their frame numbers, where these are used
         self._count = self._rows = 0  # samples that wait, and rows of the newest table
-        self._longest_wait = int(SHORTEST_STEP_S * rate_hz)
+        self._longest_wait = int(LONGEST_WAIT_S * rate_hz)
         self._patience = 0  # how many samples may wait
-        self._standing: list[tuple[int, float]] = []  # rows of forces, and what they bear [N]
+        self._feet: list[tuple[int, Patience]] = []  # rows of their forces, and for which they may
         self._legs = [
             LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
@@ -131,8 +134,8 @@ class Detector:
         self._waiting.append(table)
         self._count += count
         if self._count <= self._patience:
-            for row, limit_n in self._standing:
-                if not table.item(row, -1) >= limit_n:
+            for row, patience in self._feet:
+                if not patience.lasts(self._count, table.item(row, -1)):
                     break
             else:
                 return strides
@@ -177,13 +180,14 @@ class Detector:
         return strides
 
     def _find_patience(self) -> None:
-        """Find how many samples may wait, and which feet have to stand for it."""
-        self._standing, self._patience = [], 0 if self._clock.is_holding else self._longest_wait
-        for leg, row in zip(self._legs, self._layout.force_rows[self._rows], strict=True):
-            samples, limit_n = leg.find_patience(self._samples.end)
-            self._patience = min(self._patience, samples)
-            if limit_n is not None:
-                self._standing.append((row, limit_n))
+        """Find how many samples may wait, and for which force under each foot."""
+        is_busy = self._clock.is_holding or any(leg.pending for leg in self._legs)
+        self._patience = 0 if is_busy else self._longest_wait
+        rows = self._layout.force_rows[self._rows]
+        self._feet = [
+            (row, leg.contacts.find_patience(self._samples.end))
+            for row, leg in zip(rows, self._legs, strict=True)
+        ]
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk

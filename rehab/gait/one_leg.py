@@ -19,7 +19,6 @@ from rehab.gait.strides import Flag, RejectionReason, Stride
 GRAVITY_M_S2 = 9.81
 KEEP_S = 12.0  # the longest cycle, the longest stance after it, and the piece that they end in
 LONGEST_CHUNK_S = 1.0  # longer chunks are processed in pieces of this length
-SHORTEST_STEP_S = 0.75 * STANCE_MIN_S  # no valid stance ends sooner, by a clock that is off
 STRIDE_MAX_S = 6.0
 LONGEST_GAP_S = 0.25  # in a cycle; longer ones may hide a contact
 OFFSET_N = 15.0
@@ -114,7 +113,6 @@ class LegDetector:
             settings.is_velocity,
         )
         self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
-        self._shortest_step = int(SHORTEST_STEP_S * rate_hz)
         self.pending: deque[Contact] = deque()
         self._previous: Contact | None = None  # the stance before, with its bounces
         self._last_terminal: tuple[int, float] | None = None  # where it really ended
@@ -134,20 +132,6 @@ class LegDetector:
             if self._is_measurable(contact):
                 strides.append(self._measure(contact, due))
         return strides
-
-    def find_patience(self, stop: int) -> tuple[int, float | None]:
-        """Return in how many samples from ``stop`` on no valid stride can end, whatever they are.
-
-        The force is the one above which [N] the foot is known to stand still, so that none has
-        ended either; None where that is not asked for.
-        """
-        if self.pending:
-            return 0, None
-        contact = self.contacts.current
-        if contact is None:
-            return self._shortest_step, None
-        left = contact.begin_index + self._shortest_step - stop
-        return (left, None) if left > 0 else (self._shortest_step, self.contacts.certain_n)
 
     def finish(self) -> list[OneLegStride]:
         """Return the strides that still wait, and the one that the record's end cuts off."""

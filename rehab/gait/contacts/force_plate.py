@@ -9,6 +9,7 @@ import numpy as np
 
 from rehab.gait.contacts.contact import Contact
 from rehab.gait.contacts.drag import REST_N, find_edge
+from rehab.gait.contacts.patience import Patience
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, find_finite_maximum, find_last
@@ -26,6 +27,7 @@ BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on wit
 CERTAIN = 0.15  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
+SHORTEST_S = 0.15  # no contact that ends sooner can be a valid stance, by any clock
 STUCK_S = 4.5  # in contact for longer: standing, or the plate's zero has moved above the threshold
 BLOCK_S = 0.1
 AROUND_S = 0.015  # around both ends of a swing, where a plate bears least if the foot is dragged
@@ -73,6 +75,7 @@ class ContactFinder:
         self._low_index: int | None = None  # since when the force of a contact is not certain
         self._look_index = 0  # when a drag is looked for in a contact that is not certain
         self._dragged = max(3, round(DRAG_S * rate_hz))
+        self._shortest = int(SHORTEST_S * rate_hz)
         self._look_every = max(2, round(LOOK_EVERY_S * rate_hz))
 
     @property
@@ -84,6 +87,16 @@ class ContactFinder:
     def certain_n(self) -> float:
         """The force above which a contact is certain [N]."""
         return self._zero.offset_n + self._contact_n
+
+    def find_patience(self, stop: int) -> Patience:
+        """Return for which force the samples from ``stop`` on may wait for others."""
+        contact, certain_n = self.current, self.certain_n
+        if contact is None:
+            return Patience(self._shortest, certain_n, is_standing=False)
+        young = contact.begin_index + self._shortest - stop
+        low = self._dragged if self._low_index is None else self._look_index - stop
+        free_n = self.offset_n + self._release_n + REST_N
+        return Patience(young, certain_n, is_standing=True, low=low, free_n=free_n)
 
     def advance(self, start: int, stop: int) -> list[Contact]:
         """Process new samples ``start:stop`` and return the steps that ended in them."""
