@@ -94,7 +94,8 @@ class Detector:
         self._count = self._rows = 0  # samples that wait, and rows of the newest table
         self._longest_wait = int(LONGEST_WAIT_S * rate_hz)
         self._patience = 0  # how many samples may wait
-        self._feet: list[tuple[int, Patience]] = []  # rows of their forces, and for which they may
+        # Rows of both feet's forces, and for which forces samples may wait.
+        self._feet: list[tuple[int, float, float, Patience]] = []
         self._legs = [
             LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
@@ -134,8 +135,9 @@ class Detector:
         self._waiting.append(table)
         self._count += count
         if self._count <= self._patience:
-            for row, patience in self._feet:
-                if not patience.lasts(self._count, table.item(row, -1)):
+            for row, least_n, most_n, patience in self._feet:
+                newest_n = table.item(row, -1)
+                if not (least_n <= newest_n <= most_n or patience.lasts(self._count, newest_n)):
                     break
             else:
                 return strides
@@ -184,10 +186,10 @@ class Detector:
         is_busy = self._clock.is_holding or any(leg.pending for leg in self._legs)
         self._patience = 0 if is_busy else self._longest_wait
         rows = self._layout.force_rows[self._rows]
-        self._feet = [
-            (row, leg.contacts.find_patience(self._samples.end))
-            for row, leg in zip(rows, self._legs, strict=True)
-        ]
+        self._feet = []
+        for row, leg in zip(rows, self._legs, strict=True):
+            patience = leg.contacts.find_patience(self._samples.end)
+            self._feet.append((row, patience.least_n, patience.most_n, patience))
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk

@@ -92,11 +92,11 @@ class ContactFinder:
         """Return for which force the samples from ``stop`` on may wait for others."""
         contact, certain_n = self.current, self.certain_n
         if contact is None:
-            return Patience(self._shortest, certain_n, is_standing=False)
+            return Patience(most_n=certain_n, young=self._shortest)
         young = contact.begin_index + self._shortest - stop
         low = self._dragged if self._low_index is None else self._look_index - stop
         free_n = self.offset_n + self._release_n + REST_N
-        return Patience(young, certain_n, is_standing=True, low=low, free_n=free_n)
+        return Patience(least_n=certain_n, young=young, low=low, free_n=free_n)
 
     def advance(self, start: int, stop: int) -> list[Contact]:
         """Process new samples ``start:stop`` and return the steps that ended in them."""

@@ -1,42 +1,38 @@
 """How long samples of a force may wait for others before they are looked at.
 
-A chunk costs as much to look at as two hundred samples do. While a foot swings, has just landed or
-still stands, no valid stance can end, and a look at the newest sample tells as much.
+To look at a chunk costs as much as hundreds of samples do. While a foot swings, has just landed or
+still stands, no valid stance can have ended, and its newest sample tells which.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Patience:
-    """Until when no valid stance can have ended in samples that wait.
+    """While no valid stance can have ended in samples that wait.
 
     Only a foot that leaves and lands again within one chunk is told later, by the longest wait.
 
     Attributes
     ----------
+    least_n, most_n
+        Between these forces the foot goes on with what it does: it swings, or stands [N].
     young
-        For so many samples a foot that swings, or has just landed, need not be looked at.
-    certain_n
-        The force above which a contact is certain [N].
-    is_standing
-        Whether there is one.
+        For so many samples it may bear anything, as the next stance has not begun or is young.
     low, free_n
-        For so many samples a foot that stands may bear less, down to this force [N].
+        For so many samples it may bear less, down to this force [N]: it is about to leave the floor.
     """
 
+    least_n: float = -math.inf
+    most_n: float = math.inf
     young: int
-    certain_n: float
-    is_standing: bool
     low: int = 0
-    free_n: float = 0.0
+    free_n: float = math.inf
 
     def lasts(self, count: int, newest_n: float) -> bool:
         """Return whether ``count`` samples may wait, the newest force of which is given [N]."""
-        if count <= self.young:
-            return True
-        if not self.is_standing:
-            return newest_n <= self.certain_n
-        return newest_n >= self.certain_n or (count <= self.low and newest_n >= self.free_n)
+        goes_on = self.least_n <= newest_n <= self.most_n
+        return goes_on or count <= self.young or (count <= self.low and newest_n >= self.free_n)

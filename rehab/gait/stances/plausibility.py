@@ -131,9 +131,9 @@ def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> li
     force, moment = stance.signals[0, late] - offset_n, stance.signals[1, late]
     toes = stance.index(LEVER_FROM) - half
     # Where the force is too small to tell, the moment may be anything.
-    beyond = moment[toes:] > LEVER_MAX_M * force[toes:]
-    beyond &= force[toes:] > LEVER_FORCE * weight_n
-    if find_last(beyond) >= 0:
+    last_n = force[toes:]
+    beyond = moment[toes:] > LEVER_MAX_M * last_n
+    if beyond[beyond.argmax()] and (beyond & (last_n > LEVER_FORCE * weight_n)).any():
         return [RejectionReason.MOMENT_OUT_OF_STEP]
     leaving = find_last(force > LEAVING_SHARE * find_maximum(force))
     if leaving < 0:  # there is no force, or not all of it
