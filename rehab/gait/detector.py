@@ -129,15 +129,15 @@ class Detector:
         if rows != self._rows:  # other channels are sent than were before
             strides, table = self._change_rows(table)
         if numbers is not None and not isinstance(self._clock, FrameClock):
-            strides += self._begin_to_count()
+            strides += self._begin_to_count(numbers)
         if isinstance(self._clock, FrameClock):
             self._numbers.append(read_frames(None, count) if numbers is None else numbers)
         self._waiting.append(table)
         self._count += count
         if self._count <= self._patience:
             for row, least_n, most_n, patience in self._feet:
-                newest_n = table.item(row, -1)
-                if not (least_n <= newest_n <= most_n or patience.lasts(self._count, newest_n)):
+                goes_on = least_n <= table.item(row, -1) <= most_n
+                if not (goes_on or patience.lasts(self._count, table[row])):
                     break
             else:
                 return strides
@@ -155,8 +155,14 @@ class Detector:
         self._rows = len(table)
         return strides, table
 
-    def _begin_to_count(self) -> list[Stride]:
-        """Use frame numbers from the next sample on; return the strides until then."""
+    def _begin_to_count(self, numbers: Floats) -> list[Stride]:
+        """Use frame numbers from the next sample on; return the strides until then.
+
+        In the middle of a walk they begin with a chunk that has all of them.
+        """
+        is_first = not (self._samples.end or self._waiting or self._clock.is_holding)
+        if not is_first and not np.isfinite(numbers).all():
+            return []
         strides = self._settle()
         self._clock, self._patience = FrameClock(), 0
         return strides

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rehab.gait.signals.filters import Floats, find_minimum
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patience:
@@ -23,7 +25,7 @@ class Patience:
     young
         For so many samples it may bear anything, as the next stance has not begun or is young.
     low, free_n
-        For so many samples it may bear less, down to this force [N]: it is about to leave the floor.
+        For so many samples it may bear less, down to this force [N], as a foot that soon leaves.
     """
 
     least_n: float = -math.inf
@@ -32,7 +34,8 @@ class Patience:
     low: int = 0
     free_n: float = math.inf
 
-    def lasts(self, count: int, newest_n: float) -> bool:
-        """Return whether ``count`` samples may wait, the newest force of which is given [N]."""
-        goes_on = self.least_n <= newest_n <= self.most_n
-        return goes_on or count <= self.young or (count <= self.low and newest_n >= self.free_n)
+    def lasts(self, count: int, force: Floats) -> bool:
+        """Return whether ``count`` samples may wait, the newest of which bear this force [N]."""
+        if self.least_n <= force.item(-1) <= self.most_n or count <= self.young:
+            return True
+        return count <= self.low and find_minimum(force) >= self.free_n

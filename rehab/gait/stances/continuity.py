@@ -150,7 +150,7 @@ def check_fills(late: Floats, rate_hz: float) -> list[RejectionReason]:
 
 
 def _find_bends(rows: Floats, first: int, step: int) -> Floats:
-    """Return by how much rows bend around each ``step``-th sample, from the one behind ``first``."""
+    """Return by how much rows bend around each ``step``-th sample, from ``first + 1``."""
     stop = rows.shape[1]
     after, middle = rows[:, first + 2 :: step], rows[:, first + 1 : stop - 1 : step]
     bends: Floats = after - 2 * middle + rows[:, first : stop - 2 : step]
