@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rehab.gait import LegSamples, TwoLegDetector
+from rehab.gait import LegSamples, Stride, TwoLegDetector
 from rehab.gait.signals.frames import FrameClock
 from tests.gait.faults.bench import open_walk
 from tests.gait.faults.spoil import lose, stall
@@ -139,7 +139,7 @@ def test_numbers_that_begin_in_the_middle_of_a_walk(name, missing):
     walk, clean = open_walk(name)
     spoiled = stall_with_loss(walk, clean)
     half = len(spoiled.t_s) // 40 * 20
-    found = {}
+    found: dict[int, list[Stride]] = {}
     for begins in (half, len(spoiled.t_s)):
         detector = TwoLegDetector(spoiled.rate_hz, spoiled.mass_kg, look_ahead_s=0.05)
         strides = found[begins] = []

@@ -113,7 +113,7 @@ def has_clonus(push_off: PushOff, stance: ResampledStance) -> bool:
 
 def _count_turns(velocity: Floats) -> int:
     rising = velocity > 0
-    return np.count_nonzero(rising[1:] != rising[:-1])
+    return int(np.count_nonzero(rising[1:] != rising[:-1]))
 
 
 def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:
