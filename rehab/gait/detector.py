@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
+from rehab.gait.contacts.patience import Patience
 from rehab.gait.one_leg import KEEP_S, LONGEST_CHUNK_S, LegDetector
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
@@ -17,6 +18,8 @@ from rehab.gait.signals.frames import FrameClock, read_frames
 from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import Stride
 
+LONGEST_WAIT_S = 0.3  # of samples for others
+
 
 class Detector:
     """Detects strides in chunks of samples of any length.
@@ -25,6 +28,9 @@ class Detector:
     depend on how the samples were cut into chunks, bit for bit. Memory does not grow. The detector
     goes on after any samples; strides that cannot be trusted carry reasons. Samples that come late
     are put back to when they were taken, and lost ones are found (``signals.clock``).
+
+    Small chunks wait for others while no step can have ended in them, so that no valid stride waits
+    (``contacts.patience``).
 
     Parameters
     ----------
@@ -82,8 +88,14 @@ class Detector:
         self._clock: SampleClock | FrameClock = SampleClock()
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=len(sides))
         self._layout = self._samples.layout
-        self._rows = 0  # of the last table
         self._longest_chunk = int(LONGEST_CHUNK_S * rate_hz)
+        self._waiting: list[Floats] = []  # tables of the same rows that are not looked at yet
+        self._numbers: list[Floats] = []  # and their frame numbers, where these are used
+        self._count = self._rows = 0  # samples that wait, and rows of the newest table
+        self._longest_wait = int(LONGEST_WAIT_S * rate_hz)
+        self._patience = 0  # how many samples may wait
+        # Rows of both feet's forces, and for which forces samples may wait.
+        self._feet: list[tuple[int, float, float, Patience]] = []
         self._legs = [
             LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
@@ -94,9 +106,7 @@ class Detector:
 
         Stances that the end of the samples cuts off are among them, invalid.
         """
-        held = self._clock.finish()
-        strides = [] if held is None else self._advance(held, None)
-        return strides + self._complete_last()
+        return self._settle() + self._complete_last()
 
     @property
     def frame_problem(self) -> str:
@@ -110,30 +120,89 @@ class Detector:
         frame: ArrayLike | None = None,
     ) -> list[Stride]:
         """Add samples of the named channels, the first of which is the time."""
-        if frame is not None and not self._samples.end and not isinstance(self._clock, FrameClock):
-            self._clock = FrameClock()
-        layout, clock = self._layout, self._clock
-        table = layout.read(names, channels)
-        given = table.shape[1]
-        row = layout.time_rows[len(table)]
-        if len(table) != self._rows:  # other channels are sent than were before
-            self._rows, held = len(table), clock.finish()
-            if held is not None:
-                table = np.concatenate((layout.widen(held), layout.widen(table)), axis=1)
-                row = layout.time_rows[len(table)]
+        table = self._layout.read(names, channels)
+        rows, count = table.shape
+        numbers = None if frame is None else read_frames(frame, count)
+        if not count:
+            return []
+        strides: list[Stride] = []
+        if rows != self._rows:  # other channels are sent than were before
+            strides, table = self._change_rows(table)
+        if numbers is not None and not isinstance(self._clock, FrameClock):
+            strides += self._begin_to_count(numbers)
+        if isinstance(self._clock, FrameClock):
+            self._numbers.append(read_frames(None, count) if numbers is None else numbers)
+        self._waiting.append(table)
+        self._count += count
+        if self._count <= self._patience:
+            for row, least_n, most_n, patience in self._feet:
+                goes_on = least_n <= table.item(row, -1) <= most_n
+                if not (goes_on or patience.lasts(self._count, table[row])):
+                    break
+            else:
+                return strides
+        return strides + self._look()
+
+    def _change_rows(self, table: Floats) -> tuple[list[Stride], Floats]:
+        """Look at what waits, and return its strides and a table with the rows that are used now.
+
+        Samples that the clock holds back go before it, with NaN where they have no values.
+        """
+        strides, held = self._look(), self._clock.finish()
+        self._patience = 0
+        if held is not None:
+            self._waiting, table = [self._layout.widen(held)], self._layout.widen(table)
+        self._rows = len(table)
+        return strides, table
+
+    def _begin_to_count(self, numbers: Floats) -> list[Stride]:
+        """Use frame numbers from the next sample on; return the strides until then.
+
+        In the middle of a walk they begin with a chunk that has all of them.
+        """
+        is_first = not (self._samples.end or self._waiting or self._clock.is_holding)
+        if not is_first and not np.isfinite(numbers).all():
+            return []
+        strides = self._settle()
+        self._clock, self._patience = FrameClock(), 0
+        return strides
+
+    def _settle(self) -> list[Stride]:
+        """Return the strides of all samples that wait or are held back."""
+        strides, held = self._look(), self._clock.finish()
+        return strides if held is None else strides + self._advance(held, None)
+
+    def _look(self) -> list[Stride]:
+        """Return the strides that end in the samples that wait."""
+        tables, self._waiting, self._count = self._waiting, [], 0
+        if not tables:
+            return []
+        table = tables[0] if len(tables) == 1 else np.concatenate(tables, axis=1)
+        row, clock = self._layout.time_rows[len(table)], self._clock
         if isinstance(clock, FrameClock):
-            return self._advance(*clock.add(table, row, read_frames(frame, given)))
-        return self._advance(*clock.add(table, row))
+            numbers, self._numbers = np.concatenate(self._numbers), []
+            strides = self._advance(*clock.add(table, row, numbers))
+        else:
+            strides = self._advance(*clock.add(table, row))
+        self._find_patience()
+        return strides
+
+    def _find_patience(self) -> None:
+        """Find how many samples may wait, and for which force under each foot."""
+        is_busy = self._clock.is_holding or any(leg.pending for leg in self._legs)
+        self._patience = 0 if is_busy else self._longest_wait
+        rows = self._layout.force_rows[self._rows]
+        self._feet = []
+        for row, leg in zip(rows, self._legs, strict=True):
+            patience = leg.contacts.find_patience(self._samples.end)
+            self._feet.append((row, patience.least_n, patience.most_n, patience))
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk
         first, count = samples.end, table.shape[1]
         if count <= longest:
             samples.append(table, late_s)
-            for leg in self._legs:
-                if leg.pending or not leg.contacts.is_quiet(first, samples.end):
-                    return self._detect(first, samples.end)
-            return []
+            return self._detect(first, samples.end) if count else []
         strides: list[Stride] = []
         for done in range(0, count, longest):
             part = slice(done, done + longest)

@@ -6,6 +6,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+
 from rehab.gait.contacts.contact import Contact
 from rehab.gait.contacts.force_plate import ContactFinder
 from rehab.gait.settings import DetectorSettings
@@ -205,7 +207,7 @@ class LegDetector:
         if begin < self._samples.first or not 0 < end - begin <= self._cycle_max:
             return math.nan
         force = self.buffer.channel(FORCE, begin, end)
-        return (float(force.sum()) / (end - begin) - offset_n) / self.weight_n
+        return (float(np.add.reduce(force)) / (end - begin) - offset_n) / self.weight_n
 
     def _is_measurable(self, contact: Contact) -> bool:
         """Return whether a contact is a stance to be measured; store where it ended if not."""

@@ -56,8 +56,9 @@ class StrideDetector(Detector):
             Forward force on the foot [N] and forward position of the foot [m], shape (n,), if there
             are any.
         frame
-            The samples' numbers by the device's own count, shape (n,), if it has one: from the
-            first samples on or never (``signals.frames``).
+            The samples' numbers by the device's own count, shape (n,), if it has one
+            (``signals.frames``). They may begin in the middle of a walk: the clock then starts
+            over.
 
         Raises
         ------

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rehab.gait import LegSamples, TwoLegDetector
+from rehab.gait import LegSamples, Stride, TwoLegDetector
 from rehab.gait.signals.frames import FrameClock
 from tests.gait.faults.bench import open_walk
 from tests.gait.faults.spoil import lose, stall
@@ -130,6 +130,56 @@ def test_other_channels_from_some_sample_on():
 
     assert detector.frame_problem == ""
     assert sum(stride.valid for stride in found) > 15
+
+
+@pytest.mark.parametrize("missing", [0, 3])
+@pytest.mark.parametrize("name", ["100 Hz", "1 kHz"])
+def test_numbers_that_begin_in_the_middle_of_a_walk(name, missing):
+    """They are used from then on: from the first chunk that has all of them."""
+    walk, clean = open_walk(name)
+    spoiled = stall_with_loss(walk, clean)
+    half = len(spoiled.t_s) // 40 * 20
+    found: dict[int, list[Stride]] = {}
+    for begins in (half, len(spoiled.t_s)):
+        detector = TwoLegDetector(spoiled.rate_hz, spoiled.mass_kg, look_ahead_s=0.05)
+        strides = found[begins] = []
+        for first in range(0, len(spoiled.t_s), 20):
+            part = slice(first, first + 20)
+            numbers = spoiled.frames[part].copy()
+            numbers[: missing * (first == begins)] = np.nan
+            strides += detector.feed(
+                spoiled.t_s[part],
+                LegSamples(*spoiled.left[:, part]),
+                LegSamples(*spoiled.right[:, part]),
+                frame=numbers if first >= begins else None,
+            )
+        assert detector.frame_problem == ""
+    since_s = spoiled.t_s[half] + 1.5
+    later = [stride for stride in clean if since_s < stride.initial_contact_s]
+    numbered, stamped = (
+        count([stride for stride in strides if since_s < stride.initial_contact_s], later)
+        for strides in found.values()
+    )
+
+    assert (numbered.lost, numbered.wrong) == (0, 0)
+    assert stamped.lost >= 2
+
+
+def test_wrong_numbers_that_begin_later_are_told():
+    walk, clean = open_walk("100 Hz")
+    detector = TwoLegDetector(walk.rate_hz, walk.mass_kg)
+    found = []
+    for first in range(0, len(walk.t_s), 20):
+        part = slice(first, first + 20)
+        found += detector.feed(
+            walk.t_s[part],
+            LegSamples(*walk.left[:, part]),
+            LegSamples(*walk.right[:, part]),
+            frame=np.full(len(walk.t_s[part]), 7.0) if first >= 1000 else None,
+        )
+
+    assert "stay as they are" in detector.frame_problem
+    assert count(found, clean).lost <= 1
 
 
 WRONG = {

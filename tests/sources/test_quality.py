@@ -53,3 +53,12 @@ def test_clocks_that_drift_are_told_with_a_cure():
     line, _ = send(np.arange(6000) / 100, ahead_s=0.002)
 
     assert "clocks drift by +2.0 ms a second (let one clock stamp all channels)" in line
+
+
+def test_frame_numbers_that_begin_later_are_judged():
+    quality = SignalQuality(lambda: 0.0)
+    t_s = np.arange(400) / 100
+    quality.count_samples("stream", t_s[:200])
+    quality.count_samples("stream", t_s[200:], np.full(200, 7.0))
+
+    assert "stay as they are" in quality.frame_problem

@@ -44,14 +44,20 @@ def find_edge(
     In samples from the first one.
     """
     width = max(2, round(REST_S / 2 * rate_hz))
-    if len(force_n) < 2 * width or not np.isfinite(force_n).all():
+    level = round(LEVEL_S * rate_hz)
+    if len(force_n) < 2 * width:
+        return None
+    # Where a drag rests, half of the samples exceed the least one.
+    if 2 * np.count_nonzero(force_n >= zero_n + least_n) < min(level, 2 * width):
+        return None
+    if not np.isfinite(force_n).all():
         return None
     mean = average(force_n, width)
     rests = np.abs(mean[:-width] - mean[width:]) < REST_N
     first = int(rests.argmax())
     if not rests[first]:
         return None
-    level_n = find_upper_median(force_n[first : first + round(LEVEL_S * rate_hz)])
+    level_n = find_upper_median(force_n[first : first + level])
     if level_n - zero_n < least_n:
         return None
     quiet = average(force_n, max(1, round(QUIET_S * rate_hz)))

@@ -8,10 +8,11 @@ from collections import deque
 import numpy as np
 
 from rehab.gait.contacts.contact import Contact
-from rehab.gait.contacts.drag import QUIET_S, REST_N, average, find_edge
+from rehab.gait.contacts.drag import REST_N, find_edge
+from rehab.gait.contacts.patience import Patience
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, find_finite_maximum, find_minimum
+from rehab.gait.signals.filters import Floats, find_finite_maximum, find_last
 from rehab.gait.signals.samples import FORCE, TIME
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
@@ -26,6 +27,7 @@ BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on wit
 CERTAIN = 0.15  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
+SHORTEST_S = 0.15  # no contact that ends sooner can be a valid stance, by any clock
 STUCK_S = 4.5  # in contact for longer: standing, or the plate's zero has moved above the threshold
 BLOCK_S = 0.1
 AROUND_S = 0.015  # around both ends of a swing, where a plate bears least if the foot is dragged
@@ -58,13 +60,14 @@ class ContactFinder:
     ) -> None:
         # The contacts of the buffered samples, and the last one before them.
         self.recent: deque[Contact] = deque()
+        self.current: Contact | None = None  # under way
         self._buffer = buffer
         self._rate_hz = rate_hz
         self._weight_n = weight_n
         self._contact_n = max(contact_n, CERTAIN * weight_n)
         self._release_n = release_n
-        self._zero = PlateZero(weight_n, max(3, int(BLOCK_S * rate_hz / 2)))
-        self._current: Contact | None = None
+        self._zero = PlateZero(weight_n, rate_hz)
+        self._around = math.ceil(AROUND_S * rate_hz)
         self._last: Contact | None = None  # the last step
         self._zero_index = 0  # swing samples before this belong to another zero
         self._stuck_index = 0
@@ -72,6 +75,7 @@ class ContactFinder:
         self._low_index: int | None = None  # since when the force of a contact is not certain
         self._look_index = 0  # when a drag is looked for in a contact that is not certain
         self._dragged = max(3, round(DRAG_S * rate_hz))
+        self._shortest = int(SHORTEST_S * rate_hz)
         self._look_every = max(2, round(LOOK_EVERY_S * rate_hz))
 
     @property
@@ -79,34 +83,31 @@ class ContactFinder:
         """The plate's zero [N]."""
         return self._zero.offset_n
 
-    def is_quiet(self, start: int, stop: int) -> bool:
-        """Return whether new samples ``start:stop`` are of swing or of stance whole, as most."""
-        if start == stop:
-            return True
-        force = self._buffer.channel(FORCE, start, stop)
-        limit = self._zero.offset_n + self._contact_n
-        if self._current is None:
-            return force.item(force.argmax()) <= limit  # false for NaN, too
-        if stop < self._stuck_index and force.item(force.argmin()) >= limit:
-            self._low_index = None
-            return True
-        return False
+    @property
+    def certain_n(self) -> float:
+        """The force above which a contact is certain [N]."""
+        return self._zero.offset_n + self._contact_n
+
+    def find_patience(self, stop: int) -> Patience:
+        """Return for which force the samples from ``stop`` on may wait for others."""
+        contact, certain_n = self.current, self.certain_n
+        if contact is None:
+            return Patience(most_n=certain_n, young=self._shortest)
+        young = contact.begin_index + self._shortest - stop
+        low = self._dragged if self._low_index is None else self._look_index - stop
+        free_n = self.offset_n + self._release_n + REST_N
+        return Patience(least_n=certain_n, young=young, low=low, free_n=free_n)
 
     def advance(self, start: int, stop: int) -> list[Contact]:
         """Process new samples ``start:stop`` and return the steps that ended in them."""
-        if self.is_quiet(start, stop):
-            return []
-        return self._search(self._buffer.channel(FORCE, start, stop), start)
-
-    def _search(self, force: Floats, start: int) -> list[Contact]:
-        """Return the steps that ended in samples from ``start`` on."""
+        force = self._buffer.channel(FORCE, start, stop)
         ended: list[Contact] = []
         done = 0
         while done < len(force):
             rest = force[done:] if done else force
-            if self._current is None:
-                limit = self.offset_n + self._contact_n
-                if rest[rest.argmax()] <= limit:  # false for NaN, too
+            if self.current is None:
+                limit = self.certain_n
+                if rest.item(rest.argmax()) <= limit:  # false for NaN, too
                     break
                 loaded = rest > limit
                 step = int(loaded.argmax())
@@ -129,10 +130,11 @@ class ContactFinder:
 
     def _find_end(self, rest: Floats, start: int, ended: list[Contact]) -> int | None:
         """End the contact if it ends in these samples; return the sample from which to go on."""
-        if not len(rest) or rest[rest.argmin()] >= self.offset_n + self._contact_n:
+        certain_n, release_n = self.certain_n, self.offset_n + self._release_n
+        if not len(rest) or rest.item(rest.argmin()) >= certain_n:
             self._low_index = None
             return None
-        low = ~(rest >= self.offset_n + self._contact_n)
+        low = ~(rest >= certain_n)
         done = 0
         while done < len(rest):
             if self._low_index is None:
@@ -146,7 +148,7 @@ class ContactFinder:
             stop = len(rest) if low[done + again] else done + again
             due = self._look_index - start
             part = rest[done : min(stop, due + 1)]
-            free = part < self.offset_n + self._release_n
+            free = part < release_n
             step = int(free.argmax()) if len(free) else 0
             if len(free) and free[step]:
                 at = start + done + step
@@ -170,7 +172,7 @@ class ContactFinder:
 
     def _find_drag_end(self, low: int, last: int, least_n: float) -> tuple[int, float] | None:
         """Return at which sample and when [s] a stance ended whose foot drags on, if it did."""
-        contact = self._current
+        contact = self.current
         assert contact is not None  # noqa: S101 (for mypy)
         if not self._is_step(contact, low):
             return None
@@ -191,7 +193,7 @@ class ContactFinder:
 
     def truncate(self) -> Contact | None:
         """Return the step under way, as if it ended with the last sample, if there is one."""
-        contact, self._current = self._current, None
+        contact, self.current = self.current, None
         stop = self._buffer.samples.end
         if contact is None or not contact.is_onset_seen or contact.is_bounce:
             return None
@@ -206,21 +208,21 @@ class ContactFinder:
         before = buffer.channel(FORCE, first, index)
         loading = buffer.channel(FORCE, first, index + 1)[::-1]
         edge = find_edge(loading, self._rate_hz, self.offset_n, self._release_n, REST_N)
-        below = np.flatnonzero(before <= self.offset_n + self._release_n)
-        seen = edge is not None or len(below) > 0
+        below = find_last(before <= self.offset_n + self._release_n)
+        seen = edge is not None or below >= 0
         if edge is not None:
             at, time_s = self._find_place(max(index - edge, first))
         elif seen:
-            at, time_s = self._find_crossing(first + int(below[-1]) + 1)
+            at, time_s = self._find_crossing(first + below + 1)
         else:
             at, time_s = index, float(buffer.channel(TIME, index, index + 1)[0])
         last = self._last
         bounce = last is not None and last.end_s is not None and 0 <= time_s - last.end_s < BOUNCE_S
         if seen and not bounce:
             self._learn_zero(at)
-        self._current = Contact(at, time_s, self.offset_n, seen, bounce)
+        self.current = Contact(at, time_s, self.offset_n, seen, bounce)
         self._drop_before(index - self._buffer.samples.keep)
-        self.recent.append(self._current)
+        self.recent.append(self.current)
         self._stuck_index = index + int(STUCK_S * self._rate_hz)
         self._low_index = None
 
@@ -231,11 +233,11 @@ class ContactFinder:
 
     def _end(self, index: int, time_s: float, known: int, ended: list[Contact]) -> None:
         """End the contact at a sample and time [s], known at another sample."""
-        contact = self._current
+        contact = self.current
         assert contact is not None  # noqa: S101 (for mypy)
         contact.end_index, contact.known_index = index, known
         contact.end_s, self._end_index = time_s, index
-        self._current = self._low_index = None
+        self.current = self._low_index = None
         if not self._is_step(contact, index):
             self.recent.pop()  # it is the newest
         elif math.isfinite(contact.begin_s) and math.isfinite(contact.end_s):
@@ -257,19 +259,13 @@ class ContactFinder:
         begin = max(begin, self._zero_index, index - self._buffer.samples.keep // 2)
         margin = (index - begin) // 5
         swing = self._buffer.channel(FORCE, begin + margin, index - margin)
-        least_n = math.inf
-        if last is not None and last.end_index == begin:
-            least_n = min(
-                self._find_least_around(begin, index), self._find_least_around(index, index)
-            )
-        self._zero.learn(swing, least_n)
+        middles = (begin, index) if last is not None and last.end_index == begin else ()
+        self._zero.learn(swing, [self._find_around(at, index) for at in middles])
 
-    def _find_least_around(self, middle: int, stop: int) -> float:
-        """Return the least force around a contact, its noise averaged, before sample ``stop``."""
-        around = math.ceil(AROUND_S * self._rate_hz)
-        first = max(middle - around, self._buffer.samples.first)
-        force = self._buffer.channel(FORCE, first, min(middle + around, stop) + 1)
-        return find_minimum(average(force, max(1, min(len(force), round(QUIET_S * self._rate_hz)))))
+    def _find_around(self, middle: int, stop: int) -> Floats:
+        """Return the force around a contact, before sample ``stop``."""
+        first = max(middle - self._around, self._buffer.samples.first)
+        return self._buffer.channel(FORCE, first, min(middle + self._around, stop) + 1)
 
     def _recover_from_drift(self, index: int) -> None:
         """Reset the plate's zero where it has drifted so far that a contact does not end.
@@ -287,7 +283,7 @@ class ContactFinder:
         self._zero_index = index
         if force[-1] > lowest + self._contact_n:
             return  # in stance now; its end will be seen with the new zero
-        if self._current is not None:
-            self._current.end_index = self._current.known_index = index
-        self._current = self._low_index = None
+        if self.current is not None:
+            self.current.end_index = self.current.known_index = index
+        self.current = self._low_index = None
         self._last = None

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, find_upper_median
+from rehab.gait.contacts.drag import QUIET_S, average
+from rehab.gait.signals.filters import Floats, find_minimum, find_upper_median
 
 OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
 OFFSET_SWINGS = 10
+SWING_S = 0.05  # a swing's middle is no shorter
 # A zero drifts by less from swing to swing; one that was set anew is the same in each, a drag not.
 ZERO_STEP_N = 15.0
 ZERO_SWINGS, ZERO_SPREAD_N = 3, 4.0
@@ -28,32 +31,34 @@ class PlateZero:
     ----------
     weight_n
         Body weight [N].
-    least
-        Samples that a swing has at least.
+    rate_hz
+        Of the samples.
     """
 
-    def __init__(self, weight_n: float, least: int) -> None:
+    def __init__(self, weight_n: float, rate_hz: float) -> None:
         self.offset_n = 0.0
         self._most_n = OFFSET_MAX * weight_n
-        self._least = least
+        self._least = max(3, int(SWING_S * rate_hz))
+        self._quiet = max(1, round(QUIET_S * rate_hz))
         self._offsets: deque[float] = deque(maxlen=OFFSET_SWINGS)
         self._zeros: deque[float] = deque(maxlen=ZERO_SWINGS)
 
-    def learn(self, swing: Floats, least_n: float = math.inf) -> None:
+    def learn(self, swing: Floats, ends: Sequence[Floats] = ()) -> None:
         """Learn from a swing.
 
         Parameters
         ----------
         swing
             Its middle, shape (n,).
-        least_n
-            The least force around both ends of the swing: no plate reads less than its zero there,
-            so that a swing that reads more is one of a foot that is dragged all through it.
+        ends
+            The force around both ends of the swing, shape (m,) each, if they are known: no plate
+            reads less than its zero there, so that a swing that reads more is one of a foot that is
+            dragged all through it.
         """
         if len(swing) < self._least:
             return
         zero = _find_zero(swing)
-        if zero - least_n > LEAST_N:
+        if any(self._falls_below(end, zero - LEAST_N) for end in ends):
             self._zeros.clear()
             return
         self._zeros.append(zero)
@@ -66,6 +71,12 @@ class PlateZero:
                 self._offsets.clear()
             self._offsets.append(zero)
             self.offset_n = sorted(self._offsets)[len(self._offsets) // 2]
+
+    def _falls_below(self, force: Floats, limit_n: float) -> bool:
+        """Return whether a force falls below a limit [N], its noise averaged."""
+        if find_minimum(force) >= limit_n:
+            return False
+        return find_minimum(average(force, min(len(force), self._quiet))) < limit_n
 
     def reset(self, lowest_n: float) -> bool:
         """Take another zero, where a contact does not end; return whether that is possible."""
@@ -82,6 +93,8 @@ def _find_zero(swing: Floats) -> float:
     A part is a quarter; where all of them agree, it is the whole.
     """
     zero = find_finite_median(swing)
+    if zero - find_minimum(swing) <= QUIET_N:  # so that no part can be quieter
+        return zero
     quarter = max(1, len(swing) // 4)
     if len(swing) >= 4 and math.isfinite(zero) and math.isfinite(swing.sum()):
         quarters = swing[: 4 * quarter].reshape(4, quarter).copy()

@@ -43,6 +43,11 @@ class SampleClock:
         self._stamp_s = math.nan  # of the newest sample
         self._held: Floats | None = None
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether samples are held back."""
+        return self._held is not None
+
     def add(self, table: Floats, row: int = 0) -> tuple[Floats, Floats | None]:
         """Return the samples whose times are known now, and by how much each was late.
 

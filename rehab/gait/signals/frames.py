@@ -109,6 +109,11 @@ class FrameClock:
         """The most time between two samples of which none is lost [s]; infinite if not known."""
         return 1.5 * self._step * self._period_s or math.inf
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether samples are held back."""
+        return self._held is not None if self._plain is None else self._plain.is_holding
+
     def add(self, table: Floats, row: int, frames: Floats) -> tuple[Floats, Floats | None]:
         """Return the samples whose times are known now, and by how much each was late.
 

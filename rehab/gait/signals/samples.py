@@ -54,6 +54,10 @@ class ChannelLayout:
             len(self._narrow): slice(first, first + len(self._narrow)),
         }
         self.time_rows = {rows: rows // 2 if legs == 2 else 0 for rows in self.rows}
+        self.force_rows = {
+            rows: (time - 1, time + 1) if legs == 2 else (time + 1,)
+            for rows, time in self.time_rows.items()
+        }
 
     def read(self, names: Sequence[str], channels: Sequence[ArrayLike | None]) -> Floats:
         """Return a chunk's channels as a table; a single number is one sample.

@@ -136,14 +136,25 @@ def check_fills(late: Floats, rate_hz: float) -> list[RejectionReason]:
         Of the samples.
     """
     least = max(3, round(STRAIGHT_S * rate_hz) - 1)
-    bends = late[:, 2:] - 2 * late[:, 1:-1] + late[:, :-2]
-    straight = np.abs(bends) <= STRAIGHT_TO / rate_hz**2
+    limits = STRAIGHT_TO / rate_hz**2
+    # So long a line has one of these samples in it.
+    if not (np.abs(_find_bends(late, least - 1, least)) <= limits).any():
+        return []
+    straight = np.abs(_find_bends(late, 0, 1)) <= limits
     reasons = (RejectionReason.MOMENT_LOST, RejectionReason.ANGLE_LOST)
     return [
         reason
         for reason, row in zip(reasons, straight, strict=True)
         if row.sum() >= least and _find_longest_run(row) >= least
     ]
+
+
+def _find_bends(rows: Floats, first: int, step: int) -> Floats:
+    """Return by how much rows bend around each ``step``-th sample, from ``first + 1``."""
+    stop = rows.shape[1]
+    after, middle = rows[:, first + 2 :: step], rows[:, first + 1 : stop - 1 : step]
+    bends: Floats = after - 2 * middle + rows[:, first : stop - 2 : step]
+    return bends
 
 
 def _find_longest_run(found: NDArray[np.bool_]) -> int:
@@ -211,9 +222,9 @@ def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
 
 def _is_frozen(values: Floats, steps: Floats, longest: float) -> bool:
     """Return whether a channel repeats one value, not zero, for more than ``longest`` samples."""
-    still = steps == 0
-    if not still[still.argmax()]:
+    if np.count_nonzero(steps) == len(steps):
         return False
+    still = steps == 0
     still &= values[1:] != 0
     edges = np.concatenate(([-1], np.flatnonzero(~still), [len(still)]))
     return bool(np.diff(edges).max() - 1 >= max(2, longest))

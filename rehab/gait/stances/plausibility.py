@@ -106,8 +106,14 @@ def has_clonus(push_off: PushOff, stance: ResampledStance) -> bool:
     """
     part = slice(stance.begin, stance.index(CLONUS_TO) + 1)
     velocity = push_off.velocity_rad_s[part]
-    rising = velocity[np.abs(velocity) > CLONUS_RAD_S] > 0
-    return int(np.count_nonzero(rising[1:] != rising[:-1])) >= CLONUS_TURNS
+    if _count_turns(velocity) < CLONUS_TURNS:  # without the slow ones there are no more
+        return False
+    return _count_turns(velocity[np.abs(velocity) > CLONUS_RAD_S]) >= CLONUS_TURNS
+
+
+def _count_turns(velocity: Floats) -> int:
+    rising = velocity > 0
+    return int(np.count_nonzero(rising[1:] != rising[:-1]))
 
 
 def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:
@@ -125,9 +131,9 @@ def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> li
     force, moment = stance.signals[0, late] - offset_n, stance.signals[1, late]
     toes = stance.index(LEVER_FROM) - half
     # Where the force is too small to tell, the moment may be anything.
-    beyond = moment[toes:] > LEVER_MAX_M * force[toes:]
-    beyond &= force[toes:] > LEVER_FORCE * weight_n
-    if find_last(beyond) >= 0:
+    last_n = force[toes:]
+    beyond = moment[toes:] > LEVER_MAX_M * last_n
+    if beyond[beyond.argmax()] and (beyond & (last_n > LEVER_FORCE * weight_n)).any():
         return [RejectionReason.MOMENT_OUT_OF_STEP]
     leaving = find_last(force > LEAVING_SHARE * find_maximum(force))
     if leaving < 0:  # there is no force, or not all of it
@@ -177,8 +183,10 @@ def check_push_off(
         reasons.append(RejectionReason.MOMENT_TOO_LARGE)
     swing = np.abs(push_off.moment_nm_kg[: max(0, begin - round(SWING_S * stance.rate_hz))])
     if len(swing):
-        usual = find_upper_median(swing)
-        if usual > MOMENT_DRIFT or find_maximum(swing) > MOMENT_SWING * highest:
+        largest = find_maximum(swing)
+        if largest > MOMENT_SWING * highest or (
+            largest > MOMENT_DRIFT and find_upper_median(swing) > MOMENT_DRIFT
+        ):
             reasons.append(RejectionReason.MOMENT_IN_SWING)
     reasons += _check_motion(push_off, stance, is_velocity)
     peak_w_kg = push_off.a2_w_kg

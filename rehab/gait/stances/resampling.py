@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -132,5 +133,10 @@ def decimate(window: Floats, factor: int) -> Floats | None:
     if count < 2:
         return None
     neighbors = window[:, samples - count * factor :].reshape(rows, count, factor)
-    decimated: Floats = neighbors @ np.full(factor, 1 / factor)
+    decimated: Floats = neighbors @ _find_shares(factor)
     return decimated
+
+
+@cache
+def _find_shares(factor: int) -> Floats:
+    return np.full(factor, 1 / factor)

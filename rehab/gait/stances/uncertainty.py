@@ -74,7 +74,9 @@ def _find_noise(rows: Floats) -> list[float]:
     if rows.shape[1] < 8:
         return [0.0] * len(rows)
     steps = rows[:, 1:] - rows[:, :-1]
-    third = np.abs(steps[:, 2:] - 2 * steps[:, 1:-1] + steps[:, :-2])
+    third = steps[:, 2:] - 2 * steps[:, 1:-1]
+    third += steps[:, :-2]
+    np.abs(third, out=third)
     place = third.shape[1] // 2
     third.partition(place, axis=1)
     return [size / THIRD_DIFFERENCE for size in third[:, place].tolist()]

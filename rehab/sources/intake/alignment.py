@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class Alignment:
         self,
         t_s: Floats,
         values: Mapping[Channel, Floats],
-        there: Floats,
+        there: Floats | None,
         delays_s: Sequence[float],
         now_s: float,
     ) -> list[Samples]:
@@ -51,12 +52,18 @@ class Alignment:
         values
             Of each channel, shape (n,).
         there
-            Whether each cell was sent at all, shape (n, channels), in the order of ``values``.
+            Whether each cell was sent at all, shape (n, channels), in the order of ``values``; None
+            for all.
         delays_s
             By how much each channel is late, in the order of ``values``: it is put back [s].
         now_s
             Our clock [s].
         """
+        is_passed = not self._tracks and (there is None or bool(there.all()))
+        if is_passed and len(set(delays_s)) == 1 and _is_whole(tuple(values)):
+            return [(t_s - delays_s[0] if delays_s[0] else t_s, dict(values))]
+        if there is None:
+            there = np.ones((len(t_s), len(values)))
         complete: list[Samples] = []
         for delay_s in dict.fromkeys(delays_s):
             own = [place for place, one in enumerate(delays_s) if one == delay_s]
@@ -67,7 +74,7 @@ class Alignment:
     def _add(
         self, t_s: Floats, values: Mapping[Channel, Floats], there: Floats, now_s: float
     ) -> list[Samples]:
-        if not self._tracks and there.all() and _is_whole(values):
+        if not self._tracks and there.all() and _is_whole(tuple(values)):
             return [(t_s, dict(values))]
         for place, (channel, column) in enumerate(values.items()):
             sent = there[:, place].astype(bool)
@@ -146,6 +153,7 @@ def _interpolate(at_s: Floats, times: Floats, known: Floats) -> Floats:
     return np.asarray(np.where(exact & inside, known[after], found))
 
 
-def _is_whole(values: Mapping[Channel, Floats]) -> bool:
-    sides = {side for side, _ in values.keys() - {FRAME}}
-    return all((side, name) in values for side in sides for name in REQUIRED)
+@lru_cache(maxsize=64)
+def _is_whole(channels: tuple[Channel, ...]) -> bool:
+    sides = {side for side, _ in set(channels) - {FRAME}}
+    return all((side, name) in channels for side in sides for name in REQUIRED)

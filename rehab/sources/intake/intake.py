@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,8 +30,20 @@ from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import Measurement, Side
 
+PLANS = 64  # of tables, kept at most; streams have one or two
 REPEAT_S = 10.0  # before the same warning is shown again
 CURE_OF = {str(reason): text for reason, text in CURES.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class _TablePlan:
+    """Which columns of a table are channels, with their factors and delays [s]."""
+
+    places: list[int]
+    channels: list[Channel]
+    factors: Floats  # shape (channels, 1)
+    delays_s: list[float]
+    frame: int | None  # the column of frame numbers
 
 
 class Intake:
@@ -72,6 +85,7 @@ class Intake:
             for channel, column in leg.items()
         }
         self._frame = None if settings.columns.frame is None else settings.columns.frame.name
+        self._plans: dict[tuple[str, ...], _TablePlan] = {}
         self._counted: str | None = None  # the stream whose frame numbers are used
         self._rate_hz = settings.rate_hz
         self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
@@ -225,8 +239,8 @@ class Intake:
         """
         if not len(t_s):
             return
-        frame = next((place for place, name in enumerate(names) if name == self._frame), None)
-        frames = None if frame is None else table[:, frame]
+        plan = self._find_plan(tuple(names))
+        frames = None if plan.frame is None else table[:, plan.frame]
         self.quality.count_samples(stream, t_s, frames)
         if (problem := self.quality.frame_problem) and problem not in self._reported_reasons:
             self._reported_reasons.add(problem)
@@ -235,20 +249,33 @@ class Intake:
             rates = {n: table[:, p] for p, n in enumerate(names) if n in self._gyroscopes.names}
             self._put_steps(self._gyroscopes.add(t_s, rates))
             return
-        known = [place for place, name in enumerate(names) if name in self._columns]
-        values: dict[Channel, Floats] = {}
-        for place in known:
-            channel, column = self._columns[names[place]]
-            values[channel] = table[:, place] * column.factor
-        delays_s = [self._columns[names[place]][1].delay_s for place in known]
-        if frames is not None and frame is not None and self._is_counted(stream, values):
+        known, delays_s = plan.places, plan.delays_s
+        values = dict(zip(plan.channels, table.T[known] * plan.factors, strict=True))
+        if frames is not None and plan.frame is not None and self._is_counted(stream, values):
             force = next(place for place, (_, channel) in enumerate(values) if channel == "force")
-            delays_s.append(delays_s[force])  # they count its samples
-            known.append(frame)
+            delays_s = [*delays_s, delays_s[force]]  # they count its samples
+            known = [*known, plan.frame]
             values[FRAME] = frames
-        sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
+        sent = None if there is None else there[:, known]
         for samples in self._alignment.add(t_s, values, sent, delays_s, self._monotonic()):
             self._measure(*samples)
+
+    def _find_plan(self, names: tuple[str, ...]) -> _TablePlan:
+        """Return how a table with these columns is read, kept from table to table."""
+        plan = self._plans.get(names)
+        if plan is None:
+            if len(self._plans) >= PLANS:
+                self._plans.clear()
+            places = [place for place, name in enumerate(names) if name in self._columns]
+            used = [self._columns[names[place]] for place in places]
+            plan = self._plans[names] = _TablePlan(
+                places=places,
+                channels=[channel for channel, _ in used],
+                factors=np.array([[column.factor] for _, column in used]).reshape(-1, 1),
+                delays_s=[column.delay_s for _, column in used],
+                frame=names.index(self._frame) if self._frame in names else None,
+            )
+        return plan
 
     def _is_counted(self, stream: str, values: Mapping[Channel, Floats]) -> bool:
         """Return whether a stream's numbers are used: those of the first one with a force."""

@@ -15,7 +15,7 @@ from rehab.gait import (
     TwoLegDetector,
     check_signals,
 )
-from rehab.gait.recordings.columns import REQUIRED, SIDES
+from rehab.gait.recordings.columns import CHANNELS, REQUIRED, SIDES
 from rehab.gait.settings import check_rate
 from rehab.gait.signals.clock import estimate_rate
 from rehab.sources.intake.alignment import FRAME, Channel, Floats, Samples
@@ -23,6 +23,7 @@ from rehab.sources.reporting import Notify
 
 FIRST_SAMPLES = 100  # from which legs and rate are detected
 CHECK_S = 30.0
+LEGS: dict[str, list[Channel]] = {side: [(side, name) for name in CHANNELS] for side in SIDES}
 
 
 class SignalPipeline:
@@ -60,6 +61,7 @@ class SignalPipeline:
         self._detector: TwoLegDetector | StrideDetector | None = None
         self._sides: tuple[str, ...] = ()
         self._others: set[str] = set()  # sides that came too late
+        self._fed: set[Channel] = set()  # of the newest samples
         self._checked: list[Samples] | None = []
 
     def add(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
@@ -131,18 +133,23 @@ class SignalPipeline:
         return [stride for t, values in held for stride in self._feed(t, values)]
 
     def _feed(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
-        late = {side for side, _ in values.keys() - {FRAME}} - set(self._sides) - self._others
+        if values.keys() != self._fed:
+            self._fed = set(values)
+            self._tell_late_legs()
+        frames = values.get(FRAME)
+        if isinstance(self._detector, TwoLegDetector):
+            return self._detector.feed(t_s, *(_leg(values, s, t_s) for s in SIDES), frame=frames)
+        assert self._detector is not None  # noqa: S101 (set by _begin)
+        return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s), frame=frames)
+
+    def _tell_late_legs(self) -> None:
+        late = {side for side, _ in self._fed - {FRAME}} - set(self._sides) - self._others
         if late:
             self._others |= late
             self._notify(
                 f"Signals of the {' and '.join(sorted(late))} leg came too late to be measured. "
                 "Start this source again while both legs send."
             )
-        frames = values.get(FRAME)
-        if isinstance(self._detector, TwoLegDetector):
-            return self._detector.feed(t_s, *(_leg(values, s, t_s) for s in SIDES), frame=frames)
-        assert self._detector is not None  # noqa: S101 (set by _begin)
-        return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s), frame=frames)
 
 
 def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floats:
@@ -152,6 +159,7 @@ def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floa
 
 def _leg(values: dict[Channel, Floats], side: str, t_s: Floats) -> LegSamples:
     """Return a leg's channels; NaN for a required one that these samples lack."""
-    force, moment, angle = (_values(values, (side, name), len(t_s)) for name in REQUIRED)
-    optional = values.get((side, "forward")), values.get((side, "position"))
-    return LegSamples(force, moment, angle, *optional)
+    force, moment, angle, forward, position = [values.get(key) for key in LEGS[side]]
+    if force is None or moment is None or angle is None:
+        force, moment, angle = [_values(values, key, len(t_s)) for key in LEGS[side][:3]]
+    return LegSamples(force, moment, angle, forward, position)

@@ -16,6 +16,7 @@ from rehab.training.steps import Measurement
 
 # The sender's clock against ours; quartz clocks differ by 100 millionths.
 DRIFT_RATE, DRIFT_S = 0.0005, 0.02
+JUDGED = 100  # samples are judged together, which costs as much as one does
 CURES = {
     "late": "put back; close other programs on the lab's computer",
     "lost": "look at network and recorder",
@@ -36,6 +37,8 @@ class SignalQuality:
         self._samples = 0
         self._last_s: dict[str, float] = {}  # of each stream, by its own clock
         self._clocks: dict[str, SampleClock | FrameClock] = {}
+        self._waiting: dict[str, list[tuple[Floats, Floats | None]]] = {}  # not judged yet
+        self._count = 0  # of samples that wait
         self._times_s: dict[str, float] = {}  # the newest one that the clock has released
         self._latest_s = self._longest_s = 0.0
         self._first: tuple[float, float] | None = None  # our time, and how far the sender is ahead
@@ -48,21 +51,42 @@ class SignalQuality:
     def count_samples(self, stream: str, t_s: Floats, frames: Floats | None = None) -> None:
         """Count samples of a stream, which may be numbered."""
         self._samples += len(t_s)
-        last_s = self._last_s.get(stream)
-        went_back = bool((np.diff(t_s, prepend=t_s[0] if last_s is None else last_s) < 0).any())
+        first_s, newest_s = t_s.item(0), t_s.item(-1)
+        went_back = first_s < self._last_s.get(stream, first_s)
+        went_back = went_back or bool((t_s[1:] < t_s[:-1]).any())
         self.clock_jumps += went_back
-        self._judge(stream, t_s, frames)
-        self._last_s[stream] = float(t_s[-1])
-        self._update_lag(float(t_s[-1]), went_back)
+        if stream not in self._clocks or (
+            frames is not None and not isinstance(self._clocks[stream], FrameClock)
+        ):
+            self._judge(stream)
+            self._clocks[stream] = SampleClock() if frames is None else FrameClock()
+        waiting = self._waiting.setdefault(stream, [])
+        waiting.append((t_s, frames))
+        self._count += len(t_s)
+        if self._count >= JUDGED:
+            self._judge_all()
+        self._last_s[stream] = newest_s
+        self._update_lag(newest_s, went_back)
 
-    def _judge(self, stream: str, t_s: Floats, frames: Floats | None) -> None:
+    def _judge_all(self) -> None:
+        for stream in self._waiting:
+            self._judge(stream)
+        self._count = 0
+
+    def _judge(self, stream: str) -> None:
         """Count what comes late and what is lost."""
-        clock = self._clocks.get(stream)
-        if clock is None:
-            clock = self._clocks[stream] = SampleClock() if frames is None else FrameClock()
-        usual_s = GAP_S
+        waiting = self._waiting.get(stream)
+        if not waiting:
+            return
+        self._waiting[stream] = []
+        t_s, clock, usual_s = (
+            np.concatenate([t_s for t_s, _ in waiting]),
+            self._clocks[stream],
+            GAP_S,
+        )
         if isinstance(clock, FrameClock):
-            (times,), late_s = clock.add(np.array([t_s]), 0, read_frames(frames, len(t_s)))
+            frames = np.concatenate([read_frames(frames, len(t_s)) for t_s, frames in waiting])
+            (times,), late_s = clock.add(np.array([t_s]), 0, frames)
             self.frame_problem = self.frame_problem or clock.problem
             usual_s = GAP_S if clock.problem else clock.usual_s
         else:
@@ -116,6 +140,7 @@ class SignalQuality:
 
     def describe(self) -> str:
         """Return the line, and reset the counts."""
+        self._judge_all()
         now_s = self._monotonic()
         rate_hz = self._samples / max(now_s - self._since_s, 1e-9)
         rate = (

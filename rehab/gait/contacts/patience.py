@@ -1,0 +1,41 @@
+"""How long samples of a force may wait for others before they are looked at.
+
+To look at a chunk costs as much as hundreds of samples do. While a foot swings, has just landed or
+still stands, no valid stance can have ended, and its newest sample tells which.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rehab.gait.signals.filters import Floats, find_minimum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patience:
+    """While no valid stance can have ended in samples that wait.
+
+    Only a foot that leaves and lands again within one chunk is told later, by the longest wait.
+
+    Attributes
+    ----------
+    least_n, most_n
+        Between these forces the foot goes on with what it does: it swings, or stands [N].
+    young
+        For so many samples it may bear anything, as the next stance has not begun or is young.
+    low, free_n
+        For so many samples it may bear less, down to this force [N], as a foot that soon leaves.
+    """
+
+    least_n: float = -math.inf
+    most_n: float = math.inf
+    young: int
+    low: int = 0
+    free_n: float = math.inf
+
+    def lasts(self, count: int, force: Floats) -> bool:
+        """Return whether ``count`` samples may wait, the newest of which bear this force [N]."""
+        if self.least_n <= force.item(-1) <= self.most_n or count <= self.young:
+            return True
+        return count <= self.low and find_minimum(force) >= self.free_n
