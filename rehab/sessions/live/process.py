@@ -13,8 +13,9 @@ from django.db import DatabaseError, connection
 log = logging.getLogger(__name__)
 
 # Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
-# them rare.
-GC_THRESHOLDS = (50_000, 50, 100)
+# them rare. One of 50,000 young objects takes 15 to 30 ms while 1,000 sessions begin, of 5,000 at
+# most 9 ms (docs/performance.md).
+GC_THRESHOLDS = (5_000, 500, 100)
 # How long a thread may keep the interpreter's lock while another one wants it (default 5 ms). The
 # event loop of daphne gives it up at each system call: while a thread computes a page, each step
 # takes so long several times (docs/performance.md#while-strangers-try-to-sign-in).
