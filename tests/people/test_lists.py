@@ -13,7 +13,7 @@ from django.urls import reverse
 from django.utils.text import capfirst
 
 from rehab.people.roles import Role
-from rehab.sessions.admin.setup import PresetAdmin
+from rehab.sessions.admin.presets import PresetAdmin
 from rehab.sessions.models import TrainingSession
 from tests.support.extent import EVERYTHING
 from tests.support.world import client_of, scoped_models

@@ -1,5 +1,5 @@
 """Admin of sessions, and of what they are set up with."""
 
-from rehab.sessions.admin import sessions, setup
+from rehab.sessions.admin import presets, sessions, setup
 
-__all__ = ["sessions", "setup"]
+__all__ = ["presets", "sessions", "setup"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,23 +26,12 @@ from rehab.sources.intake.rows import (
     read_stride,
 )
 from rehab.sources.intake.settings import IntakeSettings
+from rehab.sources.intake.tables import TablePlans
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import Measurement, Side
 
-PLANS = 64  # of tables, kept at most; streams have one or two
 REPEAT_S = 10.0  # before the same warning is shown again
 CURE_OF = {str(reason): text for reason, text in CURES.items()}
-
-
-@dataclass(frozen=True, slots=True)
-class _TablePlan:
-    """Which columns of a table are channels, with their factors and delays [s]."""
-
-    places: list[int]
-    channels: list[Channel]
-    factors: Floats  # shape (channels, 1)
-    delays_s: list[float]
-    frame: int | None  # the column of frame numbers
 
 
 class Intake:
@@ -85,12 +73,12 @@ class Intake:
             for channel, column in leg.items()
         }
         self._frame = None if settings.columns.frame is None else settings.columns.frame.name
-        self._plans: dict[tuple[str, ...], _TablePlan] = {}
         self._counted: str | None = None  # the stream whose frame numbers are used
         self._rate_hz = settings.rate_hz
         self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
         if settings.gyroscopes:
             self._columns = {}
+        self._plans = TablePlans(self._columns, self._frame)
         self._problem: SourceError | None = None
         self._failed = asyncio.Event()
         self._number = 0
@@ -239,7 +227,7 @@ class Intake:
         """
         if not len(t_s):
             return
-        plan = self._find_plan(tuple(names))
+        plan = self._plans.find(tuple(names))
         frames = None if plan.frame is None else table[:, plan.frame]
         self.quality.count_samples(stream, t_s, frames)
         if (problem := self.quality.frame_problem) and problem not in self._reported_reasons:
@@ -259,23 +247,6 @@ class Intake:
         sent = None if there is None else there[:, known]
         for samples in self._alignment.add(t_s, values, sent, delays_s, self._monotonic()):
             self._measure(*samples)
-
-    def _find_plan(self, names: tuple[str, ...]) -> _TablePlan:
-        """Return how a table with these columns is read, kept from table to table."""
-        plan = self._plans.get(names)
-        if plan is None:
-            if len(self._plans) >= PLANS:
-                self._plans.clear()
-            places = [place for place, name in enumerate(names) if name in self._columns]
-            used = [self._columns[names[place]] for place in places]
-            plan = self._plans[names] = _TablePlan(
-                places=places,
-                channels=[channel for channel, _ in used],
-                factors=np.array([[column.factor] for _, column in used]).reshape(-1, 1),
-                delays_s=[column.delay_s for _, column in used],
-                frame=names.index(self._frame) if self._frame in names else None,
-            )
-        return plan
 
     def _is_counted(self, stream: str, values: Mapping[Channel, Floats]) -> bool:
         """Return whether a stream's numbers are used: those of the first one with a force."""
