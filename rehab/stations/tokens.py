@@ -7,14 +7,13 @@ any more, and where it is seen again it was copied.
 
 from __future__ import annotations
 
-import secrets
 from datetime import datetime, timedelta
 
 from django.db import transaction
 from django.db.models import Q
 
 from rehab.people.audit.audit_log import Act, build_entry, record, record_counted
-from rehab.people.sign_in.tokens import TOKEN_BYTES, find_by_token, hash_token
+from rehab.people.sign_in.tokens import draw_token, find_by_token, hash_token
 from rehab.stations.models import Device
 
 ROTATE_AFTER = timedelta(days=30)
@@ -49,7 +48,7 @@ def is_successor_due(device: Device, now: datetime) -> bool:
 
 def give_successor(device: Device, now: datetime) -> str:
     """Return another token of a device; the present one goes on until the other was used."""
-    token = secrets.token_urlsafe(TOKEN_BYTES)
+    token = draw_token()
     device.successor_hash = device.given_hash = hash_token(token)
     Device.everywhere.filter(pk=device.pk, token_hash=device.token_hash).update(
         successor_hash=device.successor_hash

@@ -50,9 +50,16 @@ class TokenModel(ClinicModel):
 
         Only its hash is stored.
         """
-        token = secrets.token_urlsafe(TOKEN_BYTES)
+        token = draw_token()
         self.token_hash = hash_token(token)
         return token
+
+
+def draw_token() -> str:
+    """Return a new token. It begins with no dash: a command line would read that as an option."""
+    while (token := secrets.token_urlsafe(TOKEN_BYTES)).startswith("-"):
+        pass
+    return token
 
 
 def renew_token(holder: TokenModel, by: User, address: str, now: datetime) -> str:
