@@ -17,6 +17,7 @@ import statistics
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -294,7 +295,12 @@ def find_problems(faults: Faults) -> list[str]:
         if log["numbers"] != list(range(1, walk.made + 1)) or not log["refolds"]:
             problems.append(f"session {walk.row['session']}: {walk.made}, {log}")
         if walk.seen != list(range(1, walk.made + 1)):
-            problems.append(f"session {walk.row['session']}: a viewer's gap or double")
+            missed = sorted(set(range(1, walk.made + 1)) - set(walk.seen))
+            again = [b for a, b in pairwise(walk.seen) if b <= a]
+            problems.append(
+                f"session {walk.row['session']}: of {walk.made} steps a viewer missed {missed}, "
+                f"and saw {again} again"
+            )
     return problems
 
 
@@ -316,4 +322,4 @@ def report(faults: Faults, problems: list[str]) -> None:
     )
     steps = sum(walk.made for walk in faults.walks)
     print(f"refused loudly: {faults.refused}; paused by orderly restarts: {faults.paused_by_order}")
-    print(f"steps: {steps}; problems: {len(problems)}")
+    print(f"steps: {steps}; problems: {len(problems)}", *problems, sep="\n")
