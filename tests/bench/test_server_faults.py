@@ -254,7 +254,11 @@ class Faults:
         for walk in self.walks:
             walk.stopping = True
         await asyncio.wait_for(asyncio.gather(*senders), 60)
-        await asyncio.sleep(3)
+        with suppress(TimeoutError):  # what they have not seen is told as a problem
+            async with asyncio.timeout(RECOVERED_S):
+                while not all(walk.has_seen_all for walk in self.walks):  # noqa: ASYNC110
+                    await asyncio.sleep(0.05)
+        await asyncio.sleep(1)  # and what they see again
         for watcher in watchers:
             watcher.cancel()
 

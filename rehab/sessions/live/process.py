@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import faulthandler
 import gc
 import logging
 import os
 import sys
 import threading
+from collections import Counter
+from typing import Any
 
 from django.db import DatabaseError, connection
 
@@ -24,15 +28,35 @@ STOP_S = 30.0  # more than a stuck database may hold up the writer
 
 
 def end_in_time() -> None:
-    """End the process if stopping takes too long: nothing acknowledged is lost by that."""
+    """End the process if stopping takes too long, and say what it waited for.
+
+    Nothing acknowledged is lost by that. Called on the event loop.
+    """
+    loop = asyncio.get_running_loop()
 
     def end() -> None:
-        log.critical("The server could not stop within %g s and ends now.", STOP_S)
-        os._exit(1)
+        try:
+            log.critical("The server could not stop within %g s and ends now.", STOP_S)
+            waiting = Counter(map(_describe_wait, asyncio.all_tasks(loop)))
+            for place, count in waiting.most_common():
+                log.critical("%s task(s) waited in %s", count, place)
+            faulthandler.dump_traceback()
+        finally:
+            os._exit(1)
 
     timer = threading.Timer(STOP_S, end)
     timer.daemon = True
     timer.start()
+
+
+def _describe_wait(task: asyncio.Task[Any]) -> str:
+    """Return where a task waits: its functions and their lines, the innermost last."""
+    places: list[str] = []
+    waiting: Any = task.get_coro()
+    while getattr(waiting, "cr_frame", None) is not None:
+        places.append(f"{waiting.__qualname__} ({waiting.cr_frame.f_lineno})")
+        waiting = waiting.cr_await
+    return " > ".join(places)
 
 
 def tune_interpreter() -> None:

@@ -79,11 +79,9 @@ class SignalQuality:
         if not waiting:
             return
         self._waiting[stream] = []
-        t_s, clock, usual_s = (
-            np.concatenate([t_s for t_s, _ in waiting]),
-            self._clocks[stream],
-            GAP_S,
-        )
+        t_s = np.concatenate([t_s for t_s, _ in waiting])
+        clock = self._clocks[stream]
+        usual_s = GAP_S
         if isinstance(clock, FrameClock):
             frames = np.concatenate([read_frames(frames, len(t_s)) for t_s, frames in waiting])
             (times,), late_s = clock.add(np.array([t_s]), 0, frames)
@@ -107,9 +105,7 @@ class SignalQuality:
         """Return what is wrong with the sender's clock, with the cures."""
         found = []
         if self.late:
-            found.append(
-                f"{self.late} late by up to {1000 * self._latest_s:.0f} ms",
-            )
+            found.append(f"{self.late} late by up to {1000 * self._latest_s:.0f} ms")
         if self.lost:
             found.append(f"{self.lost} times lost for up to {1000 * self._longest_s:.0f} ms")
         drift = self._find_drift()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -128,12 +129,22 @@ async def test_a_database_that_never_answers_holds_up_no_end(stall, live_path, m
     writer._thread.join(5)
 
 
-def test_a_stop_that_takes_too_long_ends_the_process(monkeypatch):
-    ended = threading.Event()
+async def test_a_stop_that_takes_too_long_ends_the_process_and_says_where(monkeypatch, caplog):
+    ended, event = asyncio.Event(), asyncio.Event()
+    loop = asyncio.get_running_loop()
     monkeypatch.setattr(process, "STOP_S", 0.01)
-    monkeypatch.setattr(os, "_exit", lambda status: ended.set())
+    monkeypatch.setattr(process.faulthandler, "dump_traceback", lambda: None)
+    monkeypatch.setattr(os, "_exit", lambda status: loop.call_soon_threadsafe(ended.set))
+
+    async def wait_for_ever() -> None:
+        await event.wait()
+
+    stuck = asyncio.create_task(wait_for_ever())
+    await asyncio.sleep(0)
     process.end_in_time()
-    assert ended.wait(5)
+    await asyncio.wait_for(ended.wait(), 5)
+    assert re.search(r"1 task\(s\) waited in .*wait_for_ever \(\d+\) > Event.wait", caplog.text)
+    stuck.cancel()
 
 
 @contextmanager
