@@ -20,6 +20,7 @@ from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.instruments import LATE_S
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.writer import Writer
+from rehab.sessions.live.tasks import end_tasks
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
@@ -69,9 +70,7 @@ class Routines:
 
     async def stop(self) -> None:
         """End all of them."""
-        for task in self.tasks:
-            task.cancel()
-        await asyncio.gather(*self.tasks, return_exceptions=True)
+        await end_tasks(self.tasks)
 
     async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
         """Call a function periodically; log its failures and go on."""

@@ -18,6 +18,7 @@ from twisted.internet import defer, reactor
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
+from rehab.sessions.live.tasks import end_tasks
 from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
 from robot.wire.limits import MAX_FRAME_BYTES
 
@@ -124,9 +125,7 @@ class LiveServer(Server):  # type: ignore[misc]
             log.exception("The server did not drain cleanly")
         tasks = [details.get("application_instance") for details in self.connections.values()]
         open_tasks = [task for task in tasks if task is not None and not task.done()]
-        for task in open_tasks:
-            task.cancel()
-        await asyncio.gather(*open_tasks, return_exceptions=True)
+        await end_tasks(open_tasks)
 
     async def _until_closed(self) -> None:
         """Wait until the sockets are closed: stopping with an open one can crash.

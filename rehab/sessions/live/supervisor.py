@@ -92,7 +92,7 @@ class Supervisor:
         if child is None:
             return
         if child.task is not None:
-            child.task.cancel()
+            child.task.cancel()  # once: then it ends the process
             await asyncio.wait([child.task])
         self._schedule_report()
 
@@ -197,7 +197,8 @@ async def _end(process: asyncio.subprocess.Process) -> None:
     with contextlib.suppress(ProcessLookupError):
         process.terminate()
         try:
-            await asyncio.wait_for(process.wait(), STOP_S)
+            async with asyncio.timeout(STOP_S):
+                await process.wait()
         except TimeoutError:
             process.kill()
             await process.wait()

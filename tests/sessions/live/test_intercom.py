@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import copy
 from collections.abc import AsyncIterator
 from typing import Any
@@ -91,3 +92,19 @@ async def test_an_order_that_could_not_be_sent_in_time_is_dropped(room, monkeypa
     room.layer.fails = False
     await asyncio.sleep(0.1)
     assert room.heard == [("other", "change")]
+
+
+async def test_a_server_ends_where_its_layer_loses_a_cancellation(room, monkeypatch):
+    """As redis-py does on Python 3.11, by asyncio.wait_for."""
+    sending = asyncio.Event()
+
+    async def send(channel: str, message: Any) -> None:
+        sending.set()
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.Event().wait()
+
+    monkeypatch.setattr(room.layer, "send", send)
+    one = room.open("one")
+    one.tell("other", "order", {"order": "arm"})
+    await sending.wait()
+    await asyncio.wait_for(one.close(), 5)

@@ -22,6 +22,8 @@ from typing import Any, NamedTuple
 
 from channels.layers import get_channel_layer
 
+from rehab.sessions.live.tasks import end_tasks
+
 log = logging.getLogger(__name__)
 
 Data = dict[str, Any]
@@ -107,9 +109,7 @@ class Intercom:
 
     async def close(self) -> None:
         """End, with what is under way."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await end_tasks(list(self._tasks))
 
     def _start(self, work: Any) -> None:
         loop, context = asyncio.get_running_loop(), contextvars.Context()  # not a request's

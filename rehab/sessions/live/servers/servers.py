@@ -31,6 +31,7 @@ from rehab.sessions.live.servers.intercom import HEARD_S, Data, Intercom, Unhear
 from rehab.sessions.live.servers.isolation import Isolation
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.station_robots import StationRobots
+from rehab.sessions.live.tasks import end_tasks
 from rehab.sessions.log import Remark
 from rehab.sessions.payloads import Message
 from rehab.training.changes import ChangeValue
@@ -91,9 +92,7 @@ class Servers:
 
     async def close(self) -> None:
         """End: nobody is followed, and nothing is heard any more."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await end_tasks(self._tasks)
         await self.intercom.close()
         self._database.close()
 

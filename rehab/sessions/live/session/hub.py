@@ -194,7 +194,8 @@ class Subscriber(Outgoing):
     async def _wait_for_confirmation(self) -> None:
         self._confirmed.clear()
         try:
-            await asyncio.wait_for(self._confirmed.wait(), CONFIRM_TIMEOUT_S)
+            async with asyncio.timeout(CONFIRM_TIMEOUT_S):
+                await self._confirmed.wait()
         except TimeoutError:
             raise Stalled from None
 
