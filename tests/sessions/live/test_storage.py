@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import faulthandler
 import os
 import re
 import threading
@@ -133,7 +134,7 @@ async def test_a_stop_that_takes_too_long_ends_the_process_and_says_where(monkey
     ended, event = asyncio.Event(), asyncio.Event()
     loop = asyncio.get_running_loop()
     monkeypatch.setattr(process, "STOP_S", 0.01)
-    monkeypatch.setattr(process.faulthandler, "dump_traceback", lambda: None)
+    monkeypatch.setattr(faulthandler, "dump_traceback", lambda: None)
     monkeypatch.setattr(os, "_exit", lambda status: loop.call_soon_threadsafe(ended.set))
 
     async def wait_for_ever() -> None:
