@@ -30,9 +30,12 @@ log = logging.getLogger(__name__)
 SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
 SEAL = round(600 / ROBOT_HEARTBEAT_S)
+PARTS = 10  # of the robots, one after the other: thousands at once would hold up steps
 CHECKED_SOCKETS = 100  # sign-ins that are checked at once
 CHECK_PAUSE_S = 0.1  # between these: 4,000 sockets within 4 s
 HEARTBEAT = to_text({"type": "heartbeat"})
+# By whether a PT's page is open.
+ROBOT_HEARTBEATS = [to_text({"type": "heartbeat", "watched": one}) for one in (False, True)]
 
 
 class Process(Protocol):
@@ -54,11 +57,12 @@ class Routines:
     def __init__(self, process: Process) -> None:
         self._process = process
         self._beat = 0
+        self._part = 0
         self._trouble = Trouble.NONE  # as it was told last
         self.tasks = [
             process.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
             for beats, work in (
-                (1, self._send_robot_heartbeats),
+                (1 / PARTS, self._send_robot_heartbeats),
                 (1, self._watch_storage),
                 (1, self._send_page_heartbeats),
                 (SWEEP, self._close_idle),
@@ -72,7 +76,7 @@ class Routines:
         """End all of them."""
         await end_tasks(self.tasks)
 
-    async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
+    async def _repeat(self, beats: float, work: Callable[[], Awaitable[None]]) -> None:
         """Call a function periodically; log its failures and go on."""
         while True:
             due_s = self._process.loop.time() + beats * ROBOT_HEARTBEAT_S
@@ -84,9 +88,11 @@ class Routines:
                 log.exception("A periodic task (every %.2f s) failed", beats * ROBOT_HEARTBEAT_S)
 
     async def _send_robot_heartbeats(self) -> None:
+        """Send heartbeats to a part of the robots: to all of them within an interval."""
+        self._part = (self._part + 1) % PARTS
         for live in self._process.sessions.values():
-            if live.robot is not None:
-                live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
+            if live.id % PARTS == self._part and live.robot is not None:
+                live.robot.tell_text(ROBOT_HEARTBEATS[live.is_watched])
 
     async def _watch_storage(self) -> None:
         """Tell monitors, robots and the log when steps cannot be stored, and when they can."""

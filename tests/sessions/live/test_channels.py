@@ -6,6 +6,7 @@ import asyncio
 import threading
 from collections import Counter
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -129,6 +130,24 @@ async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
     tablet = place.tablet(session)
     await tablet.watch()
     await tablet.hear("heartbeat")
+
+
+async def test_robots_hear_heartbeats_a_tenth_of_them_after_the_other(live_path, monkeypatch):
+    """A thousand at once would hold up each step meanwhile."""
+    runtime = runtimes.current()
+    await runtime.routines.stop()
+    heard: list[str] = []
+    for number in range(1, 41):
+        robot = SimpleNamespace(tell_text=heard.append)
+        live = SimpleNamespace(id=number, robot=robot if number > 20 else None, is_watched=False)
+        monkeypatch.setitem(runtime.sessions, number, live)
+    counts = []
+    for _ in range(routines.PARTS):
+        heard.clear()
+        await runtime.routines._send_robot_heartbeats()
+        counts.append(len(heard))
+    assert counts == [2] * routines.PARTS
+    assert set(heard) == {'{"type":"heartbeat","watched":false}'}
 
 
 async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):

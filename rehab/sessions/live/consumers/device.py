@@ -167,6 +167,10 @@ class DeviceSocket(Socket):
         """Queue a message for the device."""
         self.outbox.tell(message)
 
+    def tell_text(self, text: str) -> None:
+        """Queue a message that is a frame's text already."""
+        self.outbox.tell_text(text)
+
     def acknowledge(self, number: int) -> None:
         """Queue the acknowledgment of the steps up to this one."""
         self.outbox.acknowledge(number)

@@ -99,7 +99,11 @@ class Outbox(Outgoing):
 
     def tell(self, message: Message) -> None:
         """Queue a message."""
-        self._texts.append(to_text(message))
+        self.tell_text(to_text(message))
+
+    def tell_text(self, text: str) -> None:
+        """Queue a message that is a frame's text already."""
+        self._texts.append(text)
         self._ends_with_ack = False
         self.wake()
 

@@ -17,6 +17,9 @@ class Peer(Protocol):
     def tell(self, message: Message) -> None:
         """Queue a message."""
 
+    def tell_text(self, text: str) -> None:
+        """Queue a message that is a frame's text already."""
+
     def acknowledge(self, number: int) -> None:
         """Queue the acknowledgment of the steps up to this one."""
 
