@@ -81,8 +81,11 @@ class Command(BaseCommand):
             check_sharing(processes)
             if child or robot != "none":
                 raise CommandError("Several servers run no other programs. Run them beside.")
+            ports = range(port, port + processes)
+            for one in ports:
+                check_port(host, one)
             prepare_database()
-            Processes([serve_command(host, port + n, server) for n in range(processes)]).run()
+            Processes([serve_command(host, one, server) for one in ports]).run()
             return
         if robot != "none" and settings.HOSTED:
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
