@@ -6,7 +6,7 @@ import asyncio
 import contextvars
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -39,6 +39,8 @@ from rehab.training.changes import (
 from robot.wire.close_codes import CloseCode
 
 log = logging.getLogger(__name__)
+
+FINISH_S = 5.0  # in a drain
 
 
 class Draining(NotStored):
@@ -238,9 +240,9 @@ class Runtime:
         await self.supervisor.stop_all()
         await self.routines.stop()
         closing = [socket.close_now(CloseCode.RESTARTING) for socket in list(self.sockets)]
-        await asyncio.gather(*closing, self.audit_queue.join(), return_exceptions=True)
-        await asyncio.gather(*self._opening.values(), return_exceptions=True)
-        await asyncio.gather(*self.requests, return_exceptions=True)
+        await _finish(*closing, self.audit_queue.join())
+        await _finish(*self._opening.values())
+        await _finish(*self.requests)
         await self.loop.run_in_executor(None, self.writer.close)
         await asyncio.sleep(0)  # the writer's last reports
         self.sessions.clear()
@@ -250,6 +252,14 @@ class Runtime:
             log.exception("Sessions could not be released; they come back paused")
         if self.servers is not None:
             await self.servers.close()
+
+
+async def _finish(*work: Awaitable[Any]) -> None:
+    """Wait until work is done, but not for long.
+
+    A client that does not listen or a query that hangs must not keep sessions from being handed on.
+    """
+    await asyncio.wait([asyncio.gather(*work, return_exceptions=True)], timeout=FINISH_S)
 
 
 _current: Runtime | None = None

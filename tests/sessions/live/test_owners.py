@@ -19,6 +19,7 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError, connection
 
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session import loading
 from rehab.sessions.log import SessionEvent, Step
@@ -262,6 +263,19 @@ async def test_one_broken_session_keeps_no_other_from_coming_back(place, elsewhe
 
 
 # --- drain ----------------------------------------------------------------------------------------
+
+
+async def test_a_client_that_does_not_listen_keeps_no_session_from_being_handed_on(
+    place, begun, monkeypatch
+):
+    monkeypatch.setattr(runtimes, "FINISH_S", 0.05)
+    session, runtime = await begun(place), runtimes.current()
+    listening = asyncio.Event()
+    monkeypatch.setattr(Socket, "close_now", lambda *_: listening.wait())
+    await place.tablet(session).watch()
+    await runtime.drain()
+    assert (await reread(session)).owner == owners.HANDED_ON
+    listening.set()
 
 
 async def test_the_drain_commits_and_closes_every_socket_with_4012(place, begun, stall):
