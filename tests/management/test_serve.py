@@ -1,18 +1,73 @@
-"""What `manage.py serve` refuses before anything is started."""
+"""`serve` on a machine that has nothing yet: a real process, a real socket, a clean end."""
 
 from __future__ import annotations
 
+import re
+import signal
 import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
 
 import pytest
 from django.core.management import CommandError, call_command
 
-from rehab.management.commands import serve
+from rehab.management.commands import serve as command
+from tests.support.servers import ROOT, clean_environment, serve
+
+pytestmark = pytest.mark.server
+
+
+@pytest.fixture(params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
+def server(request, tmp_path):
+    with serve(tmp_path, "--server", request.param, new_machine=True) as running:
+        yield running
+
+
+def get(port: int, path: str) -> tuple[int, str]:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=20) as answer:
+        return answer.status, answer.read().decode()
+
+
+def test_a_new_machine_serves_tells_its_password_and_ends_clean(server):
+    port, said, process = server.port, server.said, server.process
+    assert f"http://127.0.0.1:{port}/" in said
+    assert re.search(r"as 'pt' with the password (\w{4}-){3}\w{4}", said)
+    status, page = get(port, "/")
+    assert (status, "GARRY" in page) == (200, True)
+    assert get(port, "/static/css/shared/tokens.css")[0] == 200
+    assert "Sign in" in get(port, "/admin/")[1]
+    with pytest.raises(urllib.error.HTTPError, match="404"):
+        get(port, "/nowhere")
+    process.send_signal(signal.SIGINT)
+    assert process.wait(15) == 0
+    assert "Traceback" not in process.stdout.read()
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind(("127.0.0.1", port))
+
+
+def test_a_port_that_is_taken_is_named_with_the_cure(tmp_path):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        result = subprocess.run(
+            [sys.executable, "manage.py", "serve"],
+            cwd=ROOT,
+            env=clean_environment(tmp_path, port),
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+    assert result.returncode == 1
+    assert re.search(r"choose another port: GARRY_PORT=\d+ make run", result.stderr)
 
 
 def test_several_servers_begin_only_where_all_their_ports_are_free(monkeypatch):
-    monkeypatch.setattr(serve, "check_sharing", lambda _: None)
-    monkeypatch.setattr(serve, "prepare_database", lambda: pytest.fail("begun"))
+    monkeypatch.setattr(command, "check_sharing", lambda _: None)
+    monkeypatch.setattr(command, "prepare_database", lambda: pytest.fail("begun"))
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
