@@ -238,13 +238,14 @@ class Detector:
 
     def _find_patience(self) -> None:
         """Find how many samples may wait, and for which force under each foot."""
-        is_busy = self._clock.is_holding or any(leg.pending for leg in self._legs)
-        self._patience = 0 if is_busy else self._longest_wait
+        is_busy = self._clock.is_holding
         self._feet = []
         for leg in self._legs:
+            is_busy = is_busy or bool(leg.pending)
             patience = leg.contacts.find_patience(self._samples.end)
             force = leg.buffer.rows[FORCE]
             self._feet.append((force, patience.least_n, patience.most_n, patience))
+        self._patience = 0 if is_busy else self._longest_wait
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk
