@@ -31,9 +31,9 @@ class SampleBuffer:
         self.first = 0  # the oldest sample that is still there
         self.filled = 0  # how many samples are there, with those that wait
         self.layout = ChannelLayout(legs)
-        wide = len(self.layout.order)
-        table = np.full((wide, 3 * keep), np.nan)
-        middle = self.layout.time_rows[wide]
+        self._room, self._wide = 3 * keep, len(self.layout.order)
+        table = np.full((self._wide, self._room), np.nan)
+        middle = self.layout.time_rows[self._wide]
         tables = [table] if legs == 1 else [table[middle::-1], table[middle:]]
         self.legs = [LegBuffer(self, leg) for leg in tables]
         self._table = table
@@ -65,10 +65,11 @@ class SampleBuffer:
         TypeError, ValueError
             For channels of another shape; none waits then.
         """
-        if self.filled + count > self._table.shape[1]:
+        if self.filled + count > self._room:
             self._make_room()
-        begin, end = self.filled, self.filled + count
-        if rows == len(self._table):
+        begin = self.filled
+        end = begin + count
+        if rows == self._wide:
             self._has_seldom = True
         elif self._has_seldom:
             self._table[:, begin:end] = np.nan
