@@ -126,7 +126,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             "rate_hz": rate_hz,
             "mass_kg": mass_kg,
             "look_ahead_s": options.look_ahead,
-            "strides": [asdict(stride) for stride in strides],
+            "strides": [stride._asdict() for stride in strides],
             "check": asdict(check),
         }
         print(json.dumps(found, allow_nan=False))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from rehab.gait.signals.buffer import SampleBuffer
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import FrameClock, read_frames
+from rehab.gait.signals.samples import FORCE
 from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import Stride
 
@@ -89,13 +91,12 @@ class Detector:
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=len(sides))
         self._layout = self._samples.layout
         self._longest_chunk = int(LONGEST_CHUNK_S * rate_hz)
-        self._waiting: list[Floats] = []  # tables of the same rows that are not looked at yet
+        self._rows = 0  # of the samples that wait
         self._numbers: list[Floats] = []  # and their frame numbers, where these are used
-        self._count = self._rows = 0  # samples that wait, and rows of the newest table
         self._longest_wait = int(LONGEST_WAIT_S * rate_hz)
         self._patience = 0  # how many samples may wait
-        # Rows of both feet's forces, and for which forces samples may wait.
-        self._feet: list[tuple[int, float, float, Patience]] = []
+        # Both feet's forces, and for which of these samples may wait.
+        self._feet: list[tuple[Floats, float, float, Patience]] = []
         self._legs = [
             LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
@@ -116,32 +117,66 @@ class Detector:
     def _feed(
         self,
         names: Sequence[str],
-        channels: Sequence[ArrayLike | None],
+        channels: Sequence[Any],
         frame: ArrayLike | None = None,
     ) -> list[Stride]:
         """Add samples of the named channels, the first of which is the time."""
-        table = self._layout.read(names, channels)
-        rows, count = table.shape
-        numbers = None if frame is None else read_frames(frame, count)
-        if not count:
-            return []
         strides: list[Stride] = []
-        if rows != self._rows:  # other channels are sent than were before
-            strides, table = self._change_rows(table)
-        if numbers is not None and not isinstance(self._clock, FrameClock):
-            strides += self._begin_to_count(numbers)
-        if isinstance(self._clock, FrameClock):
-            self._numbers.append(read_frames(None, count) if numbers is None else numbers)
-        self._waiting.append(table)
-        self._count += count
-        if self._count <= self._patience:
-            for row, least_n, most_n, patience in self._feet:
-                goes_on = least_n <= table.item(row, -1) <= most_n
-                if not (goes_on or patience.lasts(self._count, table[row])):
+        count = self._write(channels) if frame is None else 0
+        if not count:
+            strides, count = self._read(names, channels, frame)
+            if not count:
+                return strides
+        samples = self._samples
+        newest = samples.filled - 1
+        waiting = samples.first + samples.filled - samples.end
+        if waiting <= self._patience:
+            for force, least_n, most_n, patience in self._feet:
+                goes_on = least_n <= force.item(newest) <= most_n
+                if not (goes_on or patience.lasts(waiting, force[newest + 1 - count : newest + 1])):
                     break
             else:
                 return strides
         return strides + self._look()
+
+    def _write(self, channels: Sequence[Any]) -> int:
+        """Let samples wait and return how many, 0 for those that have to be read."""
+        usual = self._layout.pick(channels)
+        if usual is None or len(usual) != self._rows or isinstance(self._clock, FrameClock):
+            return 0
+        try:
+            count = len(channels[0])
+            if count > self._longest_chunk:
+                return 0
+            self._samples.write(self._rows, usual, count)
+        except (TypeError, ValueError):  # of different lengths, as a rule
+            return 0
+        return count
+
+    def _read(
+        self, names: Sequence[str], channels: Sequence[Any], frame: ArrayLike | None
+    ) -> tuple[list[Stride], int]:
+        """Read any samples; return strides that end, and how many samples wait now."""
+        table = self._layout.read(names, channels)
+        count = table.shape[1]
+        numbers = None if frame is None else read_frames(frame, count)
+        if not count:
+            return [], 0
+        strides: list[Stride] = []
+        if numbers is not None and not isinstance(self._clock, FrameClock):
+            strides = self._begin_to_count(numbers)
+        if len(table) != self._rows:  # other channels are sent than were before
+            ended, table = self._change_rows(table)
+            strides += ended
+        is_long = table.shape[1] > self._longest_chunk
+        if is_long:
+            strides += self._look()
+        if isinstance(self._clock, FrameClock):
+            self._numbers.append(read_frames(None, count) if numbers is None else numbers)
+        if is_long:
+            return strides + self._place(table), 0
+        self._samples.write(self._rows, table, table.shape[1])
+        return strides, count
 
     def _change_rows(self, table: Floats) -> tuple[list[Stride], Floats]:
         """Look at what waits, and return its strides and a table with the rows that are used now.
@@ -151,7 +186,8 @@ class Detector:
         strides, held = self._look(), self._clock.finish()
         self._patience = 0
         if held is not None:
-            self._waiting, table = [self._layout.widen(held)], self._layout.widen(table)
+            widen = self._layout.widen
+            table = np.concatenate((widen(held), widen(table)), axis=1)
         self._rows = len(table)
         return strides, table
 
@@ -160,7 +196,7 @@ class Detector:
 
         In the middle of a walk they begin with a chunk that has all of them.
         """
-        is_first = not (self._samples.end or self._waiting or self._clock.is_holding)
+        is_first = not (self._samples.filled or self._clock.is_holding)
         if not is_first and not np.isfinite(numbers).all():
             return []
         strides = self._settle()
@@ -174,10 +210,23 @@ class Detector:
 
     def _look(self) -> list[Stride]:
         """Return the strides that end in the samples that wait."""
-        tables, self._waiting, self._count = self._waiting, [], 0
-        if not tables:
+        samples, clock, start = self._samples, self._clock, self._samples.end
+        if not samples.waiting:
             return []
-        table = tables[0] if len(tables) == 1 else np.concatenate(tables, axis=1)
+        is_even = (
+            isinstance(clock, SampleClock)
+            and samples.waiting <= self._longest_chunk
+            and clock.follow(samples.waiting_times())
+        )
+        if not is_even:
+            return self._place(samples.take(self._rows))
+        samples.accept()
+        strides = self._detect(start, samples.end)
+        self._find_patience()
+        return strides
+
+    def _place(self, table: Floats) -> list[Stride]:
+        """Return the strides that end in samples, once these are put to when they were taken."""
         row, clock = self._layout.time_rows[len(table)], self._clock
         if isinstance(clock, FrameClock):
             numbers, self._numbers = np.concatenate(self._numbers), []
@@ -189,13 +238,14 @@ class Detector:
 
     def _find_patience(self) -> None:
         """Find how many samples may wait, and for which force under each foot."""
-        is_busy = self._clock.is_holding or any(leg.pending for leg in self._legs)
-        self._patience = 0 if is_busy else self._longest_wait
-        rows = self._layout.force_rows[self._rows]
+        is_busy = self._clock.is_holding
         self._feet = []
-        for row, leg in zip(rows, self._legs, strict=True):
+        for leg in self._legs:
+            is_busy = is_busy or bool(leg.pending)
             patience = leg.contacts.find_patience(self._samples.end)
-            self._feet.append((row, patience.least_n, patience.most_n, patience))
+            force = leg.buffer.rows[FORCE]
+            self._feet.append((force, patience.least_n, patience.most_n, patience))
+        self._patience = 0 if is_busy else self._longest_wait
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk

@@ -12,8 +12,7 @@ from rehab.gait.contacts.contact import Contact
 from rehab.gait.contacts.force_plate import ContactFinder
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import find_maximum, find_minimum
-from rehab.gait.signals.samples import FORCE, TIME
+from rehab.gait.signals.samples import FORCE
 from rehab.gait.stances.analysis import Stance, StanceAnalyzer
 from rehab.gait.stances.plausibility import FULL_LOAD, STANCE_MAX_S, STANCE_MIN_S
 from rehab.gait.strides import Flag, RejectionReason, Stride
@@ -28,7 +27,7 @@ USUAL_STANCES = 9
 USUAL_MIN, USUAL_MAX = 0.6, 1.5  # of the median of the last stances
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class OtherLeg:
     """What the other leg and its plate add to a stride.
 
@@ -52,7 +51,7 @@ class OtherLeg:
     weight_ratio: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class OneLegStride:
     """A stride as measured on its own leg, before the other leg is considered.
 
@@ -239,10 +238,8 @@ class LegDetector:
             return None, None, None
         if left_index - 1 < self._samples.first:
             return None, None, None
-        times = self.buffer.channel(TIME, left_index - 1, contact.begin_index + 1)
-        steps = times[1:] - times[:-1]
-        shortest, longest = find_minimum(steps), find_maximum(steps)
-        if not (stride_s > 0 and shortest > 0 and longest <= LONGEST_GAP_S):
+        stop = contact.begin_index + 1
+        if not (stride_s > 0 and self._samples.goes_on(left_index - 1, stop, LONGEST_GAP_S)):
             return None, None, None
         return begin, stride_s, contact.begin_s - left_s
 

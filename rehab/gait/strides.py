@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 
 class GaitInputError(ValueError):
@@ -50,8 +50,7 @@ class Flag(StrEnum):
     LOST = "lost"  # samples are missing where A2 does not notice
 
 
-@dataclass(frozen=True, slots=True)
-class Stride:
+class Stride(NamedTuple):
     """A stance and the swing before it, complete at its terminal contact.
 
     Attributes

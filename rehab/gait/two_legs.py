@@ -108,8 +108,8 @@ class TwoLegDetector(Detector):
         this, is_whole = stride.contact, RejectionReason.CUT_OFF not in stride.reasons
         reasons: list[RejectionReason] = []
         flags: list[Flag] = []
-        known = _find_contacts(other, stride.index)
         since = max(this.begin_index, stride.index - leg.reliable_samples)
+        known = _find_contacts(other, stride.index, since)
         others = [c for c in known if c.begin_index < _end(this) and _end(c) > since]
         first = others[0] if others else None
         second = others[1] if len(others) == 2 else None
@@ -183,13 +183,16 @@ def _end(contact: Contact) -> float:
     return math.inf if contact.end_index is None else contact.end_index
 
 
-def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
-    """Return a leg's contacts as they were known at sample ``index``, whatever came later."""
-    contacts = []
-    for contact in leg.contacts.recent:
+def _find_contacts(leg: LegDetector, index: int, since: int) -> list[Contact]:
+    """Return a leg's contacts as they were known at sample ``index``, whatever came later.
+
+    Of those that ended until sample ``since`` only the last.
+    """
+    contacts: list[Contact] = []
+    for contact in reversed(leg.contacts.recent):
         end = contact.known_index
         if contact.begin_index > index:
-            break
+            continue
         if end is None or end > index:
             begin = max(contact.begin_index, index - leg.longest_chunk)
             peak_n = find_maximum(leg.buffer.channel(FORCE, begin, index + 1)) - contact.offset_n
@@ -198,7 +201,9 @@ def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
             if end is not None:
                 contact = replace(contact, end_index=None, end_s=None, known_index=None)  # noqa: PLW2901
         contacts.append(contact)
-    return contacts
+        if _end(contact) <= since:
+            break
+    return contacts[::-1]
 
 
 def _find_time(begin_s: float, end_s: float | None) -> float | None:

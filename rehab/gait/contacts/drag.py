@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, find_upper_median
+from rehab.gait.signals.filters import Floats, average, find_upper_median, is_finite
 
 # A foot that leaves unloads by 1 N/ms and more, and one that lands is loaded as fast; dragged, its
 # force rests.
@@ -50,7 +50,7 @@ def find_edge(
     # Where a drag rests, half of the samples exceed the least one.
     if 2 * np.count_nonzero(force_n >= zero_n + least_n) < min(level, 2 * width):
         return None
-    if not np.isfinite(force_n).all():
+    if not is_finite(force_n):
         return None
     mean = average(force_n, width)
     rests = np.abs(mean[:-width] - mean[width:]) < REST_N
@@ -100,9 +100,3 @@ def _find_last_above(values: Floats, level: float) -> int:
     """Return the index of the last value above a level, 0 without one."""
     above = np.flatnonzero(values > level)
     return int(above[-1]) if len(above) else 0
-
-
-def average(values: Floats, width: int) -> Floats:
-    """Return the means of each ``width`` neighbors, of which there are as many or more."""
-    means: Floats = np.convolve(values, np.full(width, 1 / width), "valid")
-    return means

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from rehab.gait.signals.filters import Floats, find_minimum
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class Patience:
     """While no valid stance can have ended in samples that wait.
 

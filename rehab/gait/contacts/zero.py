@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
 
-from rehab.gait.contacts.drag import QUIET_S, average
-from rehab.gait.signals.filters import Floats, find_minimum, find_upper_median
+from rehab.gait.contacts.drag import QUIET_S
+from rehab.gait.signals.filters import (
+    Floats,
+    average,
+    find_minimum,
+    find_upper_median,
+    is_finite,
+)
 
 OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
 OFFSET_SWINGS = 10
@@ -93,22 +98,16 @@ def _find_zero(swing: Floats) -> float:
     A part is a quarter; where all of them agree, it is the whole.
     """
     zero = find_finite_median(swing)
-    if zero - find_minimum(swing) <= QUIET_N:  # so that no part can be quieter
-        return zero
     quarter = max(1, len(swing) // 4)
-    if len(swing) >= 4 and math.isfinite(zero) and math.isfinite(swing.sum()):
-        quarters = swing[: 4 * quarter].reshape(4, quarter).copy()
-        quarters.partition(quarter // 2, axis=1)
-        middle = quarters[:, quarter // 2]
-        lowest = float(middle[middle.argmin()])
-        return lowest if zero - lowest > QUIET_N else zero
+    if np.count_nonzero(swing < zero - QUIET_N) <= quarter // 2 and is_finite(swing):
+        return zero  # no part has a lower median by so few
     lowest = min(find_finite_median(swing[n * quarter :][:quarter]) for n in range(4))
     return lowest if zero - lowest > QUIET_N else zero
 
 
 def find_finite_median(values: Floats) -> float:
     """Return the median of the finite values, infinity without one."""
-    if math.isfinite(values.sum()) or np.isfinite(values).all():
+    if is_finite(values):
         return find_upper_median(values)
     finite = values[np.isfinite(values)]
     return float(np.median(finite)) if len(finite) else np.inf

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from collections.abc import Sequence
 
-from rehab.gait.signals.filters import Floats
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rehab.gait.signals.filters import Floats, find_maximum, find_minimum
 from rehab.gait.signals.samples import TIME, ChannelLayout
+
+USUAL_MOST_S = 0.25  # between two samples
 
 
 class SampleBuffer:
@@ -23,10 +29,11 @@ class SampleBuffer:
         self.keep = keep
         self.end = 0
         self.first = 0  # the oldest sample that is still there
+        self.filled = 0  # how many samples are there, with those that wait
         self.layout = ChannelLayout(legs)
-        wide = len(self.layout.order)
-        table = np.full((wide, 3 * keep), np.nan)
-        middle = self.layout.time_rows[wide]
+        self._room, self._wide = 3 * keep, len(self.layout.order)
+        table = np.full((self._wide, self._room), np.nan)
+        middle = self.layout.time_rows[self._wide]
         tables = [table] if legs == 1 else [table[middle::-1], table[middle:]]
         self.legs = [LegBuffer(self, leg) for leg in tables]
         self._table = table
@@ -34,30 +41,92 @@ class SampleBuffer:
         self._has_seldom = False  # rows that were never sent stay NaN
         self._late = np.zeros(3 * keep)
         self._late_end = 0  # behind the newest sample that was late
+        self._time: Floats = table[middle]
+        self._judged = 0  # the times of samples before this one are looked at
+        self._even_from = 0  # from this one on they go on, by USUAL_MOST_S at most
+
+    @property
+    def waiting(self) -> int:
+        """How many samples were written that are not accepted yet."""
+        return self.filled - (self.end - self.first)
+
+    def write(self, rows: int, channels: Floats | Sequence[ArrayLike | None], count: int) -> None:
+        """Write samples behind the newest ones, where they wait to be accepted or taken.
+
+        Parameters
+        ----------
+        rows, channels
+            The rows of a table as ``ChannelLayout.read`` returns it, shape (rows, count).
+        count
+            How many samples, as many as are kept at most.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For channels of another shape; none waits then.
+        """
+        if self.filled + count > self._room:
+            self._make_room()
+        begin = self.filled
+        end = begin + count
+        if rows == self._wide:
+            self._has_seldom = True
+        elif self._has_seldom:
+            self._table[:, begin:end] = np.nan
+        self._parts[rows][:, begin:end] = channels
+        self.filled = end
+
+    def waiting_times(self) -> Floats:
+        """Return the times of the samples that wait, shape (n,), without copying."""
+        return self._time[self.end - self.first : self.filled]
+
+    def accept(self) -> None:
+        """Append the samples that wait, none of which came late."""
+        self.end = self.first + self.filled
+
+    def take(self, rows: int) -> Floats:
+        """Return the samples that wait, shape (rows, n), and let none wait any more."""
+        begin = self.end - self.first
+        table: Floats = self._parts[rows][:, begin : self.filled].copy()
+        self.filled = begin
+        return table
 
     def append(self, table: Floats, late_s: Floats | None = None) -> None:
         """Append samples as ``ChannelLayout.read`` returns them, shape (rows, samples).
 
-        ``late_s`` is by how much each came late, None where none did.
+        ``late_s`` is by how much each came late, None where none did. No others may wait.
         """
         rows, count = table.shape
-        begin = self.end - self.first
-        end = begin + count
-        if end > self._table.shape[1]:
-            self._table[:, : self.keep] = self._table[:, begin - self.keep : begin]
-            self._late[: self.keep] = self._late[begin - self.keep : begin]
-            self._late[self.keep :] = 0
-            self.first = self.end - self.keep
-            begin, end = self.keep, self.keep + count
-        if rows == len(self._table):
-            self._has_seldom = True
-        elif self._has_seldom:
-            self._table[:, begin:end] = np.nan
-        self._parts[rows][:, begin:end] = table
-        self.end += count
+        self.write(rows, table, count)
+        self.accept()
         if late_s is not None:
-            self._late[begin:end] = late_s
+            self._late[self.filled - count : self.filled] = late_s
             self._late_end = self.end
+
+    def _make_room(self) -> None:
+        """Move the samples that are kept, and those that wait, to the front of the table."""
+        end, waiting = self.end - self.first, self.waiting
+        self._table[:, : self.keep + waiting] = self._table[:, end - self.keep : self.filled]
+        self._late[: self.keep] = self._late[end - self.keep : end]
+        self._late[self.keep :] = 0
+        self.first = self.end - self.keep
+        self.filled = self.keep + waiting
+
+    def goes_on(self, start: int, stop: int, most_s: float = math.inf) -> bool:
+        """Return whether time goes on from sample to sample of ``start:stop``.
+
+        ``most_s`` is by how much at most [s], 0.25 or more.
+        """
+        if stop > self._judged:
+            if not self._steps_are(max(self._judged - 1, self.first), stop, USUAL_MOST_S):
+                self._even_from = stop
+            self._judged = stop
+        return start >= self._even_from or self._steps_are(start, stop, most_s)
+
+    def _steps_are(self, start: int, stop: int, most_s: float) -> bool:
+        times = self._time[start - self.first : stop - self.first]
+        steps_s = times[1:] - times[:-1]
+        return not len(steps_s) or (find_minimum(steps_s) > 0 and find_maximum(steps_s) <= most_s)
 
     def find_lateness(self, start: int, stop: int) -> Floats | None:
         """Return by how much samples ``start:stop`` came late [s], None where none did."""
@@ -73,7 +142,7 @@ class LegBuffer:
     def __init__(self, samples: SampleBuffer, table: Floats) -> None:
         self.samples = samples
         self._table: Floats = table
-        self._rows: list[Floats] = list(table)
+        self.rows: list[Floats] = list(table)  # of all samples, with those that wait
 
     def view(self, start: int, stop: int) -> Floats:
         """Return samples ``start:stop`` of all channels, shape (6, samples), without copying."""
@@ -84,7 +153,7 @@ class LegBuffer:
     def channel(self, row: int, start: int, stop: int) -> Floats:
         """Return samples ``start:stop`` of one channel, shape (samples,), without copying."""
         first = self.samples.first
-        return self._rows[row][start - first : stop - first]
+        return self.rows[row][start - first : stop - first]
 
     def find_crossing(self, row: int, index: int, level: float) -> float:
         """Return when a channel crossed a level between samples ``index - 1`` and ``index`` [s]."""

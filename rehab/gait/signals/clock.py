@@ -13,7 +13,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.filters import Floats, find_maximum
 from rehab.gait.strides import GaitInputError
 
 FIRST_SAMPLES = 64  # from which the period is known
@@ -47,6 +47,18 @@ class SampleClock:
     def is_holding(self) -> bool:
         """Whether samples are held back."""
         return self._held is not None
+
+    def follow(self, stamps: Floats) -> bool:
+        """Return whether all samples come evenly, so that their times are their stamps [s].
+
+        Those that do not are to be added.
+        """
+        if self._held is not None or self._period_s is None:
+            return False
+        if self._count_even(stamps) < len(stamps):
+            return False
+        self._extend(stamps.copy(), stamps.item(-1))
+        return True
 
     def add(self, table: Floats, row: int = 0) -> tuple[Floats, Floats | None]:
         """Return the samples whose times are known now, and by how much each was late.
@@ -108,16 +120,19 @@ class SampleClock:
                 else:
                     self._usual_s = self._period_s + _find_tolerance(self._period_s)
             return count
-        usual_s = self._usual_s
-        if not stamps.item(0) - self._stamp_s <= usual_s:
-            return 0
-        if count > 1:
-            steps = stamps[1:] - stamps[:-1]
-            if not steps.item(steps.argmax()) <= usual_s:
-                count = int(np.flatnonzero(~(steps <= usual_s))[0]) + 1
-                stamps = stamps[:count]
-        self._extend(stamps, stamps.item(-1))
+        count = self._count_even(stamps)
+        if count:
+            self._extend(stamps[:count], stamps.item(count - 1))
         return count
+
+    def _count_even(self, stamps: Floats) -> int:
+        """Return how many samples come evenly, once the period is known; 0 for a gap."""
+        if not stamps.item(0) - self._stamp_s <= self._usual_s:
+            return 0
+        steps_s = stamps[1:] - stamps[:-1]
+        if not len(steps_s) or find_maximum(steps_s) <= self._usual_s:
+            return len(stamps)
+        return _first(~(steps_s <= self._usual_s)) + 1
 
     def _extend(self, times: Floats, stamp_s: float) -> None:
         self._stamp_s = stamp_s

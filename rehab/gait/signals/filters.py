@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,12 +92,29 @@ def differentiate(values: Floats, rate_hz: float) -> Floats:
         Of the samples.
     """
     slope = np.empty_like(values)
-    slope[2:-2] = np.correlate(values, _FIVE_POINTS * (rate_hz / 12), "valid")
+    slope[2:-2] = np.correlate(values, _find_five_points(rate_hz), "valid")
     first, second, third = values[:3].tolist()
     slope[0], slope[1] = (second - first) * rate_hz, (third - first) * (rate_hz / 2)
     third, second, first = values[-3:].tolist()
     slope[-2], slope[-1] = (first - third) * (rate_hz / 2), (first - second) * rate_hz
     return slope
+
+
+@cache
+def _find_five_points(rate_hz: float) -> Floats:
+    return _FIVE_POINTS * (rate_hz / 12)
+
+
+def average(values: Floats, width: int) -> Floats:
+    """Return the means of each ``width`` neighbors, of which there are as many or more."""
+    means: Floats = np.correlate(values, find_shares(width), "valid")
+    return means
+
+
+@cache
+def find_shares(width: int) -> Floats:
+    """Return the weights of a mean of ``width`` values."""
+    return np.full(width, 1 / width)
 
 
 def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
@@ -120,6 +138,12 @@ def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
 # Of a few hundred values: numpy's own reductions cost four times as much, its median five times.
 
 
+def is_finite(values: Floats) -> bool:
+    """Return whether all values are finite, of shape (n,)."""
+    # Squares of very large values are not, though.
+    return math.isfinite(values.dot(values)) or bool(np.isfinite(values).all())
+
+
 def find_maximum(values: Floats) -> float:
     """Return the largest value, NaN if there is a NaN."""
     return values.item(values.argmax())
@@ -141,10 +165,9 @@ def find_minimum(values: Floats) -> float:
 
 def find_upper_median(values: Floats) -> float:
     """Return the median, of an even number of values the upper one of the middle two."""
-    place = len(values) // 2
     ordered = values.copy()
-    ordered.partition(place)
-    return ordered.item(place)
+    ordered.sort()  # in vectors, unlike a partition
+    return ordered.item(len(values) // 2)
 
 
 def find_last(found: NDArray[np.bool_]) -> int:

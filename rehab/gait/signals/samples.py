@@ -54,10 +54,14 @@ class ChannelLayout:
             len(self._narrow): slice(first, first + len(self._narrow)),
         }
         self.time_rows = {rows: rows // 2 if legs == 2 else 0 for rows in self.rows}
-        self.force_rows = {
-            rows: (time - 1, time + 1) if legs == 2 else (time + 1,)
-            for rows, time in self.time_rows.items()
-        }
+
+    def pick(self, channels: Sequence[ArrayLike | None]) -> tuple[ArrayLike | None, ...] | None:
+        """Return the channels of a narrow table in the order of its rows; None if more are sent."""
+        for place in self._seldom:
+            if channels[place] is not None:
+                return None
+        picked: tuple[ArrayLike | None, ...] = self._pick(channels)
+        return picked
 
     def read(self, names: Sequence[str], channels: Sequence[ArrayLike | None]) -> Floats:
         """Return a chunk's channels as a table; a single number is one sample.
@@ -78,12 +82,10 @@ class ChannelLayout:
         GaitInputError
             For channels of different lengths or with more than one dimension.
         """
-        for place in self._seldom:
-            if channels[place] is not None:
-                break
-        else:
+        usual = self.pick(channels)
+        if usual is not None:
             try:
-                table: Floats = np.array(self._pick(channels), np.float64)
+                table: Floats = np.array(usual, np.float64)
             except (TypeError, ValueError):  # of different lengths, as a rule
                 pass
             else:

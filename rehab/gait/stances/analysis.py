@@ -14,14 +14,14 @@ from rehab.gait.signals.filters import (
     ZeroPhaseFilter,
     find_last,
     find_maximum,
-    find_minimum,
+    is_finite,
 )
-from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME
+from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, POSITION, TIME
 from rehab.gait.stances.continuity import (
     check_fills,
     check_samples,
     check_steps,
-    read_channel,
+    read_moving,
 )
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
 from rehab.gait.stances.lag_watch import (
@@ -34,6 +34,7 @@ from rehab.gait.stances.lag_watch import (
     find_moment_lag,
 )
 from rehab.gait.stances.plausibility import (
+    LEVER_FROM,
     STANCE_MAX_S,
     STANCE_MIN_S,
     check_force,
@@ -59,7 +60,7 @@ FORWARD_HZ = 20.0
 LATE_FROM = 0.72  # of stance; there moment and force have their late peaks
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Stance:
     """What was measured of a stance. Without a push-off there is a reason.
 
@@ -136,27 +137,21 @@ class StanceAnalyzer:
         if end - begin > 1.2 * STANCE_MAX_S * self._rate_hz:
             return Stance([RejectionReason.LONG_STANCE])
         reasons = [] if contact.is_onset_seen else [RejectionReason.FORCE_LOST]
-        window, steps_s, before = self._find_window(begin, stop)
-        if not find_minimum(steps_s[before:]) > 0:
+        samples = self._buffer.samples
+        if not samples.goes_on(begin, stop):
             return Stance([*reasons, RejectionReason.TIME_BACKWARDS])
-        late_s = self._buffer.samples.find_lateness(begin - before, stop)
-        time = window[TIME, before:]
+        window, before = self._find_window(begin, stop)
+        late_s = samples.find_lateness(begin - before, stop)
         critical_s = begin_s + HARMFUL_FROM * (end_s - begin_s)
-        critical = before + max(1, int(time.searchsorted(critical_s)))
-        clock = self._clock.judge(window, steps_s, late_s, before, critical)
+        critical = before + max(1, int(window[TIME, before:].searchsorted(critical_s)))
+        clock = self._clock.judge(window, late_s, before, critical)
         reasons += clock.reasons
-        channels = read_channel(window[MOMENT]), read_channel(window[ANGLE])
+        moving = read_moving(window)
         reasons += check_samples(
-            time.item(-1) - time.item(0),
-            channels,
-            before,
-            clock,
-            self._rate_hz,
-            self._mass_kg,
-            self._is_velocity,
+            moving, before, clock, self._rate_hz, self._mass_kg, self._is_velocity
         )
         if not self._is_velocity:
-            late = window[MOMENT : ANGLE + 1, critical : before + end - begin + 1]
+            late = moving.steps[:, critical : before + end - begin]
             reasons += check_fills(late, self._rate_hz)
         if end_s - begin_s < STANCE_MIN_S:
             reasons.append(RejectionReason.SHORT_STANCE)
@@ -168,11 +163,10 @@ class StanceAnalyzer:
         )
         is_sure = late_s is None and contact.known_index == end
         self._watch_angle((end, end_s) if is_sure else None, end)
-        is_known = all(math.isfinite(channel.jump) for channel in channels)
-        bridged, gap_s = bridge_gaps(window, clock, critical, is_known)
+        bridged, gap_s = bridge_gaps(window, clock, moving.is_known)
         clean = None if bridged is None else decimate(bridged, self._decimation)
         push_off, a2_sd, flags = None, None, list(clock.flags)
-        if clean is not None and clean[TIME, -1] - clean[TIME, 0] < LONGEST_S:
+        if clean is not None and clean.item(TIME, -1) - clean.item(TIME, 0) < LONGEST_S:
             stance = self._resampler.resample(
                 clean[: ANGLE + 1], begin_s, end_s, clean[-1] if len(clean) > ANGLE + 1 else None
             )
@@ -184,7 +178,7 @@ class StanceAnalyzer:
         if push_off is None and not reasons:
             reasons.append(RejectionReason.NO_PUSH_OFF)
         return Stance(
-            list(dict.fromkeys(reasons)),
+            list(dict.fromkeys(reasons)) if reasons else reasons,
             push_off,
             self._find_propulsion(window),
             self._find_position(contact),
@@ -209,8 +203,12 @@ class StanceAnalyzer:
     ) -> None:
         """Append what a push-off is like."""
         reasons += check_steps(stance, push_off, gap_s, self._is_velocity)
-        reasons += check_lever(stance, contact.offset_n, self._weight_n)
-        reasons += self._check_lags(stance, contact.offset_n)
+        half = stance.index(0.5)
+        force_n = stance.signals[0, half : stance.end + 1] - contact.offset_n
+        moment_nm = stance.signals[1, half : stance.end + 1]
+        toes, late = stance.index(LEVER_FROM) - half, stance.index(LATE_FROM) - half
+        reasons += check_lever(force_n, moment_nm, toes, self._weight_n)
+        reasons += self._check_lags(force_n[late:], moment_nm[late:])
         reasons += check_push_off(push_off, stance, self._is_velocity)
         if not self._is_velocity and has_clonus(push_off, stance):
             flags.append(Flag.CLONUS)
@@ -225,20 +223,14 @@ class StanceAnalyzer:
             return
         around = int((AROUND_S + 0.1) * self._rate_hz)
         first, stop = last[0] - around, min(last[0] + around, end)
-        if first < self._buffer.samples.first:
-            return
-        time, angle = (self._buffer.channel(row, first, stop) for row in (TIME, ANGLE))
-        if find_minimum(time[1:] - time[:-1]) > 0:
+        buffer = self._buffer
+        if first >= buffer.samples.first and buffer.samples.goes_on(first, stop):
+            time, angle = buffer.channel(TIME, first, stop), buffer.channel(ANGLE, first, stop)
             self._angle_lag.add(self._braking.find(time, angle, last[1]))
 
-    def _check_lags(self, stance: ResampledStance, offset_n: float) -> list[RejectionReason]:
-        """Return which channels are out of time by this stride and those before."""
-        late = slice(stance.index(LATE_FROM), stance.end + 1)
-        self._moment_lag.add(
-            find_moment_lag(
-                stance.signals[0, late] - offset_n, stance.signals[1, late], stance.rate_hz
-            )
-        )
+    def _check_lags(self, force_n: Floats, moment_nm: Floats) -> list[RejectionReason]:
+        """Return which channels are out of time by this stride's late stance and those before."""
+        self._moment_lag.add(find_moment_lag(force_n, moment_nm, self._even_hz))
         reasons = []
         if self._moment_lag.is_off:
             reasons.append(RejectionReason.MOMENT_OUT_OF_STEP)
@@ -246,24 +238,23 @@ class StanceAnalyzer:
             reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
         return reasons
 
-    def _find_window(self, begin: int, stop: int) -> tuple[Floats, Floats, int]:
-        """Return the samples from swing to ``stop``, their steps of time, and how many come before.
+    def _find_window(self, begin: int, stop: int) -> tuple[Floats, int]:
+        """Return the samples from swing to ``stop``, and how many come before the stance.
 
         Before the stance come as many as follow each other closely enough to be used.
         """
         before = min(self._before, begin)
         window = self._buffer.view(begin - before, stop)
-        steps_s = window[TIME, 1:] - window[TIME, :-1]
-        swing_s = steps_s[:before]
-        if before and not (find_minimum(swing_s) > 0 and find_maximum(swing_s) <= BEFORE_S):
+        if not self._buffer.samples.goes_on(begin - before, begin + 1, BEFORE_S):
+            swing_s = np.diff(window[TIME, : before + 1])
             cut = find_last(~((swing_s > 0) & (swing_s <= BEFORE_S))) + 1
-            window, steps_s, before = window[:, cut:], steps_s[cut:], before - cut
-        return window, steps_s, before
+            window, before = window[:, cut:], before - cut
+        return window, before
 
     def _find_propulsion(self, window: Floats) -> float | None:
-        forward = window[FORWARD : FORWARD + 1]
-        if not math.isfinite(forward[0, -1]) or not np.isfinite(forward).all():
+        if not math.isfinite(window.item(FORWARD, -1)) or not is_finite(window[FORWARD]):
             return None
+        forward = window[FORWARD : FORWARD + 1]
         decimated = decimate(forward, self._decimation)
         if decimated is None:
             return None

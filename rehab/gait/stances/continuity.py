@@ -6,7 +6,8 @@ These are faults of sensors and of their connection; physiological limits are ch
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -44,31 +45,39 @@ CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
-class StanceChannel(NamedTuple):
-    """A channel around a stance, and how it changes from sample to sample.
+class Moving(NamedTuple):
+    """Moment and angle around a stance, and how they change from sample to sample.
 
     Attributes
     ----------
     values, steps
-        Shape (n,), and their differences, shape (n - 1,).
-    jump
-        The largest of these; not finite where values are missing.
+        Shape (2, n), and their differences, shape (2, n - 1).
+    jumps
+        The largest of these of each; not finite where values are missing.
     """
 
     values: Floats
     steps: Floats
-    jump: float
+    jumps: tuple[float, float]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether no value is missing."""
+        return math.isfinite(sum(self.jumps))
 
 
-def read_channel(values: Floats) -> StanceChannel:
-    """Return a channel of shape (n,) and how it changes."""
-    steps = values[1:] - values[:-1]
-    return StanceChannel(values, steps, max(find_maximum(steps), -find_minimum(steps)))
+def read_moving(window: Floats) -> Moving:
+    """Return moment and angle of a window, shape (4 or more, n), and how they change."""
+    values = window[MOMENT : ANGLE + 1]
+    steps = values[:, 1:] - values[:, :-1]
+    most, least = steps.argmax(axis=1).tolist(), steps.argmin(axis=1).tolist()
+    moment = max(steps.item(0, most[0]), -steps.item(0, least[0]))
+    angle = max(steps.item(1, most[1]), -steps.item(1, least[1]))
+    return Moving(values, steps, (moment, angle))
 
 
 def check_samples(
-    taken_s: float,
-    channels: Sequence[StanceChannel],
+    moving: Moving,
     stance: int,
     clock: StanceClock,
     rate_hz: float,
@@ -79,9 +88,7 @@ def check_samples(
 
     Parameters
     ----------
-    taken_s
-        From the first to the last sample of the stance.
-    channels
+    moving
         Moment and angle.
     stance
         The sample at which the stance begins.
@@ -94,20 +101,21 @@ def check_samples(
     """
     reasons = []
     count = len(clock.kinetics_s) - stance
-    if clock.lost_s <= GAP_S and abs((count - 1) / (taken_s * rate_hz) - 1) > RATE_TOLERANCE:
+    samples = clock.taken_s * rate_hz
+    if clock.lost_s <= GAP_S and abs((count - 1) / samples - 1) > RATE_TOLERANCE:
         reasons.append(RejectionReason.RATE)
-    for channel, frozen_s, scale, (at_once, by_time), reason in (
-        (channels[0], MOMENT_FROZEN_S, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
+    for row, frozen_s, scale, (at_once, by_time), reason in (
+        (0, MOMENT_FROZEN_S, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
         (
-            channels[1],
+            1,
             ANGLE_FROZEN_S,
             1.0,
             VELOCITY_JUMP if is_velocity else ANGLE_JUMP,
             RejectionReason.ANGLE_LOST,
         ),
     ):
-        values, moved = channel.values[stance:], channel.steps[stance:]
-        if not channel.jump <= scale * (at_once + by_time / rate_hz):
+        values, moved = moving.values[row, stance:], moving.steps[row, stance:]
+        if not moving.jumps[row] <= scale * (at_once + by_time / rate_hz):
             time = clock.kinetics_s[stance:]
             known = np.flatnonzero(np.isfinite(values))
             if len(known) < count:
@@ -125,22 +133,24 @@ def check_samples(
     return reasons
 
 
-def check_fills(late: Floats, rate_hz: float) -> list[RejectionReason]:
+def check_fills(steps: Floats, rate_hz: float) -> list[RejectionReason]:
     """Return in which channels of a late stance a straight line stands for the walker's curve.
 
     Parameters
     ----------
-    late
-        Moment and angle from where a fault harms A2 until terminal contact, shape (2, n).
+    steps
+        By how much moment and angle change from sample to sample, from where a fault harms A2 until
+        terminal contact, shape (2, n).
     rate_hz
         Of the samples.
     """
     least = max(3, round(STRAIGHT_S * rate_hz) - 1)
-    limits = STRAIGHT_TO / rate_hz**2
-    # So long a line has one of these samples in it.
-    if not (np.abs(_find_bends(late, least - 1, least)) <= limits).any():
+    limits = _find_straight(rate_hz)
+    # So long a line has one of these bends in it.
+    bends = steps[:, least::least] - steps[:, least - 1 : -1 : least]
+    if not np.count_nonzero(np.abs(bends) <= limits):
         return []
-    straight = np.abs(_find_bends(late, 0, 1)) <= limits
+    straight = np.abs(steps[:, 1:] - steps[:, :-1]) <= limits
     reasons = (RejectionReason.MOMENT_LOST, RejectionReason.ANGLE_LOST)
     return [
         reason
@@ -149,12 +159,9 @@ def check_fills(late: Floats, rate_hz: float) -> list[RejectionReason]:
     ]
 
 
-def _find_bends(rows: Floats, first: int, step: int) -> Floats:
-    """Return by how much rows bend around each ``step``-th sample, from ``first + 1``."""
-    stop = rows.shape[1]
-    after, middle = rows[:, first + 2 :: step], rows[:, first + 1 : stop - 1 : step]
-    bends: Floats = after - 2 * middle + rows[:, first : stop - 2 : step]
-    return bends
+@cache
+def _find_straight(rate_hz: float) -> Floats:
+    return STRAIGHT_TO / rate_hz**2
 
 
 def _find_longest_run(found: NDArray[np.bool_]) -> int:
@@ -192,23 +199,30 @@ def check_steps(
     moment = push_off.moment_nm_kg[first:last]
     rough = stance.signals[MOMENT - FORCE, first:last] / push_off.mass_kg - moment
     steps = np.abs(rough[apart:] - rough[:-apart])
-    if _is_discontinuous(
-        steps, walking * (find_maximum(moment) - find_minimum(moment)), *MOMENT_STEP
-    ):
+    if _is_discontinuous(steps, moment, walking, *MOMENT_STEP):
         reasons.append(RejectionReason.MOMENT_LOST)
-    bends = np.abs(angle[2 * apart :] - 2 * angle[apart:-apart] + angle[: -2 * apart])
-    if not is_velocity and _is_discontinuous(
-        bends, walking * (find_maximum(angle) - find_minimum(angle)), *ANGLE_BEND
-    ):
-        reasons.append(RejectionReason.ANGLE_LOST)
+    if not is_velocity:
+        bends = angle[2 * apart :] - 2 * angle[apart:-apart]
+        bends += angle[: -2 * apart]
+        if _is_discontinuous(np.abs(bends), angle, walking, *ANGLE_BEND):
+            reasons.append(RejectionReason.ANGLE_LOST)
     return reasons
 
 
 def _is_discontinuous(
-    found: Floats, walking: float, by_walking: float, at_once: float, by_noise: float
+    found: Floats,
+    curve: Floats,
+    walking: float,
+    by_walking: float,
+    at_once: float,
+    by_noise: float,
 ) -> bool:
-    """Return whether the largest change exceeds what walking and noise can make."""
-    highest, limit = find_maximum(found), by_walking * walking + at_once
+    """Return whether the largest change of a curve exceeds what walking and noise can make."""
+    highest = find_maximum(found)
+    if not highest > at_once:
+        return False
+    walking *= find_maximum(curve) - find_minimum(curve)
+    limit = by_walking * walking + at_once
     return highest > limit and highest > limit + by_noise * find_upper_median(found)
 
 
@@ -222,9 +236,11 @@ def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
 
 def _is_frozen(values: Floats, steps: Floats, longest: float) -> bool:
     """Return whether a channel repeats one value, not zero, for more than ``longest`` samples."""
-    if np.count_nonzero(steps) == len(steps):
+    least = max(2, math.ceil(longest))
+    some = steps[least - 1 :: least]  # so long a rest has one of these in it
+    if np.count_nonzero(some) == len(some):
         return False
     still = steps == 0
     still &= values[1:] != 0
     edges = np.concatenate(([-1], np.flatnonzero(~still), [len(still)]))
-    return bool(np.diff(edges).max() - 1 >= max(2, longest))
+    return bool(np.diff(edges).max() - 1 >= least)

@@ -79,7 +79,7 @@ def compute_ankle_velocity(foot_rad_s: ArrayLike, shank_rad_s: ArrayLike) -> Flo
     return foot - np.asarray(shank_rad_s, dtype=np.float64)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class PushOff:
     """Ankle moment, angle, velocity and power of a stance, filtered, and the peak of power.
 
@@ -111,12 +111,12 @@ class PushOff:
     @property
     def a2_moment_nm_kg(self) -> float:
         """Moment where the power peaks."""
-        return float(self.moment_nm_kg[self.peak])
+        return self.moment_nm_kg.item(self.peak)
 
     @property
     def a2_velocity_rad_s(self) -> float:
         """Angular velocity where the power peaks."""
-        return float(self.velocity_rad_s[self.peak])
+        return self.velocity_rad_s.item(self.peak)
 
 
 class PushOffAnalyzer:
@@ -164,7 +164,7 @@ class PushOffAnalyzer:
         last_s = stance.first_s + (count - 1) / self._rate_hz
         moment, angle = self._smooth(signals, last_s - stance.end_s)
         velocity = angle if self._is_velocity else differentiate(angle, self._rate_hz)
-        moment = moment / self._mass_kg
+        moment /= self._mass_kg
         power = moment * velocity
         peak = begin + int(power[begin : end + 1].argmax())
         if 0 < peak < count - 1:
@@ -194,24 +194,24 @@ class PushOffAnalyzer:
         np.subtract(2 * signals[:, :1], signals[:, n:0:-1], out=before)
         wide[:, : reach - n] = before[:, :1]
         wide[:, reach:end] = signals
-        wide[0, end:] = signals[0, -1]
+        wide[0, end:] = signals.item(0, -1)
         left = count - min(round(known_s * self._rate_hz), count // 2)
         braking = self._find_velocity(angle[:left]) / STOP_S
         # The slope is that of half its stretch ago, for as much of it as the ankle brakes already.
         late_s = 0.0 if self._is_velocity else min(max(known_s, 0.0), SLOPE_S) / 2
-        velocity = self._beyond_s[:n] * -braking
-        velocity += self._find_velocity(angle) - braking * late_s
-        np.maximum(velocity, -TURN_S * braking, out=velocity)
+        after = wide[1, end : end + n]
+        np.multiply(self._beyond_s[:n], -braking, out=after)
+        after += self._find_velocity(angle) - braking * late_s
+        np.maximum(after, -TURN_S * braking, out=after)
         if not self._is_velocity:
-            velocity /= self._rate_hz
-            velocity[0] += angle[-1]
-            velocity = np.add.accumulate(velocity)
-        wide[1, end : end + n] = velocity
-        wide[1, end + n :] = velocity[-1]
+            after /= self._rate_hz
+            after[0] += angle.item(-1)
+            np.add.accumulate(after, out=after)
+        wide[1, end + n :] = after.item(-1)
         return self._filter.smooth_wide(wide)
 
     def _find_velocity(self, motion: Floats) -> float:
         """Return the ankle's velocity at the end of a stretch of motion, 0 if it dorsiflexes."""
         if self._is_velocity:
-            return max(0.0, float(motion[-1]))
+            return max(0.0, motion.item(-1))
         return max(0.0, float(motion[-len(self._slope) :].dot(self._slope)))

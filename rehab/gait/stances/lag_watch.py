@@ -7,7 +7,6 @@ set-up finds it (``selfcheck.delays``).
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from statistics import median
 
@@ -20,6 +19,7 @@ from rehab.gait.signals.filters import (
     find_last,
     find_maximum,
     interpolate_peak,
+    is_finite,
 )
 
 # A foot that has left the floor stops plantarflexing: the ankle brakes hardest 51 ms after terminal
@@ -137,12 +137,12 @@ class BrakingFinder:
         end_s
             The terminal contact.
         """
-        if not math.isfinite(angle_rad.dot(angle_rad)):
+        if not is_finite(angle_rad):
             known = np.isfinite(angle_rad)
             time_s, angle_rad = time_s[known], angle_rad[known]
         first_s, last_s = (end_s + at_s for at_s in self._search_s)
         first_s, last_s = first_s - SETTLE_S, last_s + SETTLE_S
-        if len(time_s) < 10 or time_s[0] > first_s or time_s[-1] < last_s:
+        if len(time_s) < 10 or time_s.item(0) > first_s or time_s.item(-1) < last_s:
             return None
         wave = np.interp(end_s + self._grid, time_s, angle_rad)
         return self.find_in_wave(wave)
@@ -151,10 +151,11 @@ class BrakingFinder:
         """Return the same for an angle around terminal contact, at the times of the grid."""
         braking: Floats = self._bend @ wave
         peak = int(braking.argmax())
-        if peak in (0, len(braking) - 1) or braking[peak] < DECELERATION_MIN_RAD_S2:
+        if peak in (0, len(braking) - 1) or braking.item(peak) < DECELERATION_MIN_RAD_S2:
             return None
         place, _ = interpolate_peak(braking, peak)
-        return float(self._grid[0] + (self._first + place) / GRID_HZ)
+        at_s: float = self._grid.item(0) + (self._first + place) / GRID_HZ
+        return at_s
 
 
 def find_moment_lag(force_n: Floats, moment_nm: Floats, rate_hz: float) -> float | None:

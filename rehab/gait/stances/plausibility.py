@@ -5,8 +5,6 @@ The comments of the limits name their sources.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rehab.gait.signals.filters import (
@@ -15,6 +13,7 @@ from rehab.gait.signals.filters import (
     find_maximum,
     find_minimum,
     find_upper_median,
+    is_finite,
 )
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
@@ -78,8 +77,8 @@ def check_force(
     """
     reasons = []
     tail = force_n[-max(2, round(CUT_S * rate_hz) + 1) : -1]
-    is_known = math.isfinite(find_maximum(force_n) - find_minimum(force_n))
-    if not is_known or (len(tail) and tail[0] - offset_n > CUT_SHARE * weight_n):
+    is_cut = len(tail) and tail.item(0) - offset_n > CUT_SHARE * weight_n
+    if is_cut or not is_finite(force_n):
         reasons.append(RejectionReason.FORCE_LOST)
     if peak_n > FORCE_MAX * weight_n:
         reasons.append(RejectionReason.FORCE_TOO_LARGE)
@@ -116,30 +115,30 @@ def _count_turns(velocity: Floats) -> int:
     return int(np.count_nonzero(rising[1:] != rising[:-1]))
 
 
-def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:
+def check_lever(
+    force_n: Floats, moment_nm: Floats, toes: int, weight_n: float
+) -> list[RejectionReason]:
     """Return what is wrong with a moment, given the force that it should come from.
 
     Parameters
     ----------
-    stance
-        With force and moment.
-    offset_n, weight_n
-        The plate's zero, and body weight [N].
+    force_n, moment_nm
+        Of the second half of stance [N above the plate's zero, Nm], shape (n,).
+    toes
+        From which of these samples on the toes bear the force: ``LEVER_FROM``.
+    weight_n
+        Body weight [N].
     """
-    half = stance.index(0.5)
-    late = slice(half, stance.end + 1)
-    force, moment = stance.signals[0, late] - offset_n, stance.signals[1, late]
-    toes = stance.index(LEVER_FROM) - half
     # Where the force is too small to tell, the moment may be anything.
-    last_n = force[toes:]
-    beyond = moment[toes:] > LEVER_MAX_M * last_n
+    last_n = force_n[toes:]
+    beyond = moment_nm[toes:] > LEVER_MAX_M * last_n
     if beyond[beyond.argmax()] and (beyond & (last_n > LEVER_FORCE * weight_n)).any():
         return [RejectionReason.MOMENT_OUT_OF_STEP]
-    leaving = find_last(force > LEAVING_SHARE * find_maximum(force))
+    leaving = find_last(force_n > LEAVING_SHARE * find_maximum(force_n))
     if leaving < 0:  # there is no force, or not all of it
         return []
-    lever_m = _find_lever(force, moment, int(moment.argmax()))
-    last_m = _find_lever(force, moment, leaving)
+    lever_m = _find_lever(force_n, moment_nm, int(moment_nm.argmax()))
+    last_m = _find_lever(force_n, moment_nm, leaving)
     low, high = LEVER_CHANGE
     # A moment that is not positive at its peak is refused by other checks.
     if lever_m > 0 and not low * lever_m <= last_m <= high * lever_m:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, find_maximum
+from rehab.gait.signals.filters import Floats, find_shares
 from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT, TIME
 from rehab.gait.stances.timing import StanceClock
 
 MIN_STANCE_SAMPLES = 8  # 0.16 s at 50 Hz
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class ResampledStance:
     """Force [N], moment [Nm] and angle [rad] around a stance at evenly spaced times.
 
@@ -84,10 +83,12 @@ class Resampler:
         first, last = time_s.item(0), time_s.item(-1)
         count = int((last - first) * rate_hz + 1e-6) + 1
         grid = last - self._behind_s[-count:]
+        if kinetics_s is None:
+            kinetics_s = time_s
         signals = np.empty((3, count))
-        times = (time_s, *(2 * (time_s if kinetics_s is None else kinetics_s,)))
-        for row, values, taken_s in zip(signals, window[FORCE:], times, strict=True):
-            row[:] = np.interp(grid, taken_s, values)
+        signals[0] = np.interp(grid, time_s, window[FORCE])
+        signals[1] = np.interp(grid, kinetics_s, window[MOMENT])
+        signals[2] = np.interp(grid, kinetics_s, window[ANGLE])
         first = grid.item(0)
         begin = max(0, math.ceil((begin_s - first) * rate_hz))
         end = min(count - 1, int((end_s - first) * rate_hz + 1e-6))
@@ -96,22 +97,19 @@ class Resampler:
         return ResampledStance(signals, rate_hz, first, begin_s, end_s, begin, end)
 
 
-def bridge_gaps(
-    window: Floats, clock: StanceClock, critical: int, is_known: bool
-) -> tuple[Floats | None, float]:
+def bridge_gaps(window: Floats, clock: StanceClock, is_known: bool) -> tuple[Floats | None, float]:
     """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
 
     The samples are None where nothing is known to bridge between; a fifth row is when moment and
-    angle were measured, where that is not when the force was. The time is the longest from sample
-    ``critical`` on that a straight line bridges. Longer gaps have made the stride invalid already,
+    angle were measured, where that is not when the force was. The time is the longest that
+    a straight line bridges where that harms A2. Longer gaps have made the stride invalid already,
     so that values measured across them are not shown. ``is_known``: whether nothing is missing.
     """
     time = clock.kinetics_s
     rows = window[: ANGLE + 1]
     if time is not window[TIME] and clock.late_s > 0:
         rows = np.vstack((rows, time))
-    steps = time[critical:] - time[critical - 1 : -1]
-    longest_s = find_maximum(steps) if len(steps) else 0.0
+    longest_s = clock.bridged_s
     if is_known:
         return rows, longest_s
     bridged = rows.copy()
@@ -133,10 +131,5 @@ def decimate(window: Floats, factor: int) -> Floats | None:
     if count < 2:
         return None
     neighbors = window[:, samples - count * factor :].reshape(rows, count, factor)
-    decimated: Floats = neighbors @ _find_shares(factor)
+    decimated: Floats = neighbors @ find_shares(factor)
     return decimated
-
-
-@cache
-def _find_shares(factor: int) -> Floats:
-    return np.full(factor, 1 / factor)

@@ -26,7 +26,7 @@ CERTAIN = 1.0  # of the sum of the logarithms of ratios
 MOST = 3.0  # that one stall may add to it
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class StanceClock:
     """The clock of a stance.
 
@@ -34,6 +34,10 @@ class StanceClock:
     ----------
     kinetics_s
         When moment and angle were measured [s], shape (n,), as the samples of the stance.
+    taken_s
+        From the first to the last sample of the stance [s].
+    bridged_s
+        Longest time between two samples that a straight line bridges where that harms A2 [s].
     late_s, lost_s
         As in ``Stride``.
     reasons, flags
@@ -41,6 +45,8 @@ class StanceClock:
     """
 
     kinetics_s: Floats
+    taken_s: float
+    bridged_s: float
     late_s: float
     lost_s: float
     reasons: list[RejectionReason]
@@ -62,7 +68,6 @@ class ClockJudge:
     def judge(
         self,
         window: Floats,
-        steps_s: Floats,
         late_s: Floats | None,
         stance: int,
         critical: int,
@@ -73,8 +78,6 @@ class ClockJudge:
         ----------
         window
             Shape (channels, n): time, force, moment, angle, …
-        steps_s
-            Between the times, shape (n - 1,).
         late_s
             By how much each sample came late [s], shape (n,), or None.
         stance, critical
@@ -83,22 +86,25 @@ class ClockJudge:
         time = window[TIME]
         reasons: list[RejectionReason] = []
         flags: list[Flag] = []
-        steps_s = steps_s[max(0, stance - 1) :]
+        first = max(0, stance - 1)
+        steps_s = time[first + 1 :] - time[first:-1]
         longest_s = find_maximum(steps_s)
+        bridged_s = _find_longest(steps_s[critical - 1 - first :])
+        taken_s = time.item(-1) - time.item(stance)
         lost_s = max(0.0, longest_s - 1 / self._rate_hz)
         least_s = max(GAP_S, 2.5 / self._rate_hz)
         if longest_s > least_s:
             is_harmful = (
                 steps_s[0] > least_s  # it hides the initial contact
                 or longest_s > GAP_MAX_S
-                or steps_s[critical - 1 - max(0, stance - 1) :].max(initial=0.0) > least_s
+                or bridged_s > least_s
             )
             if is_harmful:
                 reasons.append(RejectionReason.GAP)
             else:
                 flags.append(Flag.LOST)
         if late_s is None:
-            return StanceClock(time, 0.0, lost_s, reasons, flags)
+            return StanceClock(time, taken_s, bridged_s, 0.0, lost_s, reasons, flags)
         self._weigh(window, late_s)
         is_by_number = self._by_number > CERTAIN
         latest_s = float(late_s[stance:].max(initial=0.0))
@@ -106,8 +112,11 @@ class ClockJudge:
             reasons.append(RejectionReason.LATE)
         elif latest_s > LATE_S:
             flags.append(Flag.LATE)
-        kinetics_s = time if is_by_number else np.asarray(time + late_s)
-        return StanceClock(kinetics_s, latest_s, lost_s, reasons, flags)
+        kinetics_s = time
+        if not is_by_number:
+            kinetics_s = time + late_s
+            bridged_s = _find_longest(np.diff(kinetics_s[critical - 1 :]))
+        return StanceClock(kinetics_s, taken_s, bridged_s, latest_s, lost_s, reasons, flags)
 
     def _weigh(self, window: Floats, late_s: Floats) -> None:
         """Add what this stance's late samples tell of how its moment and angle are made."""
@@ -126,6 +135,10 @@ class ClockJudge:
             evidence = float(np.clip(ratios, -MOST, MOST).sum()) / 2
             if math.isfinite(evidence):
                 self._by_number = min(MOST, max(-MOST, self._by_number + evidence))
+
+
+def _find_longest(steps_s: Floats) -> float:
+    return find_maximum(steps_s) if len(steps_s) else 0.0
 
 
 def _find_roughness(time: Floats, rows: Floats) -> Floats:

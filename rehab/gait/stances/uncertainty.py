@@ -63,8 +63,9 @@ class Uncertainty:
         known_s = stance.first_s + (len(velocity) - 1) / self._rate_hz - stance.end_s
         ahead = AHEAD_SHARE * math.exp(-max(0.0, known_s) / AHEAD_DECAY_S) * push_off.a2_w_kg
         # Where the power peaks, it changes by moment × acceleration with the time between them.
-        before, after = velocity[max(0, peak - 1)], velocity[min(peak + 1, len(velocity) - 1)]
-        by_time = push_off.a2_moment_nm_kg * float(after - before) * self._rate_hz / 2
+        before = velocity.item(max(0, peak - 1))
+        after = velocity.item(min(peak + 1, len(velocity) - 1))
+        by_time = push_off.a2_moment_nm_kg * (after - before) * self._rate_hz / 2
         apart_s = max(0.0, abs(drift_s) - USUAL_DRIFT_S) + (PUT_BACK_S if late_s > 0 else 0.0)
         return math.hypot(noise, ahead, by_time * apart_s)
 
@@ -77,6 +78,6 @@ def _find_noise(rows: Floats) -> list[float]:
     third = steps[:, 2:] - 2 * steps[:, 1:-1]
     third += steps[:, :-2]
     np.abs(third, out=third)
-    place = third.shape[1] // 2
-    third.partition(place, axis=1)
-    return [size / THIRD_DIFFERENCE for size in third[:, place].tolist()]
+    third.sort(axis=1)  # in vectors, unlike a partition
+    middle = third[:, third.shape[1] // 2]
+    return [size / THIRD_DIFFERENCE for size in middle.tolist()]
