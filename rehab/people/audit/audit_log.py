@@ -259,23 +259,24 @@ def record_after_the_fact(entries: list[AuditEntry]) -> None:
 
 
 def record_counted(entry: AuditEntry) -> None:
-    """Add an entry about what has happened; the same again in some minutes is only counted.
+    """Add or count an entry about what has happened already. A failure is logged, likewise."""
+    try:
+        with transaction.atomic():
+            add_or_count(entry)
+    except DatabaseError:
+        log.exception("The audit log missed: %s", entry)
 
-    A failure is logged: care must go on.
-    """
+
+def add_or_count(entry: AuditEntry) -> None:
+    """Add an entry about what has happened; the same again in some minutes is only counted."""
     names = ("clinic_id", "by_id", "through", "address", "act", "patient_id", "about")
     same = {name: getattr(entry, name) for name in names}
     key = tuple(same.values())
-    try:
-        with transaction.atomic():
-            # Another row has its key where the one that is remembered was rolled back.
-            rows = _mutable_rows().filter(pk=recent_entries.find(key, entry.at) or 0, **same)
-            repeated = rows.update(count=F("count") + entry.count)
-            if not repeated:
-                entry.save()
-                recent_entries.add(key, entry.at, entry.pk)
-    except DatabaseError:
-        log.exception("The audit log missed: %s", entry)
+    # Another row has its key where the one that is remembered was rolled back.
+    rows = _mutable_rows().filter(pk=recent_entries.find(key, entry.at) or 0, **same)
+    if not rows.update(count=F("count") + entry.count):
+        entry.save()
+        recent_entries.add(key, entry.at, entry.pk)
 
 
 def truncate_address(address: str) -> str:

@@ -1,7 +1,7 @@
 """Queues the audit entries of sockets.
 
 All pending entries are written together, so that thousands of pages that reconnect after a restart
-cost a few commits and no step waits for them.
+cost a few commits and no step waits for them. While the database is away they wait.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from channels.db import database_sync_to_async
-from django.db import DatabaseError
+from django.db import DatabaseError, InterfaceError, OperationalError, transaction
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry
@@ -22,6 +22,9 @@ from rehab.sessions.live.auth import Actor, socket_address
 from rehab.sessions.models import TrainingSession
 
 log = logging.getLogger(__name__)
+
+RETRY_S = 1.0
+MAX_WAITING = 10_000  # entries; newer ones are told in the server's log alone
 
 
 class PendingEntry(NamedTuple):
@@ -39,6 +42,7 @@ class AuditQueue:
     def __init__(self) -> None:
         self._pending: list[PendingEntry] = []
         self._write_task: asyncio.Task[None] | None = None
+        self._is_ending = False  # what cannot be written now is lost
 
     def add(
         self, act: Act, actor: Actor, session_id: int, scope: Mapping[str, Any], now: datetime
@@ -55,22 +59,39 @@ class AuditQueue:
             self._write_task = loop.create_task(self._write(), context=contextvars.Context())
 
     async def _write(self) -> None:
-        entries: list[PendingEntry] = []
         try:
             while self._pending:
                 entries, self._pending = self._pending, []
-                await database_sync_to_async(_store)(entries)
-        except DatabaseError:  # the training goes on; later entries are tried again
-            log.exception("The audit log missed what sockets told it: %s", entries)
+                try:
+                    await database_sync_to_async(_store)(entries)
+                except DatabaseError as problem:  # the training goes on
+                    is_away = isinstance(problem, OperationalError | InterfaceError)
+                    if self._is_ending or not is_away:
+                        log.exception("The audit log missed what sockets told it: %s", entries)
+                    else:
+                        self._keep(entries)
+                        await asyncio.sleep(RETRY_S)
         finally:
             self._write_task = None
 
+    def _keep(self, entries: list[PendingEntry]) -> None:
+        """Let entries wait that could not be written, before those that came meanwhile."""
+        waiting = [*entries, *self._pending]
+        self._pending = waiting[:MAX_WAITING]
+        if waiting[MAX_WAITING:]:
+            log.error("The audit log missed what sockets told it: %s", waiting[MAX_WAITING:])
+
     async def join(self) -> None:
-        """Wait until all entries are written."""
-        if self._write_task is not None:
-            await self._write_task
+        """Wait until all entries are written, or cannot be."""
+        self._is_ending = True
+        try:
+            if self._write_task is not None:
+                await self._write_task
+        finally:
+            self._is_ending = False
 
 
+@transaction.atomic
 def _store(entries: list[PendingEntry]) -> None:
     sessions = TrainingSession.everywhere.filter(pk__in={entry.session_id for entry in entries})
     patients = dict(sessions.values_list("pk", "patient_id"))
@@ -81,9 +102,9 @@ def _store(entries: list[PendingEntry]) -> None:
         for entry in entries
         if entry.session_id in patients
     ]
-    audit_log.record_after_the_fact([entry for entry in built if not _may_repeat(entry)])
+    AuditEntry.everywhere.bulk_create(entry for entry in built if not _may_repeat(entry))
     for entry in _count_repeats([entry for entry in built if _may_repeat(entry)]):
-        audit_log.record_counted(entry)
+        audit_log.add_or_count(entry)
 
 
 def _may_repeat(entry: AuditEntry) -> bool:

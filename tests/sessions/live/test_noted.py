@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
-from django.db import DatabaseError
+from django.db import DatabaseError, OperationalError
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import SIGN_IN_ACTS, Act, AuditEntry, RecentEntries, RecentViews
@@ -108,6 +110,45 @@ async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, be
     await source.walk(4.0)
     await monitor.say(STOP)
     assert await robot.hear("stop") == {"type": "stop"}
+
+
+async def test_entries_wait_while_the_database_is_away(place, begun, monkeypatch):
+    away, store = threading.Event(), notes_module._store
+    tries = []
+
+    def try_to_store(entries):
+        tries.append(len(entries))
+        if not away.is_set():
+            raise OperationalError("the server is gone")
+        store(entries)
+
+    monkeypatch.setattr(notes_module, "RETRY_S", 0.001)
+    monkeypatch.setattr(notes_module, "_store", try_to_store)
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    while len(tries) < 2:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    await monitor.say(STOP)
+    while tries[-1] < 2:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    away.set()
+    assert [row[0] for row in await noted(2)] == [Act.VIEW, Act.ROBOT_STOP]
+
+
+async def test_a_server_that_ends_does_not_wait_for_its_database(place, begun, monkeypatch):
+    def fail(entries):
+        raise OperationalError("the server is gone")
+
+    missed = []
+    monkeypatch.setattr(notes_module.log, "exception", lambda *told: missed.append(told))
+    monkeypatch.setattr(notes_module, "RETRY_S", 0.001)
+    session = await begun(place)
+    with monkeypatch.context() as broken:
+        broken.setattr(notes_module, "_store", fail)
+        await place.monitor(session).watch()
+        await runtimes.current().audit_queue.join()
+    assert len(missed) == 1
 
 
 async def test_after_a_log_that_could_not_be_written_it_goes_on(place, begun, monkeypatch):
