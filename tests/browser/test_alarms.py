@@ -242,7 +242,7 @@ def test_a_stop_that_the_sessions_server_does_not_hear_is_told_at_once(
     """On a page at another server; it says what to do, and no time has to pass for that."""
     with robot_of(server, walk):
         page = unheard_page(browser, server, walk, f"/sessions/{walk.session}/monitor/")
-        expect(page.locator("[data-robot=stop]:visible").first).to_be_enabled()
+        expect(page.locator("[data-presence=robot]")).to_contain_text("✓")  # it is connected
         page.clock.pause_at(datetime.now(UTC) + timedelta(seconds=5))
         page.locator("[data-robot=stop]:visible").first.click()
         told = page.get_by_text("No answer. If the robot moves, use its own switch.").first
