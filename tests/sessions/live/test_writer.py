@@ -156,13 +156,12 @@ async def test_a_fault_of_the_thread_fails_its_jobs_and_does_not_end_it(
 ):
     await until_done(bench, 3)
 
-    real_sleep = time.sleep
+    real_sleep, problems = time.sleep, [OSError("the clock is broken")]
 
     def sleep(seconds: float) -> None:
-        if threading.current_thread() is not bench.writer._thread:
-            return real_sleep(seconds)
-        monkeypatch.undo()
-        raise OSError("the clock is broken")
+        if threading.current_thread() is bench.writer._thread and problems:
+            raise problems.pop()
+        real_sleep(seconds)
 
     one, two = aggregates[:2]
     monkeypatch.setattr("rehab.sessions.live.session.writer.time.sleep", sleep)
