@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import zipfile
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -322,6 +323,18 @@ def test_an_export_goes_on_where_it_was_stopped(world, tmp_path, monkeypatch):
     user.role = Role.LEAD
     assert Package.find(package.folder, user, NOW + timedelta(hours=25)) is None
     assert not package.folder.exists()
+
+
+def test_exports_that_nobody_fetches_go_by_when_they_were_begun(world, tmp_path):
+    user = world.people[Role.LEAD]
+    for name in ("kept", "old"):
+        Package.create(tmp_path / name, user, None, shift_dates=False, now=NOW)
+    (tmp_path / "old" / "export.json").unlink()  # a power cut: its folder tells when
+    os.utime(tmp_path / "old", (0, 0))
+    packages.discard_old(tmp_path, NOW + timedelta(hours=23))
+    assert [one.name for one in tmp_path.iterdir()] == ["kept"]
+    packages.discard_old(tmp_path, NOW + timedelta(hours=24))
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_page_prepares_shows_progress_and_gives_it_out_on_the_record(world, settings, tmp_path):

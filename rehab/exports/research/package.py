@@ -11,7 +11,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -213,8 +213,17 @@ class Package:
 def discard_old(folder: Path, now: datetime) -> None:
     """Remove exports that nobody has fetched for a day."""
     for one in folder.iterdir() if folder.is_dir() else ():
-        if one.is_dir() and now.timestamp() - one.stat().st_mtime > KEPT_FOR.total_seconds():
+        if one.is_dir() and now - _find_beginning(one) >= KEPT_FOR:
             shutil.rmtree(one, ignore_errors=True)
+
+
+def _find_beginning(folder: Path) -> datetime:
+    """Return when an export was begun: as it says, or when its folder was last written to."""
+    try:
+        about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
+        return datetime.fromisoformat(about["made_at"])
+    except (OSError, ValueError, KeyError):
+        return datetime.fromtimestamp(folder.stat().st_mtime, UTC)
 
 
 def garry_version() -> str:
