@@ -129,7 +129,7 @@ class Detector:
                 return strides
         samples = self._samples
         newest = samples.filled - 1
-        waiting = samples.first + samples.filled - samples.end
+        waiting = samples.waiting
         if waiting <= self._patience:
             for force, least_n, most_n, patience in self._feet:
                 goes_on = least_n <= force.item(newest) <= most_n

@@ -104,8 +104,7 @@ class Package:
         been told more, is left alone.
         """
         try:
-            about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
-            made_at = datetime.fromisoformat(about["made_at"])
+            about, made_at = _read_about(folder)
             package = cls(
                 folder, user, tuple(about["keys"]), about["study"], about["shift_dates"], made_at
             )
@@ -220,10 +219,15 @@ def discard_old(folder: Path, now: datetime) -> None:
 def _find_beginning(folder: Path) -> datetime:
     """Return when an export was begun: as it says, or when its folder was last written to."""
     try:
-        about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
-        return datetime.fromisoformat(about["made_at"])
+        return _read_about(folder)[1]
     except (OSError, ValueError, KeyError):
         return datetime.fromtimestamp(folder.stat().st_mtime, UTC)
+
+
+def _read_about(folder: Path) -> tuple[dict[str, Any], datetime]:
+    """Return who asked for an export, for what, and when. Raises OSError, ValueError, KeyError."""
+    about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
+    return about, datetime.fromisoformat(about["made_at"])
 
 
 def garry_version() -> str:
