@@ -31,7 +31,7 @@ SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
 SEAL = round(600 / ROBOT_HEARTBEAT_S)
 # Of the robots, one after the other: a thousand at once hold up steps (docs/performance.md).
-PARTS = 10
+PARTS = 3
 CHECKED_SOCKETS = 100  # sign-ins that are checked at once
 CHECK_PAUSE_S = 0.1  # between these: 4,000 sockets within 4 s
 HEARTBEAT = to_text({"type": "heartbeat"})
