@@ -110,7 +110,7 @@ def write_files(results: Results, folder: Path) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     digest = sha256()
     for name, text in sorted(files.items()):
-        (folder / name).write_text(text, encoding="utf-8")
+        (folder / name).write_bytes(text.encode())  # the same on Windows, too
         digest.update(f"{name}\n{text}".encode())
     return digest.hexdigest()
 
