@@ -25,13 +25,11 @@ class Measured:
 
     Attributes
     ----------
-    server_us, relay_us
-        Processor time of a server's process [µs a step] with one viewer, and of the bare relay of
-        the same run.
-    viewers_ratio
-        How much more three viewers take than one, under the server for which that is more.
     planned_sessions
         How many sessions at once docs/hosting.md plans for a process.
+    server_us
+        Processor time of a hosted process that has so many, each with tablet, monitor and robot
+        [µs a step].
     row_us
         From a batch to the commit, by COPY [µs a row], in one connection.
     row_bytes, index_bytes, parquet_bytes
@@ -40,10 +38,8 @@ class Measured:
         Of a step as text: from the source, to tablet, monitor and robot.
     """
 
-    server_us: float
-    relay_us: float
-    viewers_ratio: float
     planned_sessions: float
+    server_us: float
     row_us: float
     row_bytes: float
     index_bytes: float
@@ -60,14 +56,8 @@ class Measured:
                 raise ValueError(f"The documentation has no figure like {pattern!r}.")
             return tuple(float(figure) for figure in match.groups())
 
-        server, relay = find(
-            r"^\| uvicorn, lower quartile of 24 slices \| \d+ \| (\d+).*\| (\d+) \|$"
-        )
-        daphne_one, one, daphne_three, three = find(
-            r"([\d.]+) \(daphne\) and ([\d.]+) \(uvicorn\) with one viewer,"
-            r" ([\d.]+) and\s+([\d.]+) with three"
-        )
-        by_server = ((daphne_one, daphne_three), (one, three))
+        (planned,) = find(r"Plan (\d+) sessions at once", hosting)
+        (server,) = find(rf"^\| {planned:g} \| one process \|.*\| (\d+) \| [\d.]+ \|$")
         (row,) = find(r"^\| 50 \| \d+ \(\d+\) \| \d+ \((\d+)\) \|$")
         frames = {
             whom: find(rf"^\| a step, {words} \| (\d+) \|$")[0]
@@ -79,10 +69,8 @@ class Measured:
             }.items()
         }
         return cls(
+            planned_sessions=planned,
             server_us=server,
-            relay_us=relay,
-            viewers_ratio=max(1.0, *(three / one for one, three in by_server)),
-            planned_sessions=find(r"Plan (\d+) sessions at once", hosting)[0],
             row_us=row,
             row_bytes=find(r"^\| a row of `rehab_step`, PostgreSQL \| (\d+) \|$")[0],
             index_bytes=find(r"^\| its two indexes \| (\d+) \|$")[0],
@@ -150,8 +138,7 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     sessions = a.peak * walked_s / a.day_s
     steps_s = sessions / a.step_every_s
     rows_month = walked_s * a.days_a_month / a.step_every_s
-    step_us = measured.server_us * measured.viewers_ratio
-    work = steps_s * step_us / 1e6 / a.busy
+    work = steps_s * measured.server_us / 1e6 / a.busy
     processes = max(2.0, math.ceil(work), math.ceil(sessions / measured.planned_sessions))
     row_s = measured.row_us / 1e6 * a.database_rows_at_once * a.other
     database_cores = max(2.0, math.ceil(steps_s * row_s / a.busy))

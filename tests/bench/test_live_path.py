@@ -49,6 +49,10 @@ def measure(
     return ours, floor
 
 
+def tell_thread(ours: dict[str, Any], name: str) -> str:
+    return f"{1e6 * ours['threads_s'][name] / ours['steps']:.0f}"
+
+
 def tell(
     server_name: str, count: int, viewers: int, ours: dict[str, Any], floor: dict[str, Any]
 ) -> float:
@@ -65,7 +69,8 @@ def tell(
     print(
         f"\nN={count:5} viewers={viewers} {server_name} {times}; "
         f"arrived {ours['arrived']}/{ours['expected']}; "
-        f"CPU {ours['us_per_step']:.0f} us/step, {ours['rows_a_commit']:.1f} steps a commit, "
+        f"CPU {ours['us_per_step']:.0f} us/step (event loop {tell_thread(ours, 'MainThread')}, "
+        f"writer {tell_thread(ours, 'garry-writer')}), {ours['rows_a_commit']:.1f} steps a commit, "
         f"RSS {ours['rss_mb']:.0f} MB, "
         f"load's own CPU {ours['own_cpu']:.0%} | relay p50 {floor['view_p50_ms']:.2f} "
         f"p99 {floor['view_p99_ms']:.1f} ms, {floor['us_per_step']:.0f} us/step | "

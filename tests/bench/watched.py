@@ -1,7 +1,7 @@
-"""`manage.py serve`, watched: commits, stalls of the event loop, pauses by the garbage collector.
+"""`manage.py serve`, watched: commits, stalls of the event loop, garbage collections, its threads.
 
 `python -m tests.bench.watched FILE serve …`: SIGUSR1 begins anew, SIGUSR2 writes what was seen so
-far into the file (JSON, ms).
+far into the file (JSON, ms; of threads, seconds of processor time).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import json
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +20,15 @@ from typing import Any
 
 LOOP_S = 0.005  # between looks at the event loop
 now = time.perf_counter
+
+
+def measure_threads() -> dict[str, float]:
+    """Return the processor time that each thread of Python's has taken, by name [s]."""
+    return {
+        thread.name: time.clock_gettime(time.pthread_getcpuclockid(thread.ident))
+        for thread in threading.enumerate()
+        if thread.ident is not None
+    }
 
 
 class Watch:
@@ -33,6 +43,7 @@ class Watch:
         self.jobs = 0
         self.stall_s = self.pause_s = 0.0
         self.pause_began = now()
+        self.spent_s = measure_threads()
 
     def write(self, path: Path) -> None:
         """Write what was seen."""
@@ -44,6 +55,10 @@ class Watch:
             "commit_p99_ms": 1000 * ordered[int(len(ordered) * 0.99)],
             "stall_ms": 1000 * self.stall_s,
             "gc_ms": 1000 * self.pause_s,
+            "threads_s": {
+                name: spent - self.spent_s.get(name, 0.0)
+                for name, spent in measure_threads().items()
+            },
         }
         whole = path.with_suffix(".part")
         whole.write_text(json.dumps(seen))
