@@ -1,4 +1,4 @@
-"""Lines of the log as JSON, each with the request that it is of. They name no patient."""
+"""Lines of the log, as text or JSON, each with the request that it is of. They name no patient."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from datetime import UTC, datetime
 from django.http import HttpRequest, HttpResponseBase
 
 HEADER = "X-Request-ID"
+# What opens a page by itself: a family's link.
+SECRET_ADDRESS = re.compile(r"(/family/)[^/\s\"'\\]+")
 SAFE_ID = re.compile(r"[A-Za-z0-9-]{8,64}")
 
 request_id: ContextVar[str] = ContextVar("request_id", default="")
@@ -36,6 +38,14 @@ class RequestIdMiddleware:
             request_id.reset(token)
 
 
+class LineFormatter(logging.Formatter):
+    """Formats a record as text, without secret addresses."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the lines."""
+        return SECRET_ADDRESS.sub(r"\1...", super().format(record))
+
+
 class JsonFormatter(logging.Formatter):
     """Formats a record as one line of JSON: time, level, logger, message, request, traceback."""
 
@@ -49,4 +59,5 @@ class JsonFormatter(logging.Formatter):
             "request": request_id.get(),
             "traceback": self.formatException(record.exc_info) if record.exc_info else "",
         }
-        return json.dumps({name: value for name, value in line.items() if value})
+        told = json.dumps({name: value for name, value in line.items() if value})
+        return SECRET_ADDRESS.sub(r"\1...", told)

@@ -26,6 +26,7 @@ from rehab.sessions.corrections import anonymize_corrections
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.training.changes import ChangeKind
 
 
 def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetime) -> None:
@@ -54,6 +55,7 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
         ).update(data={})
+        _erase_typed_words(patient)
         anonymize_corrections(patient, old_pseudonym)
         Visit.everywhere.filter(patient=patient).delete()
         FamilyLink.everywhere.filter(patient=patient).delete()
@@ -69,6 +71,18 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
             about=str(ErasureReason(reason).label),
             now=now,
         )
+
+
+def _erase_typed_words(patient: Patient) -> None:
+    """Empty the words that were typed for a patient's sessions: they may name anybody."""
+    edits = SessionEvent.everywhere.filter(
+        session__patient=patient, kind=ChangeKind.FEEDBACK_TEXT.value
+    )
+    emptied = list(edits)
+    for edit in emptied:
+        for band in edit.data["value"]["bands"]:
+            band["words"] = ""
+    edits.bulk_update(emptied, ["data"])
 
 
 def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:

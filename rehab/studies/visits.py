@@ -15,7 +15,7 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
-from rehab.studies.registration.lifecycle import current_version
+from rehab.studies.registration.lifecycle import check_no_open_session, current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
@@ -48,9 +48,9 @@ def start_session(
 ) -> TrainingSession:
     """Create the session of a participant's next visit, with the arm's condition.
 
-    Raises InvalidSetting for a participant who has withdrawn or walked all visits, a study that is
-    not running or was changed, a person to whom the arm is hidden, and what `create_session`
-    refuses.
+    Raises InvalidSetting for a participant who has withdrawn, walked all visits or has a session
+    that is open, a study that is not running or was changed, a person to whom the arm is hidden,
+    and what `create_session` refuses.
     """
     study = enrollment.study
     with transaction.atomic():
@@ -61,6 +61,8 @@ def start_session(
                 gettext("The study is closed, or %(code)s has withdrawn: no session of it starts.")
                 % {"code": enrollment.code}
             )
+        # Two people who start the same visit would begin the next one, too: in another arm, maybe.
+        check_no_open_session(study, enrollment.patient)
         visit = next_visit(enrollment)
         if visit is None:
             raise InvalidSetting(

@@ -131,6 +131,14 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     SessionEvent.everywhere.create(
         session=world.session, after_number=1, kind="pain", at=NOW, data={"note": "CASE-4711"}
     )
+    bands = [{"from_performance": 0.0, "words": "Push, osamunde!", "confetti": "none"}]
+    SessionEvent.everywhere.create(
+        session=world.session,
+        after_number=1,
+        kind="feedback_text",
+        at=NOW,
+        data={"value": {"valence": "positive", "bands": bands}},
+    )
     other = Patient.everywhere.create(clinic=world.clinic, code="other", nickname="Other")
     lead_user = world.people[Role.LEAD]
     for walker in (other, patient):  # given to somebody else, and back

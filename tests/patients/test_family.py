@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import re
 from datetime import datetime, time, timedelta
+from logging.config import DictConfigurator
 
 import pytest
+from django.conf import settings
+from django.db import OperationalError
 from django.test import Client
 from django.urls import reverse
 
@@ -201,14 +205,33 @@ def test_who_asks_too_often_waits(agreed, monkeypatch):
     assert int(client.get(path)["Retry-After"]) > 0
 
 
-def test_no_log_has_a_token(agreed, caplog):
+def fail(*_: object) -> None:
+    raise OperationalError("the database is away")
+
+
+@pytest.mark.parametrize("log_format", ["line", "json"])
+@pytest.mark.parametrize("is_away", [False, True], ids=["unknown link", "no database"])
+def test_no_log_has_a_token(agreed, monkeypatch, caplog, is_away, log_format):
+    told = io.StringIO()
+    handler = logging.StreamHandler(told)
+    handler.setFormatter(DictConfigurator(settings.LOGGING).configure_formatter(
+        settings.LOGGING["formatters"][log_format]
+    ))
     caplog.set_level(logging.DEBUG)
+    caplog.set_level(logging.DEBUG, "django.request")
     path = give(agreed)
-    ENDS["the link expires"](agreed)
-    Client().post(path)
-    token = path.split("/")[2]
-    assert token not in caplog.text
-    assert not AuditEntry.everywhere.filter(about__contains=token).exists()
+    if is_away:
+        monkeypatch.setattr(page, "find_link", fail)
+    else:
+        ENDS["the link expires"](agreed)
+    logging.getLogger().addHandler(handler)
+    try:
+        Client(raise_request_exception=False).post(path)
+    finally:
+        logging.getLogger().removeHandler(handler)
+    assert "/family/.../" in told.getvalue()
+    assert path.split("/")[2] not in told.getvalue()
+    assert not AuditEntry.everywhere.filter(about__contains=path.split("/")[2]).exists()
 
 
 def test_the_next_visit_is_one_that_is_to_come(agreed):

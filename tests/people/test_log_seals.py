@@ -9,8 +9,10 @@ import json
 from datetime import timedelta
 
 import pytest
+import time_machine
 from django.core.management import CommandError, call_command
 from django.db import IntegrityError, connection, transaction
+from django.utils import timezone
 
 from rehab.management.commands.doctor import examine_seals
 from rehab.patients.erasure import delete_old_logs
@@ -91,19 +93,25 @@ def test_the_database_itself_refuses_to_change_seals(logged, sql):
         run(sql)
 
 
-def test_an_entry_is_counted_until_it_is_sealed(logged, monkeypatch):
+def test_an_entry_is_counted_until_it_is_sealed(logged, monkeypatch, tmp_path):
     monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
+    now = timezone.now()
 
-    def stop() -> None:
+    def stop() -> list[int]:
         who = logged.people[Role.PT]
-        audit_log.record_counted(audit_log.build_entry(Act.ROBOT_STOP, who, now=NOW))
+        audit_log.record_counted(audit_log.build_entry(Act.ROBOT_STOP, who, now=now))
+        stops = AuditEntry.everywhere.filter(act=Act.ROBOT_STOP).order_by("pk")
+        return list(stops.values_list("count", flat=True))
 
-    stop()
-    stop()
-    assert AuditEntry.everywhere.get(act=Act.ROBOT_STOP).count == 2
-    seal_logs(LATER)
+    assert [stop(), stop()] == [[1], [2]]
+    call_command("shiplogs", tmp_path / "logs.jsonl", stdout=io.StringIO())
+    delete_old_logs(logged.clinic, now)
+    assert stop() == [3]
+    seal_logs(now + timedelta(hours=1))
     with pytest.raises(IntegrityError, match="append-only"):
         run(f"UPDATE {AUDIT} SET count = count + 1")
+    assert stop() == [3, 1]  # its clock was set back: nothing is lost
+    assert list(find_broken()) == []
 
 
 # --- the chain ------------------------------------------------------------------------------------
@@ -221,7 +229,8 @@ def test_the_logs_are_shipped_once_each_as_lines_of_json(logged, tmp_path):
 
     def ship() -> str:
         out = io.StringIO()
-        call_command("shiplogs", file, stdout=out)
+        with time_machine.travel(LATER):
+            call_command("shiplogs", file, stdout=out)
         return out.getvalue()
 
     assert "0 new" not in ship()

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 from django.contrib import admin
+from django.urls import reverse
 
 from garry_site import urls as site_urls
-from rehab.people.roles import Right, rights_of
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import CrossClinicReference, Scope, ScopedManager, UnscopedQuery
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
@@ -22,6 +24,7 @@ from tests.support.tenancy import (
 )
 from tests.support.world import (
     all_actors,
+    client_of,
     scoped_models,
 )
 
@@ -98,6 +101,19 @@ def test_rows_of_two_clinics_are_never_tied_together(worlds):
     amber.session.patient = birch.patient
     with pytest.raises(CrossClinicReference):
         amber.session.save()
+
+
+def test_the_audit_log_names_no_patient_of_another_clinic(worlds):
+    """A form that is sent for one is answered like that of nobody, and noted."""
+    amber, birch = worlds
+    lead = client_of(amber, Role.LEAD)
+    form = reverse("admin:rehab_patient_change", args=[birch.patient.pk])
+    assert lead.post(form).status_code == 302
+    assert AuditEntry.everywhere.filter(clinic=amber.clinic, about=form).exists()
+    assert not AuditEntry.everywhere.filter(clinic=amber.clinic, patient=birch.patient).exists()
+    log = lead.get(reverse("admin:rehab_auditentry_changelist")).content.decode()
+    assert amber.patient.nickname in log
+    assert birch.patient.nickname not in log
 
 
 # --- routes -------------------------------------------------------------------------------------

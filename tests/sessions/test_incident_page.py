@@ -32,6 +32,12 @@ def test_the_page_tells_what_happened_and_can_be_replayed(world):
     assert address(world, "incident-file") in page
 
 
+def test_who_looked_is_noted_with_the_patient(world):
+    client_of(world).get(address(world))
+    entry = AuditEntry.everywhere.get(act=Act.VIEW, about=address(world))
+    assert entry.patient_id == world.patient.pk
+
+
 def test_the_sessions_page_leads_to_it_in_one_tap(world):
     page = client_of(world).get(reverse("session", args=[world.session.pk])).content.decode()
     assert f'href="{address(world)}"' in page

@@ -66,6 +66,15 @@ def test_words_go_to_the_type_that_they_were_typed_for(world):
     assert words_of(session) == ["Push, Ana!", *before[1:]]
 
 
+def test_words_that_name_the_patient_are_refused(world):
+    session = begin(world)
+    before, url = words_of(session), reverse("words", args=[session.pk])
+    for name in (world.patient.nickname, world.patient.code):
+        answer = client_of(world).post(url, {"words_0": f"Push, {name.upper()}!"})
+        assert "researchers read this too" in answer.content.decode()
+    assert words_of(session) == before
+
+
 def test_words_too_long_are_refused_and_an_ended_session_has_none_to_edit(world):
     session = begin(world)
     url = reverse("words", args=[session.pk])

@@ -162,6 +162,20 @@ def test_each_visit_is_walked_once_and_again_after_a_session_that_was_broken_off
         start_session(enrollment, Place(), None, NOW)
 
 
+def test_no_visit_starts_while_the_one_before_is_open(world):
+    """Two people start the same visit: the second one must not begin the other arm."""
+    study = running_study(world, crossover=True, visits=1)
+    enrollment = enrolled(study, new_patient(world))
+    url = reverse("participant", args=[enrollment.pk])
+    therapist = signed_in(world.people[Role.PT])
+    assert b"Start visit 1" in therapist.get(url).content
+    start_session(enrollment, Place(), None, NOW)
+    assert b"Start visit" not in therapist.get(url).content
+    with pytest.raises(InvalidSetting, match="still open"):
+        start_session(enrollment, Place(), None, NOW)
+    assert enrollment.visits.exclude(session=None).count() == 1
+
+
 def test_a_crossover_walks_the_arms_in_the_allocated_order(world):
     study = running_study(world, crossover=True, visits=1)
     enrollment = enrolled(study, new_patient(world))

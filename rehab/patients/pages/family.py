@@ -68,8 +68,6 @@ def show_family(request: HttpRequest, token: str) -> HttpResponse:
     response = render(request, "patients/family.html", context, status=status)
     for name, value in HEADERS.items():
         response[name] = value
-    # Django would write the address of what was not found into the log.
-    response._has_been_logged = True  # type: ignore[attr-defined]  # noqa: SLF001
     if wait_s:
         response["Retry-After"] = str(int(wait_s) + 1)
     return response

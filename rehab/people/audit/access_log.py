@@ -28,6 +28,8 @@ SUBJECTS = {
     "code": ("Patient", "code", "pk"),
     "enrollment_id": ("Enrollment", "pk", "patient_id"),
     "session_id": ("TrainingSession", "pk", "patient_id"),
+    "incident_id": ("RobotIncident", "pk", "session__patient_id"),
+    "link_id": ("FamilyLink", "pk", "patient_id"),
 }
 ADMIN_PAGES_WITHOUT_PATIENTS = {
     "login",
@@ -121,22 +123,21 @@ def leads_to_patients(model: type[Model]) -> bool:
 
 
 def find_patient_id(match: ResolverMatch, clinic_id: int | None) -> int | None:
-    """Return the key of the patient that a page shows; None for a list of several."""
+    """Return the key of the patient of this clinic that a page shows; None for several or none."""
     for name, value in match.kwargs.items():
         if name in SUBJECTS:
-            model_name, by, key = SUBJECTS[name]
-            return _find_key(
-                apps.get_model("rehab", model_name), key, clinic=clinic_id, **{by: value}
-            )
+            model_name, by, path = SUBJECTS[name]
+            return _find_key(apps.get_model("rehab", model_name), path, clinic_id, **{by: value})
     model, row = _model_of(match), str(match.kwargs.get("object_id", ""))
     if model is None or not row.isdecimal():
         return None
     names = {field.name for field in model._meta.concrete_fields}
     path = "pk" if model is Patient else "patient_id" if "patient" in names else ""
     path = path or ("session__patient_id" if "session" in names else "")
-    return _find_key(model, path, pk=row) if path else None
+    return _find_key(model, path, clinic_id, pk=row) if path else None
 
 
-def _find_key(model: type[Any], path: str, **by: Any) -> int | None:
-    found: int | None = model.everywhere.filter(**by).values_list(path, flat=True).first()
+def _find_key(model: type[Any], path: str, clinic_id: int | None, **by: Any) -> int | None:
+    rows = model.everywhere.filter(**by, **{model.scope.clinic: clinic_id})
+    found: int | None = rows.values_list(path, flat=True).first()
     return found

@@ -15,7 +15,7 @@ from ipaddress import IPv4Address, ip_address, ip_network
 from threading import Lock
 from typing import Any, ClassVar, NoReturn
 
-from django.db import DatabaseError, models, transaction
+from django.db import DatabaseError, IntegrityError, models, transaction
 from django.db.models import F, Q, QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
@@ -272,11 +272,20 @@ def add_or_count(entry: AuditEntry) -> None:
     names = ("clinic_id", "by_id", "through", "address", "act", "patient_id", "about")
     same = {name: getattr(entry, name) for name in names}
     key = tuple(same.values())
+    added_id = recent_entries.find(key, entry.at)
     # Another row has its key where the one that is remembered was rolled back.
-    rows = _mutable_rows().filter(pk=recent_entries.find(key, entry.at) or 0, **same)
-    if not rows.update(count=F("count") + entry.count):
+    if added_id is None or not _count(_mutable_rows().filter(pk=added_id, **same), entry.count):
         entry.save()
         recent_entries.add(key, entry.at, entry.pk)
+
+
+def _count(rows: QuerySet[AuditEntry], times: int) -> bool:
+    """Count an entry's repeats in it. Return whether there is one that is not sealed yet."""
+    try:
+        with transaction.atomic():
+            return bool(rows.update(count=F("count") + times))
+    except IntegrityError:  # the database's own refusal: a clock was set back
+        return False
 
 
 def truncate_address(address: str) -> str:

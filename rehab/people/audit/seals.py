@@ -23,7 +23,8 @@ from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Clinic
 from rehab.people.scope import Scope, ScopedModel
 
-SEALED_AFTER = timedelta(minutes=10)  # until then repeats of an entry are counted in it
+# Until then repeats of an entry are counted in it, and rows with a lower key may be committed.
+SEALED_AFTER = timedelta(minutes=10)
 BATCH_ROWS = 1_000
 LOGS: dict[str, type[Any]] = {"AuditEntry": AuditEntry, "HistoryEntry": HistoryEntry}
 
@@ -90,20 +91,20 @@ def _chains() -> Iterator[tuple[str, int | None]]:
     yield from ((log, key) for log in LOGS for key in keys)
 
 
-def seal_logs(until: datetime) -> int:
-    """Seal all rows from before a moment. Return how many."""
-    sealed = 0
+def seal_logs(now: datetime) -> int:
+    """Seal all rows that are old enough. Return how many."""
+    sealed, until = 0, now - SEALED_AFTER
     for log, clinic_id in _chains():
         try:
-            while count := _seal_batch(log, clinic_id, until):
+            while count := _seal_batch(log, clinic_id, until, now):
                 sealed += count
         except IntegrityError:  # another process seals this chain at this moment
             continue
     return sealed
 
 
-def _seal_batch(log: str, clinic_id: int | None, until: datetime) -> int:
-    """Seal the next rows of a chain, of one day at most. Return how many.
+def _seal_batch(log: str, clinic_id: int | None, until: datetime, now: datetime) -> int:
+    """Seal a chain's next rows from before a moment, of one day at most. Return how many.
 
     A row that stands before one of that time was added earlier, whatever the clock said.
     """
@@ -122,7 +123,7 @@ def _seal_batch(log: str, clinic_id: int | None, until: datetime) -> int:
         last_id=batch[-1].pk,
         last_at=max(row.at for row in batch),
         previous=last.digest if last else "",
-        sealed_at=until,
+        sealed_at=now,
     )
     seal.digest = seal.compute_digest(batch)
     with transaction.atomic():  # this alone: rows are read while trainings go on

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from datetime import datetime
 from typing import Any
 
@@ -21,6 +20,7 @@ from rehab.sessions.corrections import (
     current_values,
     normalize_newlines,
 )
+from rehab.sessions.forms.names import refuse_names
 from rehab.sessions.models import TrainingSession
 
 
@@ -84,14 +84,8 @@ class CorrectionForm(forms.Form):
         return self._refuse_names(self.cleaned_data["reason"])
 
     def _refuse_names(self, text: str) -> str:
-        for patient in (self.session.patient, self.cleaned_data.get("patient")):
-            for name in (patient.nickname, patient.code) if patient else ():
-                if re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE):
-                    raise ValidationError(
-                        gettext("Leave out “%(name)s”: researchers read this too."),
-                        params={"name": name},
-                    )
-        return text
+        chosen = self.cleaned_data.get("patient")
+        return refuse_names(text, self.session.patient, *([chosen] if chosen else []))
 
     def clean(self) -> dict[str, Any]:
         """Return the cleaned data. Refuses a form in which nothing is changed."""

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from channels.db import database_sync_to_async
 from django.utils import timezone
 
-from rehab.people.audit.seals import SEALED_AFTER, seal_logs
+from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.database.trouble import WORDS, Trouble
@@ -137,7 +137,7 @@ class Routines:
         await self._process.loop.run_in_executor(None, move_database_log)
 
     async def _seal_logs(self) -> None:
-        await database_sync_to_async(seal_logs)(timezone.now() - SEALED_AFTER)
+        await database_sync_to_async(seal_logs)(timezone.now())
 
     async def check_sign_ins(self) -> None:
         """Extend sign-ins at a running session; close sockets that are no longer authorized.

@@ -7,6 +7,7 @@ from typing import Any
 
 from django import forms
 from django.contrib import messages
+from django.core.exceptions import ValidationError
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.translation import gettext
@@ -14,8 +15,10 @@ from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import for_roles, user_of
+from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
+from rehab.sessions.forms.names import refuse_names
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session.aggregate import SessionAggregate
@@ -30,8 +33,9 @@ from rehab.training.valences import Valence
 class WordsForm(forms.Form):
     """The words of each band of a feedback type."""
 
-    def __init__(self, *args: Any, valence: Valence, **options: Any) -> None:
+    def __init__(self, *args: Any, patient: Patient, valence: Valence, **options: Any) -> None:
         super().__init__(*args, **options)
+        self.patient = patient
         self.valence = valence
         for number, band in enumerate(valence.bands):
             self.fields[f"words_{number}"] = forms.CharField(
@@ -41,6 +45,16 @@ class WordsForm(forms.Form):
                 initial=band.words,
                 required=False,
             )
+
+    def clean(self) -> dict[str, Any]:
+        """Return the cleaned data. Refuses words that name the patient."""
+        data: dict[str, Any] = super().clean() or {}
+        for field, words in data.items():
+            try:
+                refuse_names(words, self.patient)
+            except ValidationError as problem:
+                self.add_error(field, problem)
+        return data
 
     def to_change(self) -> dict[str, Any]:
         """Return the value of the change that puts the words into force."""
@@ -64,7 +78,7 @@ def edit_words(request: HttpRequest, session_id: int) -> HttpResponse:
     valences = SessionAggregate.load(session).fold.valences
     # The type that the words were typed for; another one may be in force by now.
     valence = valences.known.get(request.POST.get("valence", ""), valences.current)
-    form = WordsForm(request.POST or None, valence=valence)
+    form = WordsForm(request.POST or None, patient=session.patient, valence=valence)
     if request.method == "POST" and form.is_valid():
         try:
             change_session(session, ChangeKind.FEEDBACK_TEXT, form.to_change(), user)

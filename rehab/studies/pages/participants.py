@@ -21,6 +21,7 @@ from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participants import Enrollment
 from rehab.studies.visits import next_visit, start_session
+from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
 
 
@@ -65,11 +66,13 @@ def render_participant(
     user = user_of(request)
     first_station(enrollment.patient.clinic)
     blind = is_assessor(enrollment.study, user)
+    visits = list(enrollment.visits.select_related("session"))
+    is_walking = any(visit.session and visit.session.state in OPEN_STATES for visit in visits)
     context = {
         "enrollment": enrollment,
         "study": enrollment.study,
-        "visits": enrollment.visits.select_related("session"),
-        "next": next_visit(enrollment),
+        "visits": visits,
+        "next": None if is_walking else next_visit(enrollment),
         "blind": blind,
         "place": PlaceForm(patient=enrollment.patient, by=user),
         **more,
