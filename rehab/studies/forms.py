@@ -15,6 +15,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Patient, User
 from rehab.people.ranges import NumberField, say_ranges
 from rehab.people.web.refusals import format_refusal
+from rehab.people.web.row_forms import ClinicForm
 from rehab.sessions.formatting import format_source
 from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.services import check_station_is_free
@@ -45,7 +46,7 @@ ALLOCATION_FIELDS = (
 )
 
 
-class StudyForm(forms.ModelForm):
+class StudyForm(ClinicForm):
     """The plan of a study. A registered one keeps its allocation, and says why it is changed."""
 
     block_sizes = forms.CharField(
@@ -91,7 +92,6 @@ class StudyForm(forms.ModelForm):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        say_ranges(self)
         study: Study = self.instance
         if study.is_draft:
             del self.fields["reason"]

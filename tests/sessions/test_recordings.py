@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from django.db import connection
@@ -13,6 +14,7 @@ from rehab.sessions.setup.recordings import (
     UploadRefused,
     add_part,
     check_upload,
+    discard_old_uploads,
     name_recording,
     uploaded_file,
     write_columns,
@@ -43,6 +45,16 @@ def test_another_upload_replaces_the_one_before_of_this_person_only():
     add_part(other, b"new", 0)
     assert not mine.exists()
     assert (other.read_bytes(), theirs.read_bytes()) == (b"new", b"theirs")
+
+
+def test_an_upload_that_nobody_stores_is_removed_after_a_day():
+    file = uploaded_file(7, ".csv")
+    add_part(file, b"abc", 0)
+    began = datetime.fromtimestamp(file.stat().st_mtime, UTC)
+    discard_old_uploads(began + timedelta(hours=23))
+    assert file.exists()
+    discard_old_uploads(began + timedelta(hours=25))
+    assert not file.exists()
 
 
 def test_sizes_are_bounded(monkeypatch):

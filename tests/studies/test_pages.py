@@ -129,6 +129,14 @@ def refusals(caplog) -> list[str]:
     ]
 
 
+def test_a_second_study_of_a_name_is_refused(world):
+    lead, url = client_of(world, Role.LEAD), reverse("new-study")
+    assert lead.post(url, plan("positive", "negative")).status_code == 302
+    page = lead.post(url, plan("positive", "negative"))
+    assert "already exists" in text_of(page)
+    assert Study.everywhere.filter(clinic=world.clinic, code="VAL").count() == 1
+
+
 def test_a_pasted_list_is_sealed_and_followed(world):
     rows = "number,Side,group\n1,left,A\n2,left,B\n1,right,B\n2,right,A\n"
     sent = plan("positive", "negative", method="list", factors_text="Side: left, right")

@@ -15,6 +15,7 @@ from rehab.exports.research.package import discard_old
 from rehab.patients.closure import SessionStillOpen
 from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
 from rehab.people.models import Clinic, ErasureReason
+from rehab.sessions.setup.recordings import discard_old_uploads
 
 
 class Command(BaseCommand):
@@ -51,5 +52,6 @@ class Command(BaseCommand):
             )
         if not dry_run:
             discard_old(Path(settings.DATA_DIR) / "exports", now)
+            discard_old_uploads(now)
         if dry_run:
             self.stdout.write("Nothing was changed (--dry-run).")

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from robot.wire.limits import TIME_MAX_S
 BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
 PART_BYTES = 1024 * 1024
 WAIT_S = 90.0
+KEPT_S = 86_400.0  # an upload that nobody has stored
 _one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
 # What `rehab.gait.recordings.tables` reads; it is not imported, as servers do without numpy.
 ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".txt")
@@ -69,6 +71,14 @@ def uploaded_file(person: int, ending: str) -> Path:
     folder: Path = settings.DATA_DIR / "uploads"
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder / f"{person}{ending}"
+
+
+def discard_old_uploads(now: datetime) -> None:
+    """Remove uploads that were not stored as a recording within a day."""
+    folder = settings.DATA_DIR / "uploads"
+    for file in folder.iterdir() if folder.is_dir() else ():
+        if now.timestamp() - file.stat().st_mtime >= KEPT_S:
+            file.unlink(missing_ok=True)
 
 
 def add_part(file: Path, part: bytes, at: int) -> None:

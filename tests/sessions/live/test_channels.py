@@ -14,6 +14,7 @@ import pytest
 from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import owners
+from rehab.sessions.live.session.instruments import REGISTRY
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.training.phases import make_phase
 from tests.support.callers import (
@@ -89,6 +90,21 @@ async def test_a_step_carries_the_feedback_of_its_valence(place, begun, valence)
         praises = step["confetti"] != "none"
         assert praises == (number == 1 and valence in ("positive", "binary"))
         assert step["live"] is True
+
+
+async def test_how_long_a_step_took_is_counted(place, begun):
+    def count() -> float:
+        return REGISTRY.get_sample_value("garry_delivery_seconds_count") or 0.0
+
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    source = await place.source().dial()
+    await source.hello()
+    before = count()
+    await source.walk(3.6, 2.0)
+    await tablet.until_step(2)
+    assert count() == before + 2
 
 
 async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monkeypatch):

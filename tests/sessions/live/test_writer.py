@@ -11,8 +11,11 @@ from typing import Any
 import pytest
 from asgiref.sync import sync_to_async
 from django.db import DatabaseError
+from opentelemetry.sdk.trace import TracerProvider
+from opentelemetry.sdk.trace.export import SimpleSpanProcessor
+from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 
-from rehab.sessions.live.session import commits
+from rehab.sessions.live.session import commits, instruments
 from rehab.sessions.live.session import writer as writers
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.commits import EarlierWriteFailed, Fenced, Job
@@ -173,6 +176,17 @@ async def test_a_fault_of_the_thread_fails_its_jobs_and_does_not_end_it(
     bench.walk(two)
     await until_done(bench, 5)
     assert bench.done[4] == (two.session.pk, None)
+
+
+async def test_a_commit_is_traced_with_how_much_it_stored(bench, aggregates, monkeypatch):
+    await until_done(bench, 3)
+    kept, provider = InMemorySpanExporter(), TracerProvider()
+    provider.add_span_processor(SimpleSpanProcessor(kept))
+    monkeypatch.setattr(instruments, "TRACER", provider.get_tracer("test"))
+    bench.walk(aggregates[0])
+    await until_done(bench, 4)
+    [span] = kept.get_finished_spans()
+    assert (span.name, span.attributes) == ("commit", {"garry.sessions": 1, "garry.rows": 1})
 
 
 async def test_one_report_that_fails_keeps_no_other_from_its_source(bench, aggregates, caplog):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
@@ -22,6 +23,7 @@ from rehab.sessions.live.database.trouble import WORDS, NotStored, Trouble, clas
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
 from rehab.sessions.live.session.hub import EventFeed, Subscriber
+from rehab.sessions.live.session.instruments import DELIVERY_S
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.live.session.robot_orders import RobotOrders
@@ -181,6 +183,8 @@ class LiveSession:
             if (message := source_message(self.aggregate.fold, kind)) is not None
         ]
 
+        began_s = time.monotonic()
+
         def done(problem: Exception | None) -> None:
             self.uncommitted -= 1
             if problem is not None:
@@ -204,6 +208,7 @@ class LiveSession:
                 self.feed.publish(event)
             if stored is not None and not stored.done():
                 stored.set_result(None)
+            DELIVERY_S.observe(time.monotonic() - began_s)
 
         self.uncommitted += 1
         self._writer.submit(

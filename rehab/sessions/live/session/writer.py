@@ -22,7 +22,7 @@ from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, conne
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.database.trouble import Trouble, classify_failure, concerns_all
 from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
-from rehab.sessions.live.session.instruments import COMMIT_S, STEPS, WRITE_FAILURES
+from rehab.sessions.live.session.instruments import WRITE_FAILURES, measure_commit
 
 log = logging.getLogger(__name__)
 
@@ -135,9 +135,7 @@ class Writer:
         try:
             if any(job.owner in self._failed for job in jobs):
                 raise EarlierWriteFailed
-            with COMMIT_S.time():
-                commit(jobs)
-            STEPS.inc(sum(len(job.rows) for job in jobs))
+            self._commit(jobs)
             results = [(job, None) for job in jobs]
             self._failure = Trouble.NONE
         except Exception as problem:  # any: all sessions depend on this thread
@@ -148,6 +146,11 @@ class Writer:
                 return
             results = self._write_each(jobs)
         self._finish(results)
+
+    def _commit(self, jobs: list[Job]) -> None:
+        sessions = len({job.session_id for job in jobs})
+        with measure_commit(sessions, sum(len(job.rows) for job in jobs)):
+            commit(jobs)
 
     def _fail(self, jobs: list[Job], problem: Exception) -> None:
         log.error("Nothing could be stored", exc_info=problem)
@@ -168,8 +171,7 @@ class Writer:
         if job.owner in self._failed:
             return EarlierWriteFailed("An earlier write of this session failed.")
         try:
-            commit([job])
-            STEPS.inc(len(job.rows))
+            self._commit([job])
         except Exception as problem:
             log.exception("Session %s could not be written", job.session_id)
             self._failed.add(job.owner)
