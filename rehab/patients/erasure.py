@@ -80,7 +80,7 @@ def _erase_typed_words(patient: Patient) -> None:
     )
     emptied = list(edits)
     for edit in emptied:
-        for band in edit.data["value"]["bands"]:
+        for band in edit.data.get("value", {}).get("bands", ()):
             band["words"] = ""
     edits.bulk_update(emptied, ["data"])
 

@@ -29,6 +29,7 @@ pytestmark = [
 ]
 
 TOKEN = "only who watches the server has this"
+SECRET = "Q" * 43  # opens a family's page
 
 
 @dataclass
@@ -116,8 +117,13 @@ def test_a_walk_through_the_proxy_outlives_restarts_and_a_kill(hosted: Hosted) -
 
 
 @pytest.mark.parametrize("server_name", ["uvicorn"], indirect=True)
-def test_what_the_proxy_lets_through(hosted: Hosted) -> None:
+def test_what_the_proxy_lets_through(hosted: Hosted, tmp_path: Path) -> None:
     assert hosted.get(f"{hosted.secure}/readyz")[0] == 502  # no server yet
+    assert hosted.get(f"{hosted.secure}/family/{SECRET}/")[0] == 502
+    assert hosted.get(f"{hosted.plain}/family/{SECRET}/")[0] == 308
+    logs = [(tmp_path / "nginx" / f"{name}.log").read_text() for name in ("access", "error")]
+    assert ["/readyz" in log for log in logs] == [True, True]
+    assert [SECRET in log for log in logs] == [False, False]
     with hosted.serve():
         assert hosted.get(f"{hosted.secure}/readyz")[::2] == (200, "ok\n")
         status, headers, _ = hosted.get(f"{hosted.plain}/start/?a=b")

@@ -290,7 +290,7 @@ def run_nginx(
     main.write_text(
         f"daemon off;\n{'user root;' if os.geteuid() == 0 else ''}\npid {folder}/pid;\n"
         f"error_log {folder}/error.log;\nevents {{ worker_connections 1024; }}\n"
-        f"http {{ access_log off;\n{temporary}include {folder}/garry.conf; }}\n"
+        f"http {{ access_log {folder}/access.log;\n{temporary}include {folder}/garry.conf; }}\n"
     )
     command = [find_nginx(), "-p", str(folder), "-c", str(main)]
     tried = subprocess.run([*command, "-t"], capture_output=True, text=True)

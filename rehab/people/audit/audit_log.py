@@ -15,7 +15,7 @@ from ipaddress import IPv4Address, ip_address, ip_network
 from threading import Lock
 from typing import Any, ClassVar, NoReturn
 
-from django.db import DatabaseError, IntegrityError, models, transaction
+from django.db import Error, IntegrityError, models, transaction
 from django.db.models import F, Q, QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
@@ -254,7 +254,7 @@ def record_after_the_fact(entries: list[AuditEntry]) -> None:
     try:
         with transaction.atomic():
             AuditEntry.everywhere.bulk_create(entries)
-    except DatabaseError:
+    except Error:
         log.exception("The audit log missed: %s", ", ".join(str(entry) for entry in entries))
 
 
@@ -263,7 +263,7 @@ def record_counted(entry: AuditEntry) -> None:
     try:
         with transaction.atomic():
             add_or_count(entry)
-    except DatabaseError:
+    except Error:
         log.exception("The audit log missed: %s", entry)
 
 

@@ -14,7 +14,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from channels.db import database_sync_to_async
-from django.db import DatabaseError, InterfaceError, OperationalError, transaction
+from django.db import Error, InterfaceError, OperationalError, transaction
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry
@@ -64,7 +64,7 @@ class AuditQueue:
                 entries, self._pending = self._pending, []
                 try:
                     await database_sync_to_async(_store)(entries)
-                except DatabaseError as problem:  # the training goes on
+                except Error as problem:  # the training goes on
                     is_away = isinstance(problem, OperationalError | InterfaceError)
                     if self._is_ending or not is_away:
                         log.exception("The audit log missed what sockets told it: %s", entries)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
-from django.db import DatabaseError, OperationalError
+from django.db import DatabaseError, InterfaceError, OperationalError
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import SIGN_IN_ACTS, Act, AuditEntry, RecentEntries, RecentViews
@@ -112,14 +112,15 @@ async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, be
     assert await robot.hear("stop") == {"type": "stop"}
 
 
-async def test_entries_wait_while_the_database_is_away(place, begun, monkeypatch):
+@pytest.mark.parametrize("problem", [OperationalError, InterfaceError])
+async def test_entries_wait_while_the_database_is_away(place, begun, monkeypatch, problem):
     away, store = threading.Event(), notes_module._store
     tries = []
 
     def try_to_store(entries):
         tries.append(len(entries))
         if not away.is_set():
-            raise OperationalError("the server is gone")
+            raise problem("the server is gone")
         store(entries)
 
     monkeypatch.setattr(notes_module, "RETRY_S", 0.001)
