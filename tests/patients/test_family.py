@@ -6,14 +6,13 @@ import io
 import logging
 import re
 from datetime import datetime, time, timedelta
-from logging.config import DictConfigurator
 
 import pytest
-from django.conf import settings
 from django.db import OperationalError
 from django.test import Client
 from django.urls import reverse
 
+from garry_site.logs import JsonFormatter, LineFormatter
 from rehab.patients import family
 from rehab.patients.closure import end_program
 from rehab.patients.erasure import erase
@@ -209,14 +208,12 @@ def fail(*_: object) -> None:
     raise OperationalError("the database is away")
 
 
-@pytest.mark.parametrize("log_format", ["line", "json"])
+@pytest.mark.parametrize("formatter", [LineFormatter(), JsonFormatter()])
 @pytest.mark.parametrize("is_away", [False, True], ids=["unknown link", "no database"])
-def test_no_log_has_a_token(agreed, monkeypatch, caplog, is_away, log_format):
+def test_no_log_has_a_token(agreed, monkeypatch, caplog, is_away, formatter):
     told = io.StringIO()
     handler = logging.StreamHandler(told)
-    handler.setFormatter(DictConfigurator(settings.LOGGING).configure_formatter(
-        settings.LOGGING["formatters"][log_format]
-    ))
+    handler.setFormatter(formatter)
     caplog.set_level(logging.DEBUG)
     caplog.set_level(logging.DEBUG, "django.request")
     path = give(agreed)

@@ -49,7 +49,7 @@ class WordsForm(forms.Form):
     def clean(self) -> dict[str, Any]:
         """Return the cleaned data. Refuses words that name the patient."""
         data: dict[str, Any] = super().clean() or {}
-        for field, words in data.items():
+        for field, words in list(data.items()):
             try:
                 refuse_names(words, self.patient)
             except ValidationError as problem:
