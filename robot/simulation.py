@@ -89,8 +89,11 @@ class Simulation:
             self._now_s = min(self._now_s + pause_s, until_s)
             self._handle({"type": "heartbeat"})
         self._collect()
-        self._now_s = max(self._now_s, until_s)
-        self._handle({"type": "heartbeat"})
+        if self._now_s < until_s:
+            self._now_s = until_s
+            self._handle({"type": "heartbeat"})
+            for _ in range(2):  # the first comes late, as after a hang; the next one in time
+                self._performer.tick(until_s)
 
     def _collect(self) -> None:
         """Store the robot's new decisions and gestures."""

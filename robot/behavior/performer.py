@@ -2,11 +2,12 @@
 
 It moves only while all of this holds: the server was heard within ``SILENCE_S``, the session runs,
 and ``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is not
-played later.
+played later, nor one whose steps waited while this program hung.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +17,7 @@ from robot.behavior.body import Body
 from robot.behavior.cue import QUIET_PACE, Cue
 from robot.behavior.gesture_library import GestureLibrary
 from robot.behavior.reports import Report, decision_report
-from robot.behavior.safety import AWAY, STOPPED
+from robot.behavior.safety import AWAY, LAPSED_S, STOPPED
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
@@ -77,6 +78,8 @@ class Performer:
         self._is_running = False
         self._is_alone = False  # plays a gesture without a session
         self._heard_s = 0.0
+        self._ticked_s = math.inf  # the last tick; there was none
+        self._has_hung = False  # so that what is heard may have waited meanwhile
 
     @property
     def reports(self) -> deque[Report]:
@@ -102,13 +105,19 @@ class Performer:
         return (
             self._is_welcome
             and self._is_running
+            and not self._has_hung
             and self.body.safety.is_watched
             and self.decider.cue.intensity > 0
             and not self.body.safety.blocking_reason(self.body.senses.read())
         )
 
     def handle(self, message: Message, now_s: float) -> None:
-        """Handle a message of the server; one that breaks the protocol is only counted."""
+        """Handle a message of the server; one that breaks the protocol is only counted.
+
+        After a hang of our own, nothing that could begin a motion counts until a tick comes in time
+        again: it may have waited in the socket. Stops always count.
+        """
+        self._has_hung |= now_s - self._ticked_s > LAPSED_S
         try:
             self._dispatch(message, now_s)
         except BadFrame as problem:
@@ -151,6 +160,7 @@ class Performer:
 
     def tick(self, now_s: float) -> None:
         """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
+        self._has_hung, self._ticked_s = now_s - self._ticked_s > LAPSED_S, now_s
         # Without a session it does not move, and the server sends no heartbeat.
         if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
@@ -169,6 +179,8 @@ class Performer:
         match kind:
             case "welcome" | "stop" | "error":
                 pass
+            case "step" | "arm" | "drive" if self._has_hung:
+                self.decider.drop_window()  # a step of it may be missing now
             case "heartbeat":
                 self._handle_watched(message, self.body.safety.is_watched)
             case "step":

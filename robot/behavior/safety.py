@@ -26,8 +26,8 @@ ANNOUNCE_S = 0.5
 # (docs/reference/kobuki.md#watchdogs); twice that forgives a busy computer (largest gap measured:
 # 0.03 s) and keeps the whole within 0.35 s.
 BASE_SILENT_S = 0.2
-# A computer that hung for this long [s] during a gesture: the base has stopped by itself, and a
-# gesture that was interrupted is not resumed (ISO 13850).
+# A computer that hung for this long [s]: the base has stopped by itself, a gesture that was
+# interrupted is not resumed (ISO 13850), and what waited in the socket begins none.
 LAPSED_S = ORDER_HOLDS_S
 
 SLIP_RAD = 0.175  # 10°: wheels and gyro disagree about a gesture's turns

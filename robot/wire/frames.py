@@ -11,6 +11,9 @@ from typing import Any, NoReturn
 from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS, MAX_NESTING
 
 NAME = re.compile(rf"[A-Za-z0-9_.:-]{{1,{MAX_NAME_CHARS}}}")
+# What no text of a database may hold: NUL, and halves of pairs of surrogates (one read whole is one
+# character). Only an escape can write them.
+NO_TEXT = re.compile("[\0\ud800-\udfff]")
 
 
 class BadFrame(ValueError):
@@ -96,12 +99,15 @@ def read_number(
 def check_values(value: Any, depth: int = MAX_NESTING) -> None:
     """Check that a value can be passed on. Raises BadFrame.
 
-    Numbers have to be finite, and objects and lists may nest ``depth`` deep.
+    Numbers have to be finite, texts without what no database stores, and objects and lists may nest
+    ``depth`` deep.
     """
+    if isinstance(value, str) and NO_TEXT.search(value):
+        raise BadFrame("Texts hold no NUL and no half of a surrogate pair. Leave it out.")
     if isinstance(value, float) and not math.isfinite(value):
         raise BadFrame("Numbers are finite. Send null for a missing value.")
     if isinstance(value, dict | list):
         if not depth:
             raise BadFrame(f"Objects and lists nest at most {MAX_NESTING} deep here.")
-        for item in value.values() if isinstance(value, dict) else value:
+        for item in (*value, *value.values()) if isinstance(value, dict) else value:
             check_values(item, depth - 1)

@@ -20,7 +20,6 @@ The file has a record a line (JSON Lines).
 from __future__ import annotations
 
 import base64
-import binascii
 import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -35,6 +34,7 @@ TICK = ("order_m_s", "order_rad_s", "x_m", "y_m", "heading_rad", "speed_m_s", "t
 
 MAX_TEXT_CHARS = 60_000  # with the rest of its message below a frame's limit
 MAX_FILE_BYTES = 4_000_000  # what such a text may unpack to
+_NOT_PACKED = '"recording" is packed as robot/wire/incident.py does it.'
 
 
 def to_lines(records: Iterable[Record]) -> str:
@@ -69,9 +69,17 @@ def unpack(text: str) -> list[dict[str, Any]]:
     """Return the records of such a text. Raises BadFrame for any other."""
     try:
         unpacker = zlib.decompressobj()
-        lines = unpacker.decompress(base64.b64decode(text, validate=True), MAX_FILE_BYTES)
+        lines = unpacker.decompress(read_packed(text), MAX_FILE_BYTES)
         if unpacker.eof:
             return read_lines(lines.decode())
-    except (ValueError, binascii.Error, zlib.error):
+    except (ValueError, zlib.error):
         pass
-    raise BadFrame('"recording" is packed as robot/wire/incident.py does it.')
+    raise BadFrame(_NOT_PACKED)
+
+
+def read_packed(text: str) -> bytes:
+    """Return the bytes of such a text, still compressed. Raises BadFrame for what is no base64."""
+    try:
+        return base64.b64decode(text, validate=True)
+    except ValueError:
+        raise BadFrame(_NOT_PACKED) from None

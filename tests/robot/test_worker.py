@@ -110,6 +110,27 @@ async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
 
 
 @pytest.mark.realtime
+async def test_after_a_hang_a_stop_that_waited_counts_and_a_step_does_not(garry):
+    async with working(garry) as worker:
+        await garry.until_hello(1)
+        await garry.until(is_kind("status", state="idle", reason=""))
+        await garry.tell(type="stop")
+        time.sleep(0.4)  # noqa: ASYNC251 (its loop stands, and the stop waits in its socket)
+        await garry.until(is_kind("status", state="stopped", reason="stopped"))
+        await asyncio.sleep(0.1)
+        await garry.tell(type="arm")
+        await garry.walk(0, 1, 2, 3, 4)
+        await asyncio.sleep(0.1)
+        await garry.walk(5)
+        time.sleep(0.4)  # noqa: ASYNC251
+        await asyncio.sleep(0.1)
+        assert worker.performer.decision is None
+        await garry.walk(6, 7, 8, 9, 10, 11)
+        await garry.until(is_kind("decision", gesture="celebrate"))
+        assert len(garry.sockets) == 1
+
+
+@pytest.mark.realtime
 async def test_a_server_that_goes_stops_it_and_is_found_again():
     garry, base = FakeGarry(), IdealBase(time.monotonic)
     async with serve_garry(garry) as server:

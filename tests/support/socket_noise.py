@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED_STATES, State
+from robot.wire.incident import pack
 from tests.support.api_noise import JUNK, JUNK_TEXTS
 from tests.support.callers import (
     Caller,
@@ -32,6 +33,7 @@ from tests.support.callers import (
     change,
     open_session,
 )
+from tests.support.incidents import BUMPED
 from tests.support.noise import TELLTALES, draw
 
 STEP_S = 2.0  # in which a valid step is scored, stored and shown, whatever others send
@@ -44,7 +46,10 @@ STATUS: Message = {"kind": "status", "base": "null", "state": "idle", "reason": 
 STATUS |= {"gesture": None, "pose": {"x_m": 0, "y_m": 0.5, "heading_rad": 1}, "battery_v": 16.1}
 DECISION: Message = {"kind": "decision", "from_s": 0, "until_s": 5, "mean": 1.0, "threshold": 0.9}
 DECISION |= {"activated_share": 0.5, "steps": 4, "above": True, "reason": "", "intensity": 0.8}
-GESTURE = {"kind": "gesture", "name": "celebrate", "phase": "ended", "outcome": "done"}
+GESTURE: Message = {"kind": "gesture", "name": "celebrate", "phase": "ended", "outcome": "done"}
+GESTURE |= {"note": "kept as it came"}
+INCIDENT: Message = {"type": "incident", "session": 0, "reason": "bump", "ago_s": 6.5}
+INCIDENT |= {"recording": pack(BUMPED)}
 
 HELLO: Message = {"type": "hello", "version": 1, "run": "r", "last": 0, "clock_s": 1.5, "speed": 1}
 TEMPLATES: dict[str, list[Message]] = {
@@ -57,6 +62,7 @@ TEMPLATES: dict[str, list[Message]] = {
         {"type": "hello", "version": 1, "base": "null"},
         *({"type": "report", "report": report} for report in (STATUS, DECISION, GESTURE)),
         {"type": "report", "report": {"kind": "stop", "reason": "bump"}},
+        INCIDENT,
     ],
     "tablet": [
         {"type": "seen", "frame": 1},
@@ -179,9 +185,14 @@ class Ward:
             message = dict(TEMPLATES[noise.socket][index % len(TEMPLATES[noise.socket])])
             if message["type"] == "step":
                 message["number"], next_number = next_number, next_number + 1
+            if message["type"] == "incident":
+                message["session"] = self.session.pk
             if message["type"] != "hello":
                 await caller.say(message)
-        await caller.say(noise.frame)
+        frame = noise.frame
+        if isinstance(frame, str):
+            frame = frame.replace('"session": 0', f'"session": {self.session.pk}')
+        await caller.say(frame)
         await caller.say(LAST)
         code, error = await caller.sent_away()
         self.codes[code] += 1

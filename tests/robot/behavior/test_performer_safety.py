@@ -148,6 +148,37 @@ def test_a_robot_that_hung_mid_gesture_does_not_go_on(felt):
     assert felt.ended == ["order_lapsed"]
 
 
+@pytest.mark.parametrize(("hang_s", "first"), [(3, "messages"), (0.5, "a tick")])
+def test_steps_that_waited_while_it_hung_begin_nothing_and_fresh_ones_do(felt, hang_s, first):
+    felt.walk(*[1.0] * 5)
+    felt.now_s += hang_s
+    if first == "a tick":
+        felt.robot.tick(felt.now_s)
+    felt.hear(type="heartbeat")
+    felt.hear(type="step", time_s=felt.source_s, performance=1.0)
+    assert not felt.robot.may_act  # nor may another robot that acts on its decisions
+    felt.wait(2 * TICK_S)
+    assert felt.of("decision") == felt.of("gesture") == []
+    assert felt.robot.may_act
+    felt.walk(*[1.0] * 6)
+    assert [decision["gesture"] for decision in felt.of("decision")] == ["celebrate"]
+
+
+def test_a_stop_that_waited_while_it_hung_is_obeyed_and_an_arming_is_not(felt):
+    felt.walk(*[1.0] * 6)
+    assert felt.robot.body.player.is_busy
+    felt.now_s += 3
+    felt.hear(type="stop")
+    assert felt.base.read().twist == STILL
+    assert felt.ended == ["stopped"]
+    felt.hear(type="arm")
+    felt.wait(1)
+    assert felt.state == ("stopped", "stopped")
+    felt.hear(type="arm")
+    felt.walk(*[1.0] * 6)
+    assert felt.of("decision")[-1]["gesture"] == "celebrate"
+
+
 def test_a_robot_without_a_session_waits_for_one():
     stage = Stage()
     stage.hear(type="welcome", session=None)

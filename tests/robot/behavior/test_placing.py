@@ -91,3 +91,14 @@ def test_it_ends_at_once(how):
     stage.wait(0.02 if how != "silence" else HOLDS_S + 0.02)
     assert stage.base.read().twist.is_still
     assert stage.base.ground_truth().pose != HOME
+
+
+def test_an_order_that_waited_while_it_hung_moves_nothing():
+    stage = placed()
+    stage.base.set_home = lambda: None
+    before = stage.base.ground_truth().pose
+    stage.now_s += 1
+    stage.hear(**AHEAD)
+    stage.wait(HOLDS_S)
+    assert stage.base.ground_truth().pose == before
+    assert hold(stage, 0.5) > 0

@@ -73,6 +73,14 @@ def test_values_nest_so_deep_and_no_deeper():
         check_values([value])
 
 
+@pytest.mark.parametrize("half", ["\0", chr(0xD83D), chr(0xDE00)], ids=ascii)
+def test_texts_and_names_hold_only_what_a_database_stores(half):
+    check_values({"smile": ["\N{SMILING FACE WITH OPEN MOUTH}", "é\n", ""]})
+    for value in (f"a{half}", [half], {"a": {"b": half}}, {f"{half}b": 1}):
+        with pytest.raises(BadFrame, match="Leave it out"):
+            check_values(value)
+
+
 @given(ANYTHING)
 def test_only_bad_frames_are_raised_for_any_value(value):
     try:

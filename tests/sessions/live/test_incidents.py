@@ -54,6 +54,7 @@ async def test_one_of_another_session_is_dropped(place, begun):
     "wrong",
     [
         *({"recording": ""}, {"recording": None}, {"recording": "x" * (MAX_TEXT_CHARS + 1)}),
+        *({"recording": "\ud800"}, {"recording": "a\x00b"}, {"recording": "no base64!"}),
         *({"reason": "<b>"}, {"reason": None}, {"session": "1"}),
         *({"ago_s": -1}, {"ago_s": None}, {"ago_s": 1e9}),
     ],

@@ -93,6 +93,10 @@ def spoiled(report: Message, *path: str, value: Any) -> Message:
         spoiled(DECISION, "intensity", value="much"),
         {"kind": "stop"},
         {"kind": "stop", "reason": ""},
+        *(
+            pytest.param(GESTURE | spoiler, marks=pytest.mark.postgres)
+            for spoiler in ({"note": "\x00"}, {"note": ["half of two: \ud83d"]}, {"a\x00b": 1})
+        ),
         "status",
     ],
     ids=str,

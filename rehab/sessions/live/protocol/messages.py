@@ -26,7 +26,7 @@ from robot.wire.frames import (
     read_object,
     read_whole,
 )
-from robot.wire.incident import MAX_TEXT_CHARS
+from robot.wire.incident import MAX_TEXT_CHARS, read_packed
 from robot.wire.limits import MAX_FRAME_BYTES, PROTOCOL_VERSION
 
 T = TypeVar("T")
@@ -170,6 +170,7 @@ def read_incident(message: Message) -> Incident:
     recording = message.get("recording")
     if not isinstance(recording, str) or not 0 < len(recording) <= MAX_TEXT_CHARS:
         raise BadFrame(f'"recording" is a text of at most {MAX_TEXT_CHARS} characters.')
+    read_packed(recording)
     return Incident(
         session=read_whole(message, "session", low=1),
         reason=read_name(message, "reason"),
