@@ -7,7 +7,8 @@ import re
 import pytest
 from django.urls import reverse
 
-from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act, AuditEntry, RecentViews
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.reports.incident import review_incident
@@ -32,7 +33,8 @@ def test_the_page_tells_what_happened_and_can_be_replayed(world):
     assert address(world, "incident-file") in page
 
 
-def test_who_looked_is_noted_with_the_patient(world):
+def test_who_looked_is_noted_with_the_patient(world, monkeypatch):
+    monkeypatch.setattr(audit_log, "recent_views", RecentViews())
     client_of(world).get(address(world))
     entry = AuditEntry.everywhere.get(act=Act.VIEW, about=address(world))
     assert entry.patient_id == world.patient.pk
