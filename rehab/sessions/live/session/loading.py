@@ -42,7 +42,7 @@ class LoadedSession(NamedTuple):
     aggregate: SessionAggregate
     recent: list[Step]
     robot_stopped: bool
-    was_orphaned: bool  # its process died while it was open
+    owned_before: str  # by whom, before it was claimed here; empty if nobody
 
 
 LoadResult = LoadedSession | Exception
@@ -145,12 +145,11 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
         steps = list(_read_steps(key, after))  # once, for the fold and for pages
         _fold_rest(aggregate, steps, events)
         aggregate.keep_marks([event for event in events if event.kind in marked][-MARKS:])
-        before = owned_before.get(key, "")
         found[key] = LoadedSession(
             aggregate=aggregate,
             recent=steps[-RECENT_STEPS:],
             robot_stopped=is_robot_stopped(session, events),
-            was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
+            owned_before=owned_before.get(key, ""),
         )
     return found
 
