@@ -202,7 +202,7 @@ class Runtime:
 
         ``told``: which device stopped it, if it was no person.
         """
-        self.robots.stop(live, by, told)
+        self.robots.stop(live, by, told, again=self.servers is not None)
         if self.servers is not None and live.station_id is not None:
             self.servers.tell_of_stop(live.station_id, by, told)
 

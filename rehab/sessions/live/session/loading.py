@@ -27,6 +27,7 @@ from rehab.sessions.replay import (
     fold_entries,
     merge_entries,
 )
+from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, State
 from rehab.training.controls import CONTROLS
 
@@ -186,6 +187,12 @@ def is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) -
         return session.station.robot_stopped
     orders = [one.kind for one in events if one.kind in (RobotEntry.STOP, RobotEntry.ARM)]
     return orders[-1:] == [RobotEntry.STOP]
+
+
+def find_stopped(station_ids: Collection[int]) -> set[int]:
+    """Return the stations among these whose robot's latest order was stop."""
+    stopped = Station.everywhere.filter(pk__in=station_ids, robot_stopped=True).order_by()
+    return set(stopped.values_list("pk", flat=True))
 
 
 def find_newest_open(station_id: int) -> int | None:
