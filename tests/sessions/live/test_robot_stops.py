@@ -236,7 +236,7 @@ async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
     assert (await here.session(first.pk)).robot_orders.is_stopped
 
 
-# --- stops at other servers -------------------------------------------------------------------------
+# --- stops at other servers -----------------------------------------------------------------------
 
 
 find_stopped = sync_to_async(loading.find_stopped)
