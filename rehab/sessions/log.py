@@ -46,6 +46,9 @@ class Step(ScopedModel):
     close = models.BooleanField(
         _("close"), db_default=False, help_text=_("Too uncertain to count as hit or miss.")
     )
+    late = models.BooleanField(
+        _("late"), db_default=False, help_text=_("It came too late to be shown as live.")
+    )
     points = models.SmallIntegerField(_("points"), null=True)
     valid = models.BooleanField(_("valid"))
     reasons = models.JSONField(_("reasons"), default=list)

@@ -40,6 +40,7 @@ def make_rows(session, first):
             performance=value / 3.9,
             hit=value >= 3.9,
             close=False,
+            late=False,
             points=1,
             valid=True,
             phase=1,

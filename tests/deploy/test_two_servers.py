@@ -379,3 +379,36 @@ def test_11_a_server_that_is_cut_off_sends_its_clients_to_the_other(
         assert (log["numbers"], log["refolds"]) == ([1, 2, 3, 4, 5, 6], True)
 
     run(story())
+
+
+@at_either
+def test_12_a_stop_on_the_page_of_an_ended_session_needs_no_redis(
+    pair, run, rows, token, cables, owner
+):
+    row = rows.pop()
+
+    async def story() -> None:
+        there = 1 - owner
+        path = f"/api/v1/sessions/{row['session']}/changes"
+        await pair.get(owner, path, body={"kind": "abort"}, token=token)
+        body = {**row["place"], "goal": 3.0, "source": "live"}
+        status, said = await pair.get(there, "/api/v1/sessions", token=token, body=body)
+        assert status == 201, said
+        source = await pair.source(there, row)
+        await source.until(of_type("welcome", session=json.loads(said)["id"]))
+        robot = await pair.robot(there, row)
+        await robot.until(of_type("welcome", session=json.loads(said)["id"], stopped=False))
+        monitor = await pair.monitor(owner, row)  # of the session that has ended
+        await monitor.until(of_type("snapshot", state="aborted"))
+        _, to_redis = cables[owner]
+        to_redis.cut()
+        try:
+            said_s = await monitor.say({"type": "robot", "order": "stop"})
+            stopped = await robot.find(of_type("stop"))
+            await monitor.until(of_kind("robot_stopped", stopped=True))
+        finally:
+            to_redis.mend()
+        assert robot.times[stopped] - said_s < 3
+        await pair.until_ready(owner)
+
+    run(story())

@@ -88,6 +88,7 @@ def test_every_field_of_a_step_is_kept(patient):
         "performance": pytest.approx(3.4 / 3),
         "hit": True,
         "close": False,
+        "late": False,
         "points": 1,
         "valid": True,
         "reasons": [],

@@ -148,7 +148,7 @@ class Runtime:
         loaded = await self._loader.load(session_id)
         aggregate, stopped = loaded.aggregate, loaded.robot_stopped
         live = LiveSession(aggregate, self.writer, loaded.recent, self.drop, robot_stopped=stopped)
-        await self.handover.pause_orphaned(live, is_orphaned=loaded.was_orphaned)
+        await self.handover.pause_orphaned(live, loaded.owned_before)
         self.robots.inherit_stops(live)
         self.sessions[session_id] = live
         if self.servers is not None:
@@ -202,7 +202,7 @@ class Runtime:
 
         ``told``: which device stopped it, if it was no person.
         """
-        self.robots.stop(live, by, told)
+        self.robots.stop(live, by, told, again=self.servers is not None)
         if self.servers is not None and live.station_id is not None:
             self.servers.tell_of_stop(live.station_id, by, told)
 
@@ -228,10 +228,11 @@ class Runtime:
         if live.aggregate.fold.state is State.RUNNING:
             return  # its source may reconnect
         self.sessions.pop(live.id, None)
+        self._held.discard(live.id)  # at once: it may open again before it is released
         try:
             await sync_to_async(owners.release)(live.id, live.aggregate.session.epoch)
-            self._held.discard(live.id)
         except DatabaseError:
+            self._held.add(live.id)
             log.exception("Session %s could not be released", live.id)  # go on with the others
 
     async def drain(self) -> None:

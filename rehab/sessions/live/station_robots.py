@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 
 from django.utils import timezone
 
@@ -27,12 +27,16 @@ class StationRobots:
         # At locations whose sessions were all dropped.
         self._unlogged_stops: dict[str, RobotStop] = {}
 
-    def stop(self, live: LiveSession, by: User | None, told: Message) -> None:
+    def stop(
+        self, live: LiveSession, by: User | None, told: Message, *, again: bool = False
+    ) -> None:
         """Stop the robot of a session, and of the others at its station.
 
-        ``told``: which device stopped it, if it was no person.
+        ``told``: which device stopped it, if it was no person. ``again``: it is logged even where
+        the robot is stopped already.
         """
-        for session in (live, *self._others_at_location_of(live)):
+        live.robot_orders.stop(by, timezone.now(), told, again=again)
+        for session in self._others_at_location_of(live):
             session.robot_orders.stop(by, timezone.now(), told)
 
     def stop_at(self, station_id: int, by: User | None, told: Message) -> None:
@@ -40,6 +44,27 @@ class StationRobots:
         for session in list(self._sessions.values()):
             if session.station_id == station_id:
                 session.robot_orders.stop(by, timezone.now(), told)
+
+    async def stop_as_stored(
+        self, find_stopped: Callable[[Collection[int]], Awaitable[Collection[int]]]
+    ) -> None:
+        """Stop the robots whose stop was stored by another server, and not heard here.
+
+        What is armed, or was while the database was read, is left as it is.
+        """
+        armed = [
+            (live, live.station_id, arming)
+            for live in self._sessions.values()
+            if live.station_id is not None
+            and (arming := live.robot_orders.logged_arming) is not None
+        ]
+        if not armed:
+            return
+        stopped = await find_stopped({station_id for _, station_id, _ in armed})
+        for live, station_id, arming in armed:
+            orders, is_here = live.robot_orders, self._sessions.get(live.id) is live
+            if is_here and station_id in stopped and orders.logged_arming == arming:
+                orders.stop(None, timezone.now(), {})
 
     async def arm(self, live: LiveSession, by: User) -> None:
         """Let the robot of a session move again, once that is committed."""

@@ -254,6 +254,25 @@ async def test_a_session_that_runs_elsewhere_is_left_alone(place, begun, setting
     assert (await reread(session)).state == "running"
 
 
+async def test_a_session_that_another_server_recovered_meanwhile_is_not_paused_again(
+    place, begun, monkeypatch
+):
+    session = await left_running(place, begun, 1)
+    with monkeypatch.context() as patch:
+
+        def fail(session_ids: Collection[int]) -> Any:
+            raise DatabaseError("the connection was lost")
+
+        patch.setattr(loading, "load_together", fail)
+        assert await runtimes.current().recover() == 1
+    epoch = (await reread(session)).epoch + 1
+    row = TrainingSession.everywhere.filter(pk=session.pk)
+    await row.aupdate(owner=owners.HANDED_ON, epoch=epoch)  # there it was resumed, and handed on
+    live = await runtimes.current().session(session.pk)
+    assert live.is_running
+    assert not await SessionEvent.everywhere.filter(session=session, kind="pause").aexists()
+
+
 async def test_one_broken_session_keeps_no_other_from_coming_back(place, elsewhere, begun):
     broken = await left_running(place, begun, 1)
     sound = await left_running(elsewhere, begun, 2)
@@ -276,6 +295,29 @@ async def test_a_client_that_does_not_listen_keeps_no_session_from_being_handed_
     await runtime.drain()
     assert (await reread(session)).owner == owners.HANDED_ON
     listening.set()
+
+
+async def test_a_session_that_opens_again_while_it_is_closed_is_handed_on(
+    place, ready, monkeypatch
+):
+    session, runtime = await ready(place), runtimes.current()
+    live = await runtime.session(session.pk)
+    release, may_release = owners.release, threading.Event()
+
+    def release_late(session_id: int, epoch: int) -> None:
+        assert may_release.wait(10)
+        release(session_id, epoch)
+
+    monkeypatch.setattr(owners, "release", release_late)
+    closing = asyncio.create_task(runtime.close(live))
+    await turns()
+    opening = asyncio.create_task(runtime.session(session.pk))
+    await turns()
+    may_release.set()
+    await asyncio.gather(closing, opening)
+    await change(session, "start")
+    await runtime.drain()
+    assert (await reread(session)).owner == owners.HANDED_ON
 
 
 async def test_the_drain_commits_and_closes_every_socket_with_4012(place, begun, stall):

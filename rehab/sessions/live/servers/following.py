@@ -2,7 +2,7 @@
 
 A follower reads the new rows of the log, once for all its pages, and folds them by the code that
 the owner folded them with: its pages get the same events. What no log has comes with the owner's
-hints: who is connected, what the robot says, which steps came too late to be shown as live.
+hints: who is connected, what the robot says.
 """
 
 from __future__ import annotations
@@ -76,7 +76,6 @@ class FollowedSession(LiveSession):
         self.owner = aggregate.session.owner
         self.last_event = last_event
         self._presence = NOBODY
-        self._late: set[int] = set()
 
     @property
     def viewers(self) -> Data:
@@ -99,7 +98,6 @@ class FollowedSession(LiveSession):
 
     def take_hint(self, hint: Data) -> None:
         """Publish what the owner tells and no log has."""
-        self._late = set(hint["late"])
         before, self._presence = self._presence, hint["presence"]
         if any(before[name] != self._presence[name] for name in WHO):  # ages go with heartbeats
             self.feed.publish(presence_event(self.aggregate.fold, self._presence))
@@ -116,7 +114,7 @@ class FollowedSession(LiveSession):
             while events and events[-1].after_number < step.number:
                 self._fold_event(events.pop())
             if step.number == self.next_number:
-                late = step.number in self._late or now - step.received_at > LATE
+                late = step.late or now - step.received_at > LATE
                 measured = to_measurement(*(getattr(step, name) for name in MEASURED))
                 try:
                     self.record_step(measured, step.received_at, late=late)
@@ -193,8 +191,8 @@ class Follower(Subscriber):
         """Send one hint for all that happened in this turn of the event loop."""
         self._is_due = False
         live = self.live
-        hint = {"presence": live.presence(timezone.now()), "robot": live.robot_orders.reports}
-        self._tell({"session": live.id, "late": list(live.late), **hint})
+        presence, robot = live.presence(timezone.now()), live.robot_orders.reports
+        self._tell({"session": live.id, "presence": presence, "robot": robot})
 
 
 def load_followed(session_id: int) -> FollowedSession:

@@ -72,12 +72,15 @@ class Handover:
         except Exception:  # one broken session must not keep the server from starting
             log.exception("Session %s could not be recovered", session_id)
 
-    async def pause_orphaned(self, live: LiveSession, *, is_orphaned: bool = False) -> None:
+    async def pause_orphaned(self, live: LiveSession, owned_before: str | None = None) -> None:
         """Pause a session whose process died while it ran.
 
         If that cannot be stored, it is tried again when the session is loaded next.
+        ``owned_before``: of one that was just loaded, by whom.
         """
-        if is_orphaned:
+        if owned_before in ("", owners.HANDED_ON):  # another server recovered it meanwhile
+            self._orphaned.discard(live.id)
+        elif owned_before not in (None, live.aggregate.session.owner):
             self._orphaned.add(live.id)
         if live.id in self._orphaned:
             if live.is_running:

@@ -30,6 +30,7 @@ from rehab.sessions.live.servers.handover import Handover
 from rehab.sessions.live.servers.intercom import HEARD_S, Data, Intercom, Unheard
 from rehab.sessions.live.servers.isolation import Isolation
 from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.loading import find_stopped
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.tasks import end_tasks
 from rehab.sessions.log import Remark
@@ -87,7 +88,10 @@ class Servers:
         loop = asyncio.get_running_loop()
         self._tasks = [
             loop.create_task(work, context=contextvars.Context())
-            for work in map(self._repeat, (self._beat, self._watch_database, self.followed.read))
+            for work in map(
+                self._repeat,
+                (self._beat, self._watch_database, self._watch_stops, self.followed.read),
+            )
         ]
 
     async def close(self) -> None:
@@ -139,7 +143,10 @@ class Servers:
         self._tell_all("opened", {"session": session_id, "station": station_id})
 
     def tell_of_stop(self, station_id: int, by: User | None, told: Message) -> None:
-        """Tell other servers of a stop: sessions of one station share its robot."""
+        """Tell other servers of a stop: sessions of one station share its robot.
+
+        Where that is lost they find it in the database within a second.
+        """
         self._tell_all("stop_at", {"station": station_id, "by": by and by.pk, "told": told})
 
     def _tell_all(self, kind: str, data: Data) -> None:
@@ -197,6 +204,12 @@ class Servers:
             log.critical("This server is cut off from its database; clients go to another one.")
             for socket in list(self._owning.sockets):
                 socket.close_soon(CloseCode.RESTARTING)
+        await asyncio.sleep(BEAT_S)
+
+    async def _watch_stops(self) -> None:
+        """Each second: stop the robots that were stopped at another server, heard of or not."""
+        robots = self._owning.robots
+        await robots.stop_as_stored(lambda stations: self._database.run(find_stopped, stations))
         await asyncio.sleep(BEAT_S)
 
     def _is_gone(self, owner: str) -> bool:

@@ -29,6 +29,7 @@ class StepRow(NamedTuple):
     session_id: int
     step: ScoredStep
     received_at: datetime
+    late: bool = False  # not shown as live
 
 
 Row = StepRow | SessionEvent | SessionMetric
@@ -100,9 +101,11 @@ class SessionAggregate:
         elif kind in list(Remark):
             self.marks.append({"after": event.after_number, "kind": kind, "value": value})
 
-    def record_step(self, measurement: Measurement, received_at: datetime) -> StepRow:
+    def record_step(
+        self, measurement: Measurement, received_at: datetime, *, late: bool = False
+    ) -> StepRow:
         """Score one stride and return its row. Raises what ``SessionFold.step`` raises."""
-        return StepRow(self.id, self.fold.step(measurement), received_at)
+        return StepRow(self.id, self.fold.step(measurement), received_at, late)
 
     def change(self, change: Change, by: User | None, at: datetime) -> list[Row]:
         """Apply a change from the next step on and return the rows that record it.

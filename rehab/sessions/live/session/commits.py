@@ -37,6 +37,7 @@ STEP_COLUMNS = (
     "performance",
     "hit",
     "close",
+    "late",
     "points",
     "valid",
     "reasons",
@@ -68,7 +69,7 @@ def _sqlite_time(at: datetime) -> str:
 
 def _step_values(row: StepRow, adapt_time: Callable[[datetime], Any]) -> tuple[Any, ...]:
     """Return the values of a row, in the order of ``STEP_COLUMNS``."""
-    session_id, step, received_at = row
+    session_id, step, received_at, late = row
     return (
         session_id,
         step.number,
@@ -82,6 +83,7 @@ def _step_values(row: StepRow, adapt_time: Callable[[datetime], Any]) -> tuple[A
         step.performance,
         step.hit,
         step.close,
+        late,
         step.points,
         step.valid,
         _to_json(step.reasons).decode() if step.reasons else "[]",

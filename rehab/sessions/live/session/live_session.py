@@ -34,7 +34,6 @@ from rehab.training.changes import Change, ChangeKind, State
 from rehab.training.controls import Audience
 from rehab.training.steps import Measurement, ScoredStep
 
-LATE_STEPS = 256
 RECENT_STEPS = 60  # strides that a page's chart may begin with
 
 
@@ -78,7 +77,6 @@ class LiveSession:
         self.robot: Peer | None = None
         self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
         self.tablets = 0
-        self.late: deque[int] = deque(maxlen=LATE_STEPS)  # steps that were not shown as live
         self.tablet_heard_at: datetime | None = None
         self.stride_at: datetime | None = recent[-1].received_at if recent else None
         self.committed = aggregate.fold.last_number
@@ -121,9 +119,7 @@ class LiveSession:
         """Score a step and queue it for the log. Raises what ``SessionFold.step`` raises."""
         fold = self.aggregate.fold
         before = Before.of(fold)
-        row = self.aggregate.record_step(measurement, received_at)
-        if late:
-            self.late.append(row.step.number)
+        row = self.aggregate.record_step(measurement, received_at, late=late)
         events = events_of_step(fold, before, row.step, self.feed.audiences, live=not late)
         rows: list[Row] = [row]
         changed = before.changed_by_step(fold)

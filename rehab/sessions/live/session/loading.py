@@ -27,6 +27,7 @@ from rehab.sessions.replay import (
     fold_entries,
     merge_entries,
 )
+from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, State
 from rehab.training.controls import CONTROLS
 
@@ -42,7 +43,7 @@ class LoadedSession(NamedTuple):
     aggregate: SessionAggregate
     recent: list[Step]
     robot_stopped: bool
-    was_orphaned: bool  # its process died while it was open
+    owned_before: str  # by whom, before it was claimed here; empty if nobody
 
 
 LoadResult = LoadedSession | Exception
@@ -145,12 +146,11 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
         steps = list(_read_steps(key, after))  # once, for the fold and for pages
         _fold_rest(aggregate, steps, events)
         aggregate.keep_marks([event for event in events if event.kind in marked][-MARKS:])
-        before = owned_before.get(key, "")
         found[key] = LoadedSession(
             aggregate=aggregate,
             recent=steps[-RECENT_STEPS:],
             robot_stopped=is_robot_stopped(session, events),
-            was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
+            owned_before=owned_before.get(key, ""),
         )
     return found
 
@@ -187,6 +187,12 @@ def is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) -
         return session.station.robot_stopped
     orders = [one.kind for one in events if one.kind in (RobotEntry.STOP, RobotEntry.ARM)]
     return orders[-1:] == [RobotEntry.STOP]
+
+
+def find_stopped(station_ids: Collection[int]) -> set[int]:
+    """Return the stations among these whose robot's latest order was stop."""
+    stopped = Station.everywhere.filter(pk__in=station_ids, robot_stopped=True).order_by()
+    return set(stopped.values_list("pk", flat=True))
 
 
 def find_newest_open(station_id: int) -> int | None:

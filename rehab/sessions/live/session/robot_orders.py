@@ -52,17 +52,25 @@ class RobotOrders:
         self.is_stopped = is_stopped  # until a person arms it again
         self.unlogged_stop: RobotStop | None = None  # in force, not committed yet
         self.reports: Message = {"status": None, "decision": None}  # the latest
+        self._armings = self._logged_armings = 0
         self._live = live
         self._submit = submit
 
-    def stop(self, by: User | None, at: datetime, data: Message) -> None:
+    @property
+    def logged_arming(self) -> int | None:
+        """The count of armings, where the robot may move by what is committed; else None."""
+        is_logged = not self.is_stopped and self._logged_armings == self._armings
+        return self._armings if is_logged else None
+
+    def stop(self, by: User | None, at: datetime, data: Message, *, again: bool = False) -> None:
         """Stop the robot at once, until a person arms it.
 
-        ``data``: which device stopped it, if it was no person.
+        ``data``: which device stopped it, if it was no person. ``again``: it is logged even where
+        the robot is stopped already: another server may have armed it.
         """
         if self._live.robot is not None:
             self._live.robot.tell({"type": "stop"})
-        if self.is_stopped:
+        if self.is_stopped and (self.unlogged_stop is not None or not again):
             return
         self.is_stopped = True
         self.unlogged_stop = stop = RobotStop(by, at, data)
@@ -79,6 +87,10 @@ class RobotOrders:
         """Let the robot move again once that is committed; then the future is done."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.is_stopped = False
+        self._armings += 1
+
+        def note() -> None:
+            self._logged_armings += 1
 
         def tell(result: asyncio.Future[None]) -> None:
             failed = result.cancelled() or result.exception() is not None
@@ -88,7 +100,7 @@ class RobotOrders:
         stored.add_done_callback(tell)
         row = self._live.aggregate.log_event(RobotEntry.ARM, by, at, {})
         event = robot_stopped_event(self._live.aggregate.fold, False)
-        self._submit([row], [event], [], stored=stored)
+        self._submit([row], [event], [], stored=stored, on_stored=note)
         return stored
 
     def record_report(self, report: Message, at: datetime) -> None:
