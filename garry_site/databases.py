@@ -12,7 +12,8 @@ SQLITE_OPTIONS = {
         # FULL keeps acknowledged steps through a power cut, not only through a crash
         # (docs/reference/stack.md#durability).
         "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; "
-        "PRAGMA mmap_size=134217728; PRAGMA cache_size=-16000; "
+        # No memory map: an error of the disk in it would end the process (sqlite.org/mmap.html).
+        "PRAGMA mmap_size=0; PRAGMA cache_size=-16000; "
         # The live runtime checkpoints between commits (rehab/sessions/live/process.py); left to
         # SQLite, every fiftieth commit would wait for a checkpoint.
         "PRAGMA wal_autocheckpoint=20000;"
