@@ -26,7 +26,7 @@ class ClinicForm(forms.ModelForm):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        if getattr(self.instance, "clinic_id", 0) is None:
+        if self.instance.pk is None and getattr(self.instance, "clinic_id", 0) is None:
             self.instance.clinic_id = self.new_clinic_id
         say_ranges(self)
 
