@@ -44,7 +44,7 @@ PAGE_ROWS = 2_000  # rows held in memory
 SESSIONS_PAGE = 200
 STEP_FIELDS = (
     *("number", "time_s", "received_at", "side", "value", "gain", "shown", "goal", "performance"),
-    *("hit", "close", "points", "valid", "reasons", "phase", "rules_version", "extra"),
+    *("hit", "close", "late", "points", "valid", "reasons", "phase", "rules_version", "extra"),
 )
 NUMBER, SIDE, REASONS, PHASE = (
     STEP_FIELDS.index(name) for name in ("number", "side", "reasons", "phase")

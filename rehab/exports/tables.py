@@ -149,6 +149,7 @@ STEPS = Table(
         Column("performance", "ratio", "shown / goal.", Type.NUMBER),
         Column("hit", "", "true: performance of 1 or more.", Type.BOOLEAN),
         Column("close", "", "true: too uncertain to count as hit or miss.", Type.BOOLEAN),
+        Column("late", "", "true: it came too late to be shown as live.", Type.BOOLEAN),
         Column("points", "points", "Points given or taken.", Type.INTEGER),
         Column("valid", "", "false: not shown, paid or punished.", Type.BOOLEAN),
         Column("reasons", "", "Why it is not valid, separated by blanks."),

@@ -20,7 +20,7 @@ def told_steps(session: TrainingSession) -> Iterator[tuple[Any, ...]]:
     """Yield a row for each step that the page answered: the columns of ``FEEDBACK`` from number on.
 
     The same fold and the same rule make them as made the page's. A step that arrived too late to
-    be answered at its moment is among them: its points counted, and the log does not know more.
+    be answered at its moment is among them, as its points counted; the steps' table says which.
     """
     fold = SessionFold(session.to_plan())
     try:

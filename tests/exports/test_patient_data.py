@@ -165,6 +165,7 @@ def test_visits_boards_and_earlier_values_are_told(world):
 
 def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
     Step.everywhere.filter(number=4).update(value=0.1 + 0.2, time_s=1e-17, goal=1 / 3)
+    Step.everywhere.filter(number=5).update(late=True)
     files = fetch(world)
     for row, step in zip(
         rows_of(files["steps.csv"]), Step.everywhere.order_by("number"), strict=True
@@ -178,6 +179,7 @@ def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
             "" if step.hit is None else str(step.hit).lower(),
             str(step.valid).lower(),
         )
+        assert row["late"] == str(step.number == 5).lower()
         assert datetime.fromisoformat(row["received_at"]) == step.received_at
         assert row["reasons"].split() == step.reasons
         assert (row["phase_kind"], row["side"], row["trained"]) == ("training", "left", "true")
