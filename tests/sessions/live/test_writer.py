@@ -185,8 +185,13 @@ async def test_a_commit_is_traced_with_how_much_it_stored(bench, aggregates, mon
     monkeypatch.setattr(instruments, "TRACER", provider.get_tracer("test"))
     bench.walk(aggregates[0])
     await until_done(bench, 4)
-    [span] = kept.get_finished_spans()
-    assert (span.name, span.attributes) == ("commit", {"garry.sessions": 1, "garry.rows": 1})
+    fail_on(monkeypatch, aggregates[0].session.pk, DatabaseError("Failing row contains (Rosa)"))
+    bench.walk(aggregates[0])
+    await until_done(bench, 5)
+    stored, *failed = kept.get_finished_spans()
+    assert (stored.name, stored.attributes) == ("commit", {"garry.sessions": 1, "garry.rows": 1})
+    assert failed
+    assert not any("Rosa" in span.to_json() for span in failed)
 
 
 async def test_one_report_that_fails_keeps_no_other_from_its_source(bench, aggregates, caplog):
