@@ -7,6 +7,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -47,8 +48,8 @@ def drive(
 ) -> dict[str, Any]:
     """Run the load against a server; add what the server's process spent for each step.
 
-    ``slices``: of that time, each with its latencies and the memory at its end. ``seen``: where a
-    watched server (watched.py) writes what it saw, which is added, too.
+    ``slices``: of that time, each with its latencies, its end and the memory then. ``seen``: where
+    a watched server (watched.py) writes what it saw, which is added, too.
     """
     program = [sys.executable, "tests/bench/load.py", mode, str(port), str(rows)]
     process = subprocess.Popen(
@@ -59,7 +60,7 @@ def drive(
     )
     assert process.stdout is not None
     server, spent, first_rss, result = psutil.Process(pid), 0.0, 0, {}
-    rss_mb: list[float] = []
+    ends: list[tuple[float, float]] = []
     for line in process.stdout:
         times = server.cpu_times()
         used = times.user + times.system
@@ -68,7 +69,7 @@ def drive(
             if seen is not None:
                 server.send_signal(signal.SIGUSR1)
         elif line == "slice\n":
-            rss_mb.append(server.memory_info().rss / 1e6)
+            ends.append((time.monotonic(), server.memory_info().rss / 1e6))
         elif line == "measured\n":
             spent = used - spent
             if seen is not None:
@@ -80,8 +81,8 @@ def drive(
     result["us_per_step"] = 1e6 * spent / result["steps"]
     result["rss_mb"] = server.memory_info().rss / 1e6
     result["first_rss_mb"] = first_rss / 1e6
-    for part, mb in zip(result["slices"], rss_mb, strict=True):
-        part["rss_mb"] = mb
+    for part, (ended, mb) in zip(result["slices"], ends, strict=True):
+        part |= {"ended": ended, "rss_mb": mb}
     if seen is not None:
         result |= json.loads(seen.read_text())
     return result

@@ -66,6 +66,7 @@ def run_postgres(
     *,
     disk: Path | None = None,
     variables: dict[str, str] | None = None,
+    settings: str = "",
 ) -> Iterator[str]:
     """Run a PostgreSQL of our own until the block ends; yield the address of its database.
 
@@ -79,13 +80,17 @@ def run_postgres(
         Where its folder is made, else among the temporary ones.
     variables
         Environment variables of its own.
+    settings
+        Of its own, as on its command line: ``-c commit_delay=500``.
     """
     with tempfile.TemporaryDirectory(prefix="garry-postgres-", dir=disk) as name:
-        yield from _run_postgres(Path(name), {} if restarts is None else restarts, variables)
+        yield from _run_postgres(
+            Path(name), {} if restarts is None else restarts, variables, settings
+        )
 
 
 def _run_postgres(
-    folder: Path, restarts: Restarts, variables: dict[str, str] | None
+    folder: Path, restarts: Restarts, variables: dict[str, str] | None, settings: str
 ) -> Iterator[str]:
     bin_folder = find_initdb().parent
     port = free_port()
@@ -110,7 +115,9 @@ def _run_postgres(
         **account,
     )
     assert made.returncode == 0, made.stderr
-    options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={sockets}"
+    options = (
+        f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={sockets} {settings}"
+    )
 
     def start() -> subprocess.Popen[bytes]:
         return subprocess.Popen(
