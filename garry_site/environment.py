@@ -3,6 +3,7 @@ ones.
 """
 
 import os
+import re
 
 from django.core.exceptions import ImproperlyConfigured
 
@@ -10,9 +11,18 @@ VARIABLES: dict[str, str] = {}  # every variable that is read, and what it is fo
 
 
 def text(name: str, default: str, about: str) -> str:
-    """Read a variable as text."""
+    """Read a variable as text.
+
+    Refused with a comment in it: a shell takes one off, systemd and containers do not, so that a
+    command and the server would have two keys.
+    """
     VARIABLES[name] = about
-    return os.environ.get(name, "") or default
+    value = os.environ.get(name, "")
+    if re.search(r"\s#", value):
+        raise ImproperlyConfigured(
+            f"{name} has a comment in its value. Put comments (#) on lines of their own."
+        )
+    return value or default
 
 
 def flag(name: str, default: bool, about: str) -> bool:

@@ -32,7 +32,7 @@ from robot.base_options import add_base_arguments, make_base
 from robot.bases import BadOption, BaseLost
 from robot.bases.twin.__main__ import main as run_twin
 from robot.black_box.recorder import BlackBox
-from robot.calibration import BadCalibration, apply_calibration
+from robot.calibration import BadCalibration, apply_calibration, calibration_file
 from robot.connection_args import (
     BadConnectionArgs,
     add_connection_arguments,
@@ -145,6 +145,11 @@ def run(options: Namespace) -> int:
     with base, originals or contextlib.nullcontext(), box or contextlib.nullcontext():
         if apply_calibration(base):
             print_notice(f"{base.identity} answers as it was measured to.")
+        elif base.abilities.moves and not base.abilities.simulated:
+            print_notice(
+                f"{calibration_file()} has no measurement of {base.identity}. Run `python -m robot "
+                f"calibrate` for that file."
+            )
         make_worker = partial(
             Worker,
             partial(Link, url, token, keep_token=find_token_store(options, print_notice)),

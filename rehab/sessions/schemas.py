@@ -198,6 +198,7 @@ class StepOut(Schema):
     performance: float | None
     hit: bool | None
     close: bool
+    late: bool
     points: int | None
     valid: bool
     reasons: list[str]

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from django.utils.translation import gettext as _
+from django.utils.translation import override
+
 from rehab.people.models import Clinic
 from rehab.stations.models import Device, Station
 
-FIRST_STATION = "Station 1"
-
 
 def first_station(clinic: Clinic) -> Station:
-    """Return a clinic's first station; create it on first use."""
-    stations = Station.everywhere.filter(clinic=clinic).order_by("pk")
-    return stations.first() or Station.everywhere.create(clinic=clinic, name=FIRST_STATION)
+    """Return a clinic's first station; create it on first use, named in the clinic's language."""
+    found = Station.everywhere.filter(clinic=clinic).order_by("pk").first()
+    if found is not None:
+        return found
+    with override(clinic.language):
+        return Station.everywhere.create(clinic=clinic, name=_("Station 1"))
 
 
 def issue_builtin_token(station: Station, kind: Device.Kind) -> str:
     """Return a new token of the station's built-in device; the one before stops working."""
     device = Device.everywhere.filter(station=station, kind=kind, builtin=True).first()
     if device is None:
+        with override(station.clinic.language):
+            name = _("Built in")
         device = Device(
-            clinic_id=station.clinic_id, station=station, kind=kind, name="Built in", builtin=True
+            clinic_id=station.clinic_id, station=station, kind=kind, name=name, builtin=True
         )
     token = device.new_token()
     device.revoked_at = None

@@ -44,13 +44,20 @@ def next_visit(enrollment: Enrollment) -> StudyVisit | None:
 
 
 def start_session(
-    enrollment: Enrollment, place: Place, by: User | None, now: datetime
+    enrollment: Enrollment,
+    place: Place,
+    by: User | None,
+    now: datetime,
+    *,
+    chosen_id: str | None = None,
 ) -> TrainingSession:
     """Create the session of a participant's next visit, with the arm's condition.
 
+    ``chosen_id``: key of the visit that somebody saw as the next one, where somebody did.
+
     Raises InvalidSetting for a participant who has withdrawn, walked all visits or has a session
-    that is open, a study that is not running or was changed, a person to whom the arm is hidden,
-    and what `create_session` refuses.
+    that is open, where another visit is next, for a study that is not running or was changed, a
+    person to whom the arm is hidden, and what `create_session` refuses.
     """
     study = enrollment.study
     with transaction.atomic():
@@ -61,12 +68,16 @@ def start_session(
                 gettext("The study is closed, or %(code)s has withdrawn: no session of it starts.")
                 % {"code": enrollment.code}
             )
-        # Two people who start the same visit would begin the next one, too: in another arm, maybe.
         check_no_open_session(study, enrollment.patient)
         visit = next_visit(enrollment)
         if visit is None:
             raise InvalidSetting(
                 gettext("%(code)s has walked all visits of the study.") % {"code": enrollment.code}
+            )
+        # Two people who start the same visit would begin the next one, too: in another arm, maybe.
+        if chosen_id not in (None, str(visit.pk)):
+            raise InvalidSetting(
+                gettext("Somebody else has started that visit. Look at the list, then start again.")
             )
         if visit.session is not None:  # it was broken off
             visit = StudyVisit(

@@ -85,13 +85,16 @@ def test_step_to_screen(tmp_path: Path, database_and_redis: tuple[str, str], cou
         floor = drive("relay", port, pid, rows, VIEWERS)
     with stock_channels(database_and_redis[1]) as (port, pid):
         stock = drive("relay", port, pid, rows, VIEWERS)
-    seen = {"relay": floor, "stock Channels, Redis": stock}
+    seen, disk_ms = {"relay": floor, "stock Channels, Redis": stock}, 0.0
     for processes in PROCESSES:
         folder = tmp_path / str(processes)
         folder.mkdir()
         pair = Pair(folder, *database_and_redis, count=processes)
-        seen[f"{processes} processes"] = sum_up(asyncio.run(run_load(pair, folder, count)))
-    is_busy = floor["view_p99_ms"] > BUSY_MS
+        with watch_machine(DISK) as (disk, _):
+            seen[f"{processes} processes"] = sum_up(asyncio.run(run_load(pair, folder, count)))
+        print(f"\nthe disk kept a page within {disk.p99_ms():.1f} ms (p99)", end="")
+        disk_ms = max(disk_ms, disk.p99_ms())
+    is_busy = floor["view_p99_ms"] > BUSY_MS or disk_ms > BUSY_MACHINE_MS
     for name, one in seen.items():
         ratio = one["us_per_step"] / floor["us_per_step"]
         print(
@@ -114,7 +117,11 @@ def test_soak(tmp_path: Path, database_and_redis: tuple[str, str]):
     with watch_machine(DISK) as (disk, processor):
         runs = asyncio.run(run_load(pair, tmp_path, SOAKED, **how))
     ends = [part["ended"] for part in runs[0]["slices"]]
-    waits_ms = {"disk_p99_ms": disk.p99_ms(ends), "processor_p99_ms": processor.p99_ms(ends)}
+    slices = [(end - 60 * SOAK_MINUTES / SLICES, end) for end in ends]
+    waits_ms = {
+        "disk_p99_ms": [disk.p99_ms(*one) for one in slices],
+        "processor_p99_ms": [processor.p99_ms(*one) for one in slices],
+    }
     rows = [
         (key, [part[key] for part in run["slices"]])
         for run in runs

@@ -5,11 +5,12 @@ A floor for latencies that hang on them, measured beside the run.
 
 from __future__ import annotations
 
+import math
 import os
 import statistics
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -27,19 +28,10 @@ class Waits:
     def __init__(self) -> None:
         self._waits: list[tuple[float, float]] = []
 
-    def p99_ms(self, ends: Sequence[float]) -> list[float]:
-        """Return the 99 % of each slice, which begins where the one before it ends.
-
-        The first is as long as the second.
-        """
-        begins = [2 * ends[0] - ends[1], *ends[:-1]]
-        return [
-            1000 * statistics.quantiles(self._waited_s(*slice_), n=100, method="inclusive")[98]
-            for slice_ in zip(begins, ends, strict=True)
-        ]
-
-    def _waited_s(self, begin: float, end: float) -> list[float]:
-        return [waited for due, waited in self._waits if begin <= due < end]
+    def p99_ms(self, begin: float = -math.inf, end: float = math.inf) -> float:
+        """Return the 99 % of the calls that were due from ``begin`` to ``end``."""
+        waited_s = [waited for due, waited in self._waits if begin <= due < end]
+        return 1000 * statistics.quantiles(waited_s, n=100, method="inclusive")[98]
 
     @contextmanager
     def repeat(self, call: Callable[[], object]) -> Iterator[None]:

@@ -83,12 +83,27 @@ def test_the_server_has_longer_to_stop_than_it_takes() -> None:
     assert float(grace[1]) > STOP_S
 
 
+def test_a_robots_port_may_owe_its_base_a_stop_after_the_service_has_ended() -> None:
+    read = Unit(strict=False)
+    read.read(DEPLOY / "systemd" / "garry-robot.service")
+    assert read["Service"]["KillMode"] == "process"
+
+
+def test_the_settings_to_copy_are_the_same_for_systemd_and_a_shell() -> None:
+    text = (ROOT / "docs" / "hosting.md").read_text()
+    lines = re.findall(r"^ +(GARRY_\w+=.*)$", text, re.MULTILINE)
+    assert len(lines) > 8
+    for line in lines:
+        name, value = line.split("=", 1)
+        assert shlex.split(line, comments=True) == [f"{name}={value}"]
+
+
 def test_settings_that_are_named_exist() -> None:
     named = set()
     for file in (*DEPLOY.rglob("*"), ROOT / "docs" / "hosting.md"):
         if file.is_file() and file.suffix != ".pyc":
             named |= set(re.findall(r"\bGARRY_[A-Z_]+\b", file.read_text()))
-    clients = {"GARRY_SERVER", "GARRY_TOKEN", "GARRY_TEST_ALL"}
+    clients = {"GARRY_SERVER", "GARRY_TOKEN", "GARRY_ROBOT_CALIBRATION", "GARRY_TEST_ALL"}
     assert named - clients <= set(settings.VARIABLES)
 
 

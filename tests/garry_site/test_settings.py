@@ -58,6 +58,7 @@ def test_the_hosted_settings_pass_the_deployment_checks(tmp_path):
         ({"GARRY_PROT": "8001"}, "garry.W008"),
         ({"GARRY_PORT": "eighty"}, "whole number from 1 to 65535"),
         ({"GARRY_HOSTED": "maybe"}, "neither yes nor no"),
+        ({"GARRY_METRICS_TOKEN": "a_token     # for Prometheus"}, "lines of their own"),
         ({"GARRY_TIME_ZONE": "Mars/Base"}, "no time zone"),
         ({"GARRY_LOG_LEVEL": "LOUD"}, "GARRY_LOG_LEVEL must be"),
         ({"GARRY_DATABASE_URL": "nonsense"}, "GARRY_DATABASE_URL"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import socket
 import sys
 import threading
 import time
@@ -83,6 +85,18 @@ def test_requests_are_traced_by_their_route(tmp_path, collector, server_name):
     assert told["http.response.status_code"].int_value == 404
     assert len(told["garry.request"].string_value) == 32
     assert not any(TOKEN.encode() in one for one in collector.sent)
+
+
+@pytest.mark.server
+def test_a_stop_waits_for_no_collector(tmp_path):
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen()  # it takes connections, and never answers
+        settings = {"OTEL_EXPORTER_OTLP_ENDPOINT": f"http://127.0.0.1:{deaf.getsockname()[1]}"}
+        with serve(tmp_path, settings=settings) as server:
+            urllib.request.urlopen(f"http://127.0.0.1:{server.port}/healthz", timeout=10).close()
+            server.process.send_signal(signal.SIGTERM)
+            assert server.process.wait(6) == 0
 
 
 def test_without_an_endpoint_there_are_none(monkeypatch):

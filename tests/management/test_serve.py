@@ -9,6 +9,7 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from types import SimpleNamespace
 
 import pytest
 from django.core.management import CommandError, call_command
@@ -63,6 +64,14 @@ def test_a_port_that_is_taken_is_named_with_the_cure(tmp_path):
         )
     assert result.returncode == 1
     assert re.search(r"choose another port: GARRY_PORT=\d+ make run", result.stderr)
+
+
+def test_several_servers_have_no_address_in_common(monkeypatch, settings):
+    settings.HOSTED, settings.REDIS_URL = True, "redis://127.0.0.1:1/0"
+    settings.ADDRESS = "10.0.0.1:8000"
+    monkeypatch.setattr(command, "connection", SimpleNamespace(vendor="postgresql"))
+    with pytest.raises(CommandError, match="Unset it"):
+        call_command("serve", processes=2)
 
 
 def test_several_servers_begin_only_where_all_their_ports_are_free(monkeypatch):

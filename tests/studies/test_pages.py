@@ -205,8 +205,18 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
 
 
 def start_visit(client: Client, enrollment: Enrollment) -> Any:
+    page = client.get(reverse("participant", args=[enrollment.pk]))
+    return press_start(client, enrollment, shown_visit(page))
+
+
+def shown_visit(page: Any) -> str:
+    found = re.search(r'name="visit" value="(\d+)"', page.content.decode())
+    return found[1] if found else ""
+
+
+def press_start(client: Client, enrollment: Enrollment, visit: str) -> Any:
     station = Station.everywhere.filter(clinic=enrollment.clinic).first()
-    where = {"station": station.pk, "source": "live"}
+    where = {"station": station.pk, "source": "live", "visit": visit}
     return client.post(reverse("start-visit", args=[enrollment.pk]), where)
 
 
@@ -229,6 +239,19 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
         pt.post(url, {"patient": patient.pk, "keep_data": "no"})
     )
     assert refusals(caplog) == [f"Refused to account {world.people[Role.PT].pk}: {url}"]
+
+
+def test_an_old_page_starts_no_visit_but_the_one_that_it_shows(world):
+    study = running_study(world)
+    enrollment = enrolled(study, new_patient(world))
+    pt = client_of(world)
+    old = shown_visit(pt.get(reverse("participant", args=[enrollment.pk])))
+    assert press_start(pt, enrollment, old).status_code == 302
+    assert "still has an open session" in text_of(press_start(pt, enrollment, old))
+    first = TrainingSession.everywhere.filter(study_visit__enrollment=enrollment)
+    first.update(state="finished")
+    assert "Somebody else" in text_of(press_start(pt, enrollment, old))
+    assert first.count() == 1
 
 
 def test_an_arm_is_revealed_with_a_reason_and_the_lead_can_read_who_asked(world):

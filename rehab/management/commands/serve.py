@@ -171,6 +171,11 @@ def check_sharing(processes: int) -> None:
             "GARRY_HOSTED=1, GARRY_DATABASE_URL=postgres://… and GARRY_REDIS_URL=redis://…, or "
             "serve by one process."
         )
+    if settings.ADDRESS:
+        raise CommandError(
+            "GARRY_ADDRESS is the address of one server. Unset it: several have the host's and "
+            "their ports'. Or start each by a `serve` of its own."
+        )
 
 
 def take_lease(host: str, port: int) -> Lease:

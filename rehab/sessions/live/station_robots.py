@@ -32,8 +32,8 @@ class StationRobots:
     ) -> None:
         """Stop the robot of a session, and of the others at its station.
 
-        ``told``: which device stopped it, if it was no person. ``again``: it is logged even where
-        the robot is stopped already.
+        ``told``: which device stopped it, if it was no person. ``again``: where the robot is
+        stopped already, it is stored still, if another server has armed it meanwhile.
         """
         live.robot_orders.stop(by, timezone.now(), told, again=again)
         for session in self._others_at_location_of(live):

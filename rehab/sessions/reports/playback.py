@@ -2,14 +2,14 @@
 
 The log is folded again by the rules by which the session ran, and each step and event is told by
 the same functions, so that a page that plays it shows what it showed then. What no log has is not
-made up: who was connected, and which steps came too late to be shown.
+made up: who was connected.
 """
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from datetime import datetime
 from typing import Any
 
@@ -23,7 +23,7 @@ from rehab.sessions.events.event import (
 )
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.incidents import RobotIncident
-from rehab.sessions.log import EVENTS, Remark, RobotEntry, RuleEntry, SessionEvent
+from rehab.sessions.log import EVENTS, Remark, RobotEntry, RuleEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog, log_rows, to_change
@@ -75,12 +75,13 @@ def play_back(user: User, session: TrainingSession) -> Message:
         )
         for audience in AUDIENCES
     }
+    late = set(Step.everywhere.filter(session=session, late=True).values_list("number", flat=True))
     moments: list[list[Any]] = []
     at_s = 0.0
     for at, row in rows:
         # What was noted before the start belongs to it, and a clock may be set back.
         at_s = max(at_s, round((at - began).total_seconds(), 2))
-        for event in _events(fold, row):
+        for event in _events(fold, row, late):
             texts = [event.text(audience) for audience in AUDIENCES]
             if any(texts):
                 told = [text and json.loads(text) for text in texts]
@@ -113,14 +114,18 @@ def _is_robot(row: Row) -> bool:
     return isinstance(row, SessionEvent) and row.kind in list(RobotEntry)
 
 
-def _events(fold: SessionFold, row: Row) -> list[LiveEvent]:
-    """Fold an entry of the log and return its events; none where it had no effect."""
+def _events(fold: SessionFold, row: Row, late: Collection[int]) -> list[LiveEvent]:
+    """Fold an entry of the log and return its events; none where it had no effect.
+
+    ``late``: numbers of the steps that were not shown as live.
+    """
     if isinstance(row, SessionEvent) and row.kind not in CONTROLS:
         return [_told(fold, row)]
     before = Before.of(fold)
     try:
         if isinstance(row, Measurement):
-            return events_of_step(fold, before, fold.step(row), AUDIENCES, live=True)
+            is_live = row.number not in late
+            return events_of_step(fold, before, fold.step(row), AUDIENCES, live=is_live)
         change = to_change(row)
         fold.change(change)
         return events_of_change(fold, before, change)

@@ -87,14 +87,18 @@ def start_visit(request: HttpRequest, enrollment_id: int) -> HttpResponse:
     user = user_of(request)
     enrollment = get_enrollment(user, enrollment_id)
     form = PlaceForm(request.POST, patient=enrollment.patient, by=user)
+    refused = ""
     if form.is_valid():
+        chosen_id = request.POST.get("visit", "")
         try:
-            session = start_session(enrollment, form.place, user, timezone.now())
+            session = start_session(
+                enrollment, form.place, user, timezone.now(), chosen_id=chosen_id
+            )
         except InvalidSetting as problem:
-            form.add_error(None, refuse(request, problem))
+            refused = refuse(request, problem)
         else:
             return redirect("monitor", session_id=session.pk)
-    return render_participant(request, enrollment, place=form)
+    return render_participant(request, enrollment, place=form, refused=refused)
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -156,9 +156,7 @@ def check_no_open_session(study: Study, patient: Patient | None = None) -> None:
     states = [state.value for state in OPEN_STATES]
     of_whom = {"patient__enrollments__study": study} if patient is None else {"patient": patient}
     if TrainingSession.everywhere.filter(state__in=states, **of_whom).exists():
-        raise InvalidSetting(
-            gettext("A session is still open. End it first: its page may show what is hidden now.")
-        )
+        raise InvalidSetting(gettext("A session is still open. End it first."))
 
 
 def set_blinded(patient: Patient) -> None:

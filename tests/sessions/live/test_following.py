@@ -13,6 +13,7 @@ from django.utils import timezone
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.servers.following import Follower, load_followed, read_new_rows
 from rehab.sessions.live.session.hub import EventFeed
+from rehab.sessions.live.session.instruments import REGISTRY
 from rehab.training.controls import Audience
 from rehab.training.steps import Measurement, Side
 
@@ -42,6 +43,10 @@ async def test_an_owner_hints_once_a_turn_at_what_is_new_and_who_is_there():
     assert hints == [hint, hint]
 
 
+def delivered() -> float:
+    return REGISTRY.get_sample_value("garry_delivery_seconds_count") or 0.0
+
+
 async def send_nowhere(_: str) -> None:
     """Send nothing: the test looks into the feed."""
 
@@ -58,9 +63,11 @@ async def test_late_steps_are_not_live_at_a_server_that_heard_no_hint(place, beg
     await owner.wait_until_committed()
     end = (session.pk, 0, followed.last_event)
     found = await sync_to_async(read_new_rows)([end])
+    timed = delivered()
     followed.fold_rows(found[session.pk], at)
     texts = [event.text(Audience.MONITOR) for event in followed.feed.events_after(0)]
     events = [json.loads(text) for text in texts if text is not None]
     lively = {event["number"]: event["live"] for event in events if event["kind"] == "step"}
     assert list(lively) == list(range(1, count + 1))
     assert [number for number, live in lively.items() if live] == [count]
+    assert delivered() == timed  # a follower tells nothing of how long a step took

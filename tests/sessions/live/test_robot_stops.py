@@ -14,6 +14,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session import commits, loading
 from rehab.sessions.live.session import writer as writers
+from rehab.sessions.log import RobotEntry, SessionEvent
 from rehab.stations.models import Station
 from tests.support.callers import change, restart, turns
 from tests.support.robot_reports import ARM, STOP, is_stopped, log_of
@@ -304,6 +305,12 @@ async def test_a_stop_is_stored_again_where_another_server_may_have_armed_the_ro
     here.robots.stop(live, None, {}, again=True)
     await live.wait_until_committed()
     assert (await station.aget()).robot_stopped
+    logged = SessionEvent.everywhere.filter(session=session, kind=RobotEntry.STOP)
+    assert await logged.acount() == 2
+    for _ in range(5):  # nobody has armed it since: nothing more is logged
+        here.robots.stop(live, None, {}, again=True)
+        await live.wait_until_committed()
+    assert await logged.acount() == 2
 
 
 ASKED = [

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 from asgiref.sync import sync_to_async
+from django.conf import settings
 from django.db import (
     DatabaseError,
     OperationalError,
@@ -24,6 +25,7 @@ from django.test import Client
 
 from rehab.sessions.live import process, routines
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.database import lease
 from rehab.sessions.live.database import own_connection as own_connections
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.session import writer as writers
@@ -41,6 +43,11 @@ only_postgres = pytest.mark.skipif(
 async def health(path: str = "/healthz") -> tuple[int, str]:
     answer = await sync_to_async(Client().get)(path)
     return answer.status_code, answer.content.decode()
+
+
+async def figures() -> str:
+    answer = await sync_to_async(Client().get)("/metrics", headers={"Authorization": "a token"})
+    return answer.content.decode()
 
 
 async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeypatch, caplog):
@@ -96,9 +103,16 @@ async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_th
     assert (await health("/readyz"))[0] == 503
     await runtime.recover()
     assert await health("/readyz") == (200, "ok\n")
+    monkeypatch.setattr(settings, "METRICS_TOKEN", "a token")
+    assert "garry_ready 1.0" in await figures()
     with monkeypatch.context() as cut_off:
-        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True))
+        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True, deaf_s=0.0))
         assert "cut off" in (await health("/readyz"))[1]
+        assert "garry_ready 0.0" in await figures()
+    with monkeypatch.context() as expired:
+        expired.setattr(lease, "held", lambda: SimpleNamespace(is_current=False))
+        assert "expired" in (await health("/readyz"))[1]
+        assert "garry_ready 0.0" in await figures()
     await runtime.drain()
     assert (await health("/readyz"))[0] == 503
 

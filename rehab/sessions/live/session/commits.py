@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 from django.db import connection, transaction
 
-from rehab.sessions.live.session.aggregate import Row, StepRow, Summary
+from rehab.sessions.live.session.aggregate import RepeatedStop, Row, StepRow, Summary
 from rehab.sessions.log import (
     RobotEntry,
     SessionEvent,
@@ -116,7 +116,8 @@ class Job(NamedTuple):
     """Rows of one session, committed together.
 
     ``owner``: the object whose rows these are; after a failed job none of its later ones is
-    written. ``done`` is called on the event loop with the error, or None.
+    written. ``done`` is called on the event loop with the error, or None. ``came_s``: when a step
+    came in (`time.monotonic`), which is timed; 0 for anything else.
     """
 
     owner: object
@@ -125,6 +126,7 @@ class Job(NamedTuple):
     rows: Sequence[Row]
     summary: Summary | None
     done: Callable[[Exception | None], None]
+    came_s: float = 0.0
 
 
 def commit(jobs: Sequence[Job]) -> None:
@@ -138,7 +140,9 @@ def commit(jobs: Sequence[Job]) -> None:
     with transaction.atomic():
         _check_logs(epochs, _find_first_numbers(steps))
         _insert_steps(steps)
-        events = [row for job in jobs for row in job.rows if isinstance(row, SessionEvent)]
+        repeated = [row.event for job in jobs for row in job.rows if isinstance(row, RepeatedStop)]
+        events = [event for event in repeated if _stop_again(event.session.station_id)]
+        events += [row for job in jobs for row in job.rows if isinstance(row, SessionEvent)]
         if events:
             SessionEvent.everywhere.bulk_create(events)
             _note_robot_orders(events)
@@ -155,6 +159,14 @@ def commit(jobs: Sequence[Job]) -> None:
             ended = {row.session_id for row in metrics}
             TrainingSession.everywhere.filter(pk__in=ended).update(boards_due=True)
             transaction.on_commit(partial(figures_stored.send, TrainingSession), robust=True)
+
+
+def _stop_again(station_id: int | None) -> bool:
+    """Store that a station's robot is stopped; return whether that is news."""
+    if station_id is None:
+        return False
+    armed = Station.everywhere.filter(pk=station_id, robot_stopped=False)
+    return armed.update(robot_stopped=True) > 0
 
 
 def _note_robot_orders(events: Sequence[SessionEvent]) -> None:

@@ -23,7 +23,7 @@ COMMIT_S = Histogram(
 )
 DELIVERY_S = Histogram(
     "garry_delivery_seconds",
-    "From a step's or a change's coming in until it is stored and its messages are handed on.",
+    "From a step's coming in until it is stored and handed to its session's viewers here.",
     registry=REGISTRY,
     buckets=MILLISECONDS,
 )

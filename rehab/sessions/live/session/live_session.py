@@ -23,7 +23,6 @@ from rehab.sessions.live.database.trouble import WORDS, NotStored, Trouble, clas
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
 from rehab.sessions.live.session.hub import EventFeed, Subscriber
-from rehab.sessions.live.session.instruments import DELIVERY_S
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.live.session.robot_orders import RobotOrders
@@ -179,8 +178,6 @@ class LiveSession:
             if (message := source_message(self.aggregate.fold, kind)) is not None
         ]
 
-        began_s = time.monotonic()
-
         def done(problem: Exception | None) -> None:
             self.uncommitted -= 1
             if problem is not None:
@@ -204,7 +201,6 @@ class LiveSession:
                 self.feed.publish(event)
             if stored is not None and not stored.done():
                 stored.set_result(None)
-            DELIVERY_S.observe(time.monotonic() - began_s)
 
         self.uncommitted += 1
         self._writer.submit(
@@ -215,6 +211,7 @@ class LiveSession:
                 rows=rows,
                 summary=summary,
                 done=done,
+                came_s=0.0 if row is None else time.monotonic(),
             )
         )
 

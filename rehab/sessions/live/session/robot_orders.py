@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events.event import robot_report_event, robot_stopped_event
-from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import RepeatedStop, SessionAggregate
 from rehab.sessions.live.session.hub import EventFeed
 from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.log import RobotEntry
@@ -65,12 +65,13 @@ class RobotOrders:
     def stop(self, by: User | None, at: datetime, data: Message, *, again: bool = False) -> None:
         """Stop the robot at once, until a person arms it.
 
-        ``data``: which device stopped it, if it was no person. ``again``: it is logged even where
-        the robot is stopped already: another server may have armed it.
+        ``data``: which device stopped it, if it was no person. ``again``: where the robot is
+        stopped already, it is stored still, if another server has armed it meanwhile.
         """
         if self._live.robot is not None:
             self._live.robot.tell({"type": "stop"})
-        if self.is_stopped and (self.unlogged_stop is not None or not again):
+        is_repeated = self.is_stopped
+        if is_repeated and (self.unlogged_stop is not None or not again):
             return
         self.is_stopped = True
         self.unlogged_stop = stop = RobotStop(by, at, data)
@@ -81,7 +82,8 @@ class RobotOrders:
 
         row = self._live.aggregate.log_event(RobotEntry.STOP, by, at, data)
         event = robot_stopped_event(self._live.aggregate.fold, True)
-        self._submit([row], [event], [], on_stored=forget)
+        rows = [RepeatedStop(row) if is_repeated else row]
+        self._submit(rows, [event], [], on_stored=forget)
 
     def arm(self, by: User | None, at: datetime) -> asyncio.Future[None]:
         """Let the robot move again once that is committed; then the future is done."""

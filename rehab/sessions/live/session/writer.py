@@ -22,7 +22,7 @@ from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, conne
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.database.trouble import Trouble, classify_failure, concerns_all
 from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
-from rehab.sessions.live.session.instruments import WRITE_FAILURES, measure_commit
+from rehab.sessions.live.session.instruments import DELIVERY_S, WRITE_FAILURES, measure_commit
 
 log = logging.getLogger(__name__)
 
@@ -193,6 +193,8 @@ class Writer:
                 job.done(problem)
             except Exception:  # the others' steps are stored, and their sources wait to hear it
                 log.exception("Session %s could not be told what was stored", job.session_id)
+            if job.came_s and problem is None:
+                DELIVERY_S.observe(time.monotonic() - job.came_s)
 
 
 def _set_lock_timeout(milliseconds: int) -> None:

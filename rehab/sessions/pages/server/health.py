@@ -29,14 +29,20 @@ def healthz(request: HttpRequest) -> HttpResponse:
 @require_safe
 def readyz(request: HttpRequest) -> HttpResponse:
     """Answer with "ok" once the sessions of the last run are back, and until the server stops."""
+    problem = find_unready()
+    return _answer(problem, 503) if problem else healthz(request)
+
+
+def find_unready() -> str:
+    """Return why the server may get no visitors, as far as it knows without asking; else ""."""
     live = runtimes.peek()
     if live is None or not live.is_ready:
-        return _answer("The server is starting or stopping.", 503)
+        return "The server is starting or stopping."
     if live.servers is not None and live.servers.is_isolated:
-        return _answer("The server was cut off from its database, which another one has.", 503)
+        return "The server was cut off from its database, which another one has."
     if (own := lease.held()) is not None and not own.is_current:
-        return _answer("The server's lease has expired: the database does not answer.", 503)
-    return healthz(request)
+        return "The server's lease has expired: the database does not answer."
+    return ""
 
 
 def _answer(words: str, status: int) -> HttpResponse:

@@ -20,6 +20,7 @@ from rehab.people.access import public
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.session.instruments import REGISTRY
+from rehab.sessions.pages.server.health import find_unready
 
 
 class LiveSessions(Collector):
@@ -58,7 +59,7 @@ class LiveSessions(Collector):
             deaf_s,
         )
         yield GaugeMetricFamily(
-            "garry_ready", "1 between the server's start and its end.", int(live.is_ready)
+            "garry_ready", "1 while it may get visitors, as /readyz says.", int(not find_unready())
         )
 
 
