@@ -382,6 +382,28 @@ def test_11_a_server_that_is_cut_off_sends_its_clients_to_the_other(
 
 
 @at_either
+def test_11_a_server_that_is_cut_off_knows_of_one_that_has_just_begun(
+    pair, run, rows, cables, owner
+):
+    row = rows.pop()
+
+    async def story() -> None:
+        source = await begin(pair, owner, row)
+        assert await pair.end(1 - owner, signal.SIGTERM) == 0
+        await asyncio.sleep(1.5)  # until that is read in the database
+        pair.begin(1 - owner)
+        await pair.until_ready(1 - owner)
+        for cable in cables[owner]:
+            cable.cut()
+        assert await source.until_closed(SLOW_S) == 4012
+        for cable in cables[owner]:
+            cable.mend()
+        await pair.until_ready(owner)
+
+    run(story())
+
+
+@at_either
 def test_12_a_stop_on_the_page_of_an_ended_session_needs_no_redis(
     pair, run, rows, token, cables, owner
 ):

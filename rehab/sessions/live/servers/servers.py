@@ -177,7 +177,12 @@ class Servers:
     async def _beat(self) -> None:
         """Each second: who is there, which pages are here, and the log where no hint came."""
         self.intercom.echo()
-        self._addresses = dict(await self._database.run(lease.valid_servers))
+        known, self._addresses = (
+            self._addresses,
+            dict(await self._database.run(lease.valid_servers)),
+        )
+        if self._addresses.keys() - known.keys():  # who begins is known to the others at once
+            self._tell_of_lease()
         self.followed.beat(self._is_gone)
         now_s = asyncio.get_running_loop().time()
         for own in self._owning.sessions.values():
@@ -194,7 +199,7 @@ class Servers:
 
     async def _watch_database(self) -> None:
         """Each second, whatever the database does: close all sockets once only others have it."""
-        self._tell_all("lease", {"current": self._own.is_current})
+        self._tell_of_lease()
         others = self._addresses.keys() - {self._own.id}
         was_isolated, is_deaf = self.is_isolated, bool(self.deaf_s)
         # Nobody is let in before the sessions are dropped that others have taken meanwhile.
@@ -205,6 +210,10 @@ class Servers:
             for socket in list(self._owning.sockets):
                 socket.close_soon(CloseCode.RESTARTING)
         await asyncio.sleep(BEAT_S)
+
+    def _tell_of_lease(self) -> None:
+        told = {"current": self._own.is_current, "address": self._own.address}
+        self._tell_all("lease", told)
 
     async def _watch_stops(self) -> None:
         """Each second: stop the robots that were stopped at another server, heard of or not."""
@@ -272,6 +281,8 @@ class Servers:
 
     async def _on_lease(self, server: str, told: Data) -> None:
         self._isolation.hear(server, is_current=told["current"])
+        if told["current"] and "address" in told:  # the database may be read no more
+            self._addresses.setdefault(server, told["address"])
 
     async def _on_give_up(self, server: str, asked: Data) -> Data:
         return {"given": await self._owning.handover.give_up(asked["session"], asked["slot"])}
