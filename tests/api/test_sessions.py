@@ -139,17 +139,8 @@ def test_steps_come_by_their_number(world, pt):
     )
     stored = Step.everywhere.get(session=world.session, number=4)
     step = page["items"][3]
-    for name in (
-        "value",
-        "shown",
-        "goal",
-        "performance",
-        "hit",
-        "late",
-        "points",
-        "valid",
-        "reasons",
-    ):
+    verdict = ("performance", "hit", "late", "points", "valid", "reasons")
+    for name in ("value", "shown", "goal", *verdict):
         assert step[name] == getattr(stored, name)
     assert page["items"][2]["valid"] is False
 

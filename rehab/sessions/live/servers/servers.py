@@ -177,10 +177,8 @@ class Servers:
     async def _beat(self) -> None:
         """Each second: who is there, which pages are here, and the log where no hint came."""
         self.intercom.echo()
-        known, self._addresses = (
-            self._addresses,
-            dict(await self._database.run(lease.valid_servers)),
-        )
+        known = self._addresses
+        self._addresses = dict(await self._database.run(lease.valid_servers))
         if self._addresses.keys() - known.keys():  # who begins is known to the others at once
             self._tell_of_lease()
         self.followed.beat(self._is_gone)

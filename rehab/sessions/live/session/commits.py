@@ -141,7 +141,7 @@ def commit(jobs: Sequence[Job]) -> None:
         _check_logs(epochs, _find_first_numbers(steps))
         _insert_steps(steps)
         repeated = [row.event for job in jobs for row in job.rows if isinstance(row, RepeatedStop)]
-        events = [event for event in repeated if _stop_again(event.session.station_id)]
+        events = [event for event in repeated if _is_armed(event.session.station_id)]
         events += [row for job in jobs for row in job.rows if isinstance(row, SessionEvent)]
         if events:
             SessionEvent.everywhere.bulk_create(events)
@@ -161,12 +161,11 @@ def commit(jobs: Sequence[Job]) -> None:
             transaction.on_commit(partial(figures_stored.send, TrainingSession), robust=True)
 
 
-def _stop_again(station_id: int | None) -> bool:
-    """Store that a station's robot is stopped; return whether that is news."""
-    if station_id is None:
+def _is_armed(station_id: int | None) -> bool:
+    """Return whether a station's robot may move by what is stored."""
+    if station_id is None:  # the session looks into its own log
         return False
-    armed = Station.everywhere.filter(pk=station_id, robot_stopped=False)
-    return armed.update(robot_stopped=True) > 0
+    return Station.everywhere.filter(pk=station_id, robot_stopped=False).exists()
 
 
 def _note_robot_orders(events: Sequence[SessionEvent]) -> None:
