@@ -47,7 +47,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help run test test-fast test-all test-main test-postgres test-pure test-clocks check format bench \
-	size screenshots pictures messages setup constraints clean
+	mutate size screenshots pictures messages setup constraints clean
 
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -112,6 +112,9 @@ format: setup ## Format the code and mend what can be mended
 
 bench: setup ## Measure speed (tests/bench)
 	$(PYTHON) -m pytest -m bench -s tests/bench $(ARGS)
+
+mutate: setup ## Change the code a little, many times, and name what no test notices (an hour)
+	$(PYTHON) -m tests.bench.mutate $(ARGS)
 
 size: setup ## Say how large the project is: code by room, modules, circles, tests, styles, documents
 	$(PYTHON) -m tests.support.size
