@@ -159,8 +159,8 @@ class Tree:
                 shutil.copy2(checkout / name, folder / name)
         (folder / "node_modules").symlink_to(checkout / "node_modules")
 
-    def fails(self, tests: tuple[str, ...]) -> bool:
-        """Return whether these tests fail here (or hang)."""
+    def fails(self, tests: tuple[str, ...]) -> str:
+        """Return the end of what these tests print where they fail here (or hang), else ""."""
         unmarked = "not (bench or screenshots or browser or server or realtime or long or wide)"
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "2", "-m", unmarked]
         command += ["-p", "no:cacheprovider", "--timeout", "60", *tests]
@@ -174,8 +174,8 @@ class Tree:
                 command, cwd=self.folder, env=environment, capture_output=True, timeout=TIMEOUT_S
             )
         except subprocess.TimeoutExpired:
-            return True
-        return result.returncode not in (0, 5)
+            return f"No end within {TIMEOUT_S} s."
+        return "" if result.returncode in (0, 5) else result.stdout.decode()[-2000:]
 
     def kills(self, mutant: Mutant, rounds: tuple[tuple[str, ...], ...]) -> bool:
         """Return whether a test notices."""
@@ -205,8 +205,8 @@ def main() -> int:
             if args.only not in (None, package):
                 continue
             for tests in rounds:
-                if tree.fails(tree.existing(tests)):
-                    print(f"{' '.join(tests)} fails without any mutant.", file=sys.stderr)
+                if found := tree.fails(tree.existing(tests)):
+                    print(f"{found}\n{' '.join(tests)}: fails without a mutant.", file=sys.stderr)
                     return 2
             chosen = mutants(tree.checkout, package, random.Random(f"{args.seed} {package}"))
             for mutant in (next(chosen) for _ in range(args.each)):
