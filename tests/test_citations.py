@@ -6,7 +6,10 @@ A citation is the name of a Markdown file, in code from the root on (``docs/refe
 
 from __future__ import annotations
 
+import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator
 from functools import cache
 from itertools import chain
@@ -25,12 +28,19 @@ CITATION = re.compile(r"(?<![\w./\"-])([\w./-]+\.md)\b(?:#([\w-]+))?")
 LINK = re.compile(r"\]\(([^()\s]+)\)|\b(?:src|href)=\"([^\"]+)\"")
 # A path in quotation marks of code, without places to fill in.
 PATH = re.compile(r"`((?:docs|rehab|robot|static|templates|tests)/[\w./-]+)(?:::\w+)?`")
-# The end of a path, as documents shorten them (`people/scope.py`).
-SHORTENED = re.compile(r"`([\w./-]+\.(?:css|html|js|py))`")
+# The end of a path, as documents and comments shorten them (people/scope.py).
+SHORTENED = re.compile(r"(?<![\w./\"'{%*-])((?:[\w.-]+/)*[\w-]+\.(?:css|html|js|py))\b(?![\"'(])")
 OTHERS = {
+    "GARRY-Server/sqliteHelper.py",  # three files of the original
     "data_processing.py",
     "gesture_generation.py",
-}  # files of the original, which docs tell of
+    "admin/js/theme.js",  # Django's
+}
+COMMENTS = {
+    ".css": re.compile(r"/\*.*?\*/", re.DOTALL),
+    ".html": re.compile(r"\{#.*?#\}|<!--.*?-->", re.DOTALL),
+    ".js": re.compile(r"/\*.*?\*/|(?<!:)//[^\n]*", re.DOTALL),
+}
 FENCE = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.MULTILINE | re.DOTALL)
 HEADING = re.compile(r"^#{1,6} +(.+?) *#* *$", re.MULTILINE)
 
@@ -122,8 +132,22 @@ def test_links_lead_on(document):
     assert not list(find_bad_links(document.read_text(encoding="utf-8"), document))
 
 
+def read_prose(file: Path) -> str:
+    """Return what a file says to people: a document, or the comments and docstrings of code."""
+    text = file.read_text(encoding="utf-8")
+    if file.suffix == ".md":
+        return text
+    if file.suffix != ".py":
+        return "\n".join(COMMENTS[file.suffix].findall(text))
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    comments = [token.string for token in tokens if token.type == tokenize.COMMENT]
+    documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, documented)]
+    return "\n".join([*comments, *(ast.get_docstring(node, clean=False) or "" for node in nodes)])
+
+
 def find_unknown_files(text: str, there: str) -> list[str]:
-    """Return the files that a document names and that no path ends with.
+    """Return the files that a text names and that no path ends with.
 
     ``there``: all paths, each in a line, after a ``/``.
     """
@@ -131,17 +155,17 @@ def find_unknown_files(text: str, there: str) -> list[str]:
     return sorted(path for path in named if f"/{path.lstrip('./')}\n" not in there)
 
 
-def test_files_that_documents_name_exist(sources):
+def test_files_that_documents_and_comments_name_exist(sources):
     files = [*sources, Path(__file__).resolve()]
     there = "".join(f"/{file.relative_to(ROOT)}\n" for file in files)
-    own = [one for one in DOCUMENTS if REFERENCE not in str(one) and one.name != "CHANGELOG.md"]
     bad = [
-        f"{document.relative_to(ROOT)} names {path}"
-        for document in own
-        for path in find_unknown_files(document.read_text(encoding="utf-8"), there)
+        f"{file.relative_to(ROOT)} names {path}"
+        for file in sources
+        if file.suffix in (".md", ".py", *COMMENTS) and REFERENCE not in str(file)
+        for path in find_unknown_files(read_prose(file), there)
     ]
     assert not bad, "\n".join(bad)
-    assert find_unknown_files("`gone.py` `scope.py` `e.py`", there) == ["e.py", "gone.py"]
+    assert find_unknown_files("`gone.py` scope.py x/e.py:7", there) == ["gone.py", "x/e.py"]
 
 
 def test_every_reference_is_listed_and_cited(sources):
