@@ -12,7 +12,7 @@ SQLITE_OPTIONS = {
         # FULL keeps acknowledged steps through a power cut, not only through a crash
         # (docs/reference/stack.md#durability).
         "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; "
-        # No memory map: an error of the disk in it would end the process (sqlite.org, “Memory-Mapped I/O”).
+        # No memory map: an error of the disk in it would end the process.
         "PRAGMA mmap_size=0; PRAGMA cache_size=-16000; "
         # The live runtime checkpoints between commits (rehab/sessions/live/process.py); left to
         # SQLite, every fiftieth commit would wait for a checkpoint.
