@@ -31,7 +31,8 @@ from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 
-from robot.bases.kobuki_protocol import FRAME_S, Version
+from robot.bases.kobuki_protocol.feedback import Version
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.bodies import KinematicBody, WheeledBody
 from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from importlib.resources import as_file, files
 from typing import Any
 
-from robot.bases.kobuki_protocol import SensorSide, Wheel
+from robot.bases.kobuki_protocol.feedback import SensorSide, Wheel
 from robot.bases.twin.bodies import Touch
-from robot.motion.pose import HOME, Pose, wrap
+from robot.motion.pose import HOME, Pose, advance, wrap
+from robot.motion.twist import Twist
 
 # Of 2.5 ms each in a frame: 400 Hz, finer than the 240 Hz of docs/reference/kobuki.md#twin.
 STEPS = 8
@@ -190,12 +191,8 @@ class BulletBody:
         return [SENSOR_RANGE_M * hit[2] for hit in hits]
 
     def _place_ahead(self, away_m: float, z_m: float) -> tuple[float, float, float]:
-        pose = self.pose
-        return (
-            pose.x_m + away_m * math.cos(pose.heading_rad),
-            pose.y_m + away_m * math.sin(pose.heading_rad),
-            z_m,
-        )
+        place = advance(self.pose, Twist(away_m), 1.0)
+        return place.x_m, place.y_m, z_m
 
     def _put_box(
         self, size_m: tuple[float, float, float], middle_m: tuple[float, ...], heading_rad: float
