@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
 from collections.abc import Sequence
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Any
 
 from robot.bases.kobuki_protocol.feedback import SensorSide, Wheel
@@ -39,6 +42,22 @@ TOUCH_M = 0.001
 ROBOT, SURROUNDINGS = 1, 2  # collision groups, so that rays do not meet the robot itself
 FLOOR_SIZE_M = (10.0, 10.0, 0.5)
 WALL_SIZE_M = (0.05, 1.0, 0.25)
+
+
+def redirect_output() -> int:
+    """Return a file for answers alone in place of standard output, and import pybullet.
+
+    pybullet prints past Python: its build date when it is imported, and more when it ends.
+    """
+    answers, errors = os.dup(1), os.dup(2)
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    with contextlib.suppress(ImportError):
+        import pybullet  # noqa: F401
+    os.dup2(errors, 2)
+    os.close(errors)
+    return answers
 
 
 class BulletBody:
