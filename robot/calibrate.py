@@ -18,8 +18,7 @@ from dataclasses import dataclass
 
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
-from robot.behavior.control_loop import control_loop
-from robot.behavior.performer import Performer
+from robot.behavior.performer import Performer, control_loop
 from robot.calibration import BadCalibration, store_calibration
 from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.limits import TICK_S
@@ -90,7 +89,7 @@ def measure(
         for pause_s in control_loop(
             performer, monotonic, lambda: not performer.body.player.is_busy
         ):
-            there = performer.body.senses.state
+            there = performer.body.state
             turns.add(there.pose.heading_rad, there.sensors.slip_rad)
             sleep(pause_s)
         if performer.body.player.outcome != DONE:

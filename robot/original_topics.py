@@ -12,7 +12,6 @@ at the end, and where no decision follows a ``True``.
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -190,47 +189,36 @@ class OriginalTopics:
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url, self._monotonic = url, monotonic
-        self._client, self._lock = OriginalTopicClient(names), threading.Lock()
-        self._bridge: Bridge | None = None
+        self._client = OriginalTopicClient(names)
+        self._bridge = Bridge(self._client, monotonic)
 
     def __enter__(self) -> Self:
         """Start to connect."""
-        self._bridge = Bridge(self._url, self._client, self._lock, self._monotonic)
+        self._bridge.open(self._url)
         return self
 
     def __exit__(self, *_: object) -> None:
         """Close the connection."""
-        if self._bridge is not None:
-            self._bridge.close()
+        self._bridge.close()
 
     @property
     def problem(self) -> str:
         """Why messages do not arrive; empty where they do."""
-        if self._bridge is None:
-            return ""
-        with self._lock:
+        with self._bridge.lock:
             return self._bridge.problem or self._client.problem(self._monotonic())
 
     def handle_message(self, message: Mapping[str, Any]) -> None:
         """Publish the data of a message of the server."""
-        with self._lock:
+        with self._bridge.sending():
             self._client.handle_message(message, self._monotonic())
-        self._wake()
 
     def publish_decision(self, above: bool, window_s: float) -> None:
         """Publish a decision: whether the window, of a length [s], was above."""
-        with self._lock:
+        with self._bridge.sending():
             self._client.publish_decision(above, window_s, self._monotonic())
-        self._wake()
 
     def allow(self, is_allowed: bool) -> None:
         """Allow what moves a robot, or take back what was said."""
-        with self._lock:
-            is_new = self._client.is_allowed != is_allowed
-            self._client.allow(is_allowed)
-        if is_new:
-            self._wake()
-
-    def _wake(self) -> None:
-        if self._bridge is not None:
-            self._bridge.wake()
+        if self._client.is_allowed != is_allowed:  # asked at each tick, by the only one who sets it
+            with self._bridge.sending():
+                self._client.allow(is_allowed)

@@ -20,8 +20,7 @@ from typing import Any, TextIO
 
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
-from robot.behavior.control_loop import control_loop
-from robot.behavior.performer import Performer
+from robot.behavior.performer import Performer, control_loop
 from robot.behavior.safety import BASE_SILENT, BASE_SILENT_S
 from robot.calibration import BadCalibration, apply_calibration
 from robot.motion.gesture import Gesture
@@ -122,7 +121,7 @@ def play_gesture(
     if not refused:
         performer.tick(began_s)
     for pause_s in control_loop(performer, monotonic, lambda: not performer.body.player.is_busy):
-        farthest_m = max(farthest_m, performer.body.senses.state.pose.distance_m(HOME))
+        farthest_m = max(farthest_m, performer.body.state.pose.distance_m(HOME))
         sleep(pause_s)
     took_s = monotonic() - began_s
     outcome = refused or performer.body.player.outcome

@@ -45,14 +45,6 @@ def read_ticks(text: str) -> list[tuple[float, Twist, Pose]]:
     return ticks
 
 
-def seen_from(start: Pose, pose: Pose) -> Pose:
-    """Return a pose in the frame of another."""
-    x_m, y_m = pose.x_m - start.x_m, pose.y_m - start.y_m
-    cos, sin = math.cos(start.heading_rad), math.sin(start.heading_rad)
-    turned_rad = wrap(pose.heading_rad - start.heading_rad)
-    return Pose(cos * x_m + sin * y_m, cos * y_m - sin * x_m, turned_rad)
-
-
 def replay(
     ticks: Sequence[tuple[float, Twist, Pose]],
     base: MobileBase,
@@ -73,7 +65,7 @@ def replay(
         replayed = base.read().pose
         order = following
         base.drive(order)
-        yield Compared(at_s - first_s, seen_from(start, pose), replayed)
+        yield Compared(at_s - first_s, pose.seen_from(start), replayed)
     base.stop()
 
 

@@ -9,10 +9,9 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from robot.bases import BaseLost, MobileBase
-from robot.behavior.control_loop import control_loop
-from robot.behavior.performer import NO_LINK, Performer
+from robot.behavior.performer import NO_LINK, Performer, control_loop
+from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox, Incident
-from robot.black_box.witness import Witness
 from robot.link import Link, LinkRefused, Message
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.original_topics import OriginalTopics
@@ -55,7 +54,7 @@ class Worker:
         self.performer = Performer(base, limits)
         self._link = dial(greet=self._greet, on_lost=self._handle_lost_link)
         self._base, self._originals, self._black_box = base, originals, black_box
-        self._witness = Witness(black_box, self.performer, base)
+        self._capture = Capture(black_box, self.performer, base)
         self._notice = notice
         self._monotonic = monotonic
         self._sleep = sleep
@@ -73,7 +72,7 @@ class Worker:
             for task in done:
                 task.result()
         except BaseLost:
-            self._witness.lose("base_lost")
+            self._capture.record_loss("base_lost")
             raise
         finally:
             self._base.stop()
@@ -109,7 +108,7 @@ class Worker:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages
         decided = self.performer.decision
         self.performer.handle(message, self._monotonic())
-        self._witness.hear(message)
+        self._capture.record_message(message)
         if self._originals is not None:
             self._allow_originals()
             self._originals.handle_message(message)
@@ -133,7 +132,7 @@ class Worker:
         problem = topics_problem = box_problem = ""
         was_linked = False
         for pause_s in control_loop(self.performer, self._monotonic):
-            self._witness.see(self._monotonic())
+            self._capture.record_tick(self._monotonic())
             if was_linked and not self.performer.is_linked:
                 # Messages that are still on their way would come too late.
                 self._notice("The server is silent; standing still, dialing in again.")

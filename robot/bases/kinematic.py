@@ -17,7 +17,7 @@ from robot.bases.drive_train import (
     STICTION_M_S,
     DriveTrain,
 )
-from robot.bases.kobuki_protocol.wheels import TICK_M, WHEELBASE_M, wheel_speeds
+from robot.bases.kobuki_protocol.wheels import TICK_M
 from robot.bases.odometry import Odometry
 from robot.motion.limits import ORDER_HOLDS_S, TICK_S, WHEEL_LIMITS
 from robot.motion.pose import HOME, advance
@@ -79,7 +79,7 @@ class KinematicBase(MobileBase):
         self._drive_train = DriveTrain(faults.dead_time_s, faults.lag_s, faults.stiction_m_s)
         self.held = faults.held
         self.response = Response(faults.dead_time_s, faults.lag_s)
-        self._odometry = Odometry(WHEELBASE_M)
+        self._odometry = Odometry()
         self._chance = random.Random(1)  # noqa: S311 (nothing here is a secret)
         self._truth, self._farthest_m = HOME, 0.0
         self._rolled_m, self._turned_rad = [0.0, 0.0], 0.0  # as its sensors count
@@ -99,7 +99,7 @@ class KinematicBase(MobileBase):
     def calibrate(self, response: Response) -> None:
         """Take over how it was measured to answer."""
         super().calibrate(response)
-        self._odometry = Odometry(WHEELBASE_M, response.gyro_bias_rad_s, response.wheel_scale)
+        self._odometry = Odometry(response.gyro_bias_rad_s, response.wheel_scale)
         self._sample()
 
     def drive(self, twist: Twist) -> Twist:
@@ -142,7 +142,7 @@ class KinematicBase(MobileBase):
         return GroundTruth(self._truth, self._farthest_m)
 
     def _order(self, twist: Twist) -> None:
-        self._drive_train.order(wheel_speeds(twist), self._time_s)
+        self._drive_train.order(twist.wheels_m_s, self._time_s)
         self._drives = not twist.is_still
         self._roll(0.0)  # without a dead time it counts at once
 
@@ -169,8 +169,8 @@ class KinematicBase(MobileBase):
         """Roll for a span, true and as its sensors see it."""
         faults = self._faults
         left_m_s, right_m_s = self._drive_train.step(self._time_s, span_s)
-        self._twist = _to_twist(left_m_s, right_m_s)
-        true = _to_twist(left_m_s * faults.left_scale, right_m_s * faults.right_scale)
+        self._twist = Twist.of_wheels(left_m_s, right_m_s)
+        true = Twist.of_wheels(left_m_s * faults.left_scale, right_m_s * faults.right_scale)
         self._truth = advance(self._truth, true, span_s)
         self._farthest_m = max(self._farthest_m, self._truth.distance_m(HOME))
         self._rolled_m[0] += left_m_s * span_s
@@ -189,7 +189,3 @@ class KinematicBase(MobileBase):
             turn_rad_s += self._chance.gauss(0.0, math.radians(GYRO_NOISE_DEG_S))
         self._odometry.add(left_m, right_m, turned_rad, turn_rad_s, self._time_s)
         self._sampled_s = self._time_s
-
-
-def _to_twist(left_m_s: float, right_m_s: float) -> Twist:
-    return Twist((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / WHEELBASE_M)

@@ -6,10 +6,10 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 from robot.bases.base import Abilities, BaseLost, BaseState, Indication, MobileBase, SensorState
-from robot.bases.hazards import UNORDERED, StillWatch, UnreadHazards
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,
@@ -23,8 +23,9 @@ from robot.bases.kobuki_protocol.commands import (
 from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
 from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
-from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_to_twist, twist_to_control
+from robot.bases.kobuki_protocol.wheels import STOP, control_to_twist, twist_to_control
 from robot.bases.odometry import Odometry
+from robot.bases.unordered_motion import UNORDERED, UnorderedMotion
 from robot.motion.limits import WHEEL_LIMITS
 from robot.motion.response import Response
 from robot.motion.score import Color, Note
@@ -69,12 +70,13 @@ class KobukiBase(MobileBase):
         self._lock = threading.Lock()  # data are received on another thread
         self._reader = FrameReader(decode_feedback)
         self._filter = FrameFilter()
-        self._odometry = Odometry(WHEELBASE_M)
+        self._odometry = Odometry()
         self._estimate: Estimate | None = None
         self._opened = 0
         self._seen_s = monotonic()
-        self._unread, self._still_watch = UnreadHazards(), StillWatch()
-        self._felt: frozenset[str] = frozenset()  # in the newest frame
+        self._unordered = UnorderedMotion()
+        self._present = frozenset[str]()  # hazards in the newest frame
+        self._unread = frozenset[str]()  # since the last reading, however short
         self._lights, self._sound = LIGHTS[Indication.WAITING], b""
         self._requested_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
@@ -135,7 +137,7 @@ class KobukiBase(MobileBase):
         """Take over how it was measured to answer. Where it stands is home then."""
         super().calibrate(response)
         with self._lock:
-            self._odometry = Odometry(WHEELBASE_M, response.gyro_bias_rad_s, response.wheel_scale)
+            self._odometry = Odometry(response.gyro_bias_rad_s, response.wheel_scale)
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
@@ -143,7 +145,7 @@ class KobukiBase(MobileBase):
             raise BaseLost("The process that owns the port does not run: see its messages above.")
         control = twist_to_control(WHEEL_LIMITS.clip(twist))
         if control != STOP:
-            self._still_watch.order_motion(self._monotonic())
+            self._unordered.order_motion(self._monotonic())
         self._client.order(encode_commands(control), self._extra_commands())
         return control_to_twist(control)
 
@@ -159,7 +161,7 @@ class KobukiBase(MobileBase):
         now_s = self._monotonic()
         with self._lock:
             estimate, odometry = self._estimate, self._odometry
-            detected = self._unread.take() | self._felt
+            detected, self._unread = self._unread | self._present, frozenset()
             silent_s, firmware = now_s - self._seen_s, self._filter.firmware
             if estimate is None:
                 return BaseState(
@@ -180,7 +182,9 @@ class KobukiBase(MobileBase):
                 drift_rad_s=odometry.drift_rad_s,
                 push_n=FORCE_N_A * estimate.current_a,
             )
-            twist = Twist((estimate.left_m_s + estimate.right_m_s) / 2, estimate.turn_rad_s)
+            twist = replace(
+                Twist.of_wheels(estimate.left_m_s, estimate.right_m_s), w_rad_s=estimate.turn_rad_s
+            )
             return BaseState(odometry.pose, twist, sensors)
 
     def set_home(self) -> None:
@@ -246,9 +250,9 @@ class KobukiBase(MobileBase):
             "over_current": estimate.over_current,
             "restarted": has_restarted,  # switched off or carried away: home is unknown
             "stop_button": estimate.buttons & Button.B0,
-            UNORDERED: self._still_watch.update(
+            UNORDERED: self._unordered.update(
                 max(estimate.left_m_s, estimate.right_m_s, key=abs), at_s
             ),
         }
-        self._felt = frozenset(hazard for hazard, is_detected in detected.items() if is_detected)
-        self._unread.add(*self._felt)
+        self._present = frozenset(hazard for hazard, is_present in detected.items() if is_present)
+        self._unread |= self._present

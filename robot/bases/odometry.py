@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from robot.motion.pose import HOME, advance
-from robot.motion.twist import Twist
+from robot.motion.twist import WHEELBASE_M, Twist
 
 # A gyro that turns slower than this [rad/s] while both wheels stand still drifts: "a couple of
 # degrees a minute at worst" (docs/reference/kobuki.md#odometry-and-gyro), 30 times less. A base
@@ -28,8 +29,6 @@ class Odometry:
 
     Parameters
     ----------
-    wheelbase_m
-        Distance between the wheels [m].
     drift_rad_s
         How fast the gyro turns by itself, as long as no rest has told [rad/s].
     wheel_scale
@@ -46,10 +45,8 @@ class Odometry:
         How fast the gyro turns by itself, as far as is known [rad/s].
     """
 
-    def __init__(
-        self, wheelbase_m: float, drift_rad_s: float = 0.0, wheel_scale: float = 1.0
-    ) -> None:
-        self._wheelbase_m, self._wheel_scale = wheelbase_m, wheel_scale
+    def __init__(self, drift_rad_s: float = 0.0, wheel_scale: float = 1.0) -> None:
+        self._wheel_scale = wheel_scale
         self.drift_rad_s = drift_rad_s
         self._last: tuple[float, float, float] | None = None
         self._last_s = 0.0
@@ -67,7 +64,7 @@ class Odometry:
 
         What wheels of unequal size explain is left out.
         """
-        explained_rad = UNEQUAL * abs(self._rolled_m) / self._wheelbase_m
+        explained_rad = UNEQUAL * abs(self._rolled_m) / WHEELBASE_M
         return max(abs(self.slip_rad) - explained_rad, 0.0)
 
     def add(
@@ -100,11 +97,10 @@ class Odometry:
         else:
             self._still_s = 0.0
             by_rad -= self.drift_rad_s * min(elapsed_s, GAP_S)
-        by_left_m, by_right_m = by_left_m / self._wheel_scale, by_right_m / self._wheel_scale
-        by_m = (by_left_m + by_right_m) / 2
-        self._rolled_m += by_m
-        self.slip_rad += (by_right_m - by_left_m) / self._wheelbase_m - by_rad
-        self.pose = advance(self.pose, Twist(by_m, by_rad), 1.0)
+        by_wheels = Twist.of_wheels(by_left_m / self._wheel_scale, by_right_m / self._wheel_scale)
+        self._rolled_m += by_wheels.v_m_s
+        self.slip_rad += by_wheels.w_rad_s - by_rad
+        self.pose = advance(self.pose, replace(by_wheels, w_rad_s=by_rad), 1.0)
 
     def _learn_drift(self, by_rad: float, elapsed_s: float) -> None:
         """Add what the gyro turned while the wheels stood."""

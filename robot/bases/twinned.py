@@ -7,9 +7,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
-from robot.bases.base import Abilities, BaseLost, GroundTruth
+from robot.bases.base import BaseLost, GroundTruth
 from robot.bases.kobuki import KobukiBase
 from robot.motion.pose import Pose
 
@@ -20,9 +21,7 @@ class TwinBase(KobukiBase):
     """Starts a twin, drives it over its port, and ends it with itself."""
 
     name: ClassVar[str] = "twin"
-    abilities = Abilities(
-        simulated=True, moves=True, announces=True, notes=True, real_time=True, bumpers=True
-    )
+    abilities = replace(KobukiBase.abilities, simulated=True)
 
     def __init__(self, monotonic: Callable[[], float], *options: str) -> None:
         super().__init__(monotonic)

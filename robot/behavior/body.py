@@ -5,16 +5,17 @@ It knows no server and no session. Time is a parameter.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from robot.bases import Answer, BaseState, MobileBase
 from robot.behavior.expression import Expression
-from robot.behavior.placing import Placing
-from robot.behavior.reports import stop_report
+from robot.behavior.manual_drive import ManualDrive
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
-from robot.behavior.senses import Senses
 from robot.behavior.status import StatusReporter
 from robot.motion.gesture import Gesture
 from robot.motion.limits import Limits
 from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
+from robot.motion.pose import HOME
 from robot.motion.response import AT_ONCE
 from robot.motion.twist import STILL
 
@@ -36,22 +37,38 @@ class Body:
     ----------
     ordered
         The base's present order.
+    state
+        What the base reported last; before that, home.
     """
 
     def __init__(self, base: MobileBase, limits: Limits) -> None:
-        self.base, self.senses = base, Senses(base)
+        self.base, self.state = base, BaseState(HOME, STILL)
+        # Since the last safety check, so that nothing is lost to another reader in between.
+        self._hazards, self._stop_pressed = frozenset[str](), False
         # Without odometry its pose is what was ordered, which is never late.
         self.player = Player(limits, base.response if base.abilities.closed_loop else AT_ONCE)
         self.status = StatusReporter(base)
         self.expression = Expression(base)
         self.safety = Safety(base.abilities)
-        self.placing = Placing()
+        self.manual_drive = ManualDrive()
         self.ordered = STILL
 
     @property
     def is_away(self) -> bool:
         """Whether it has to be put back by a person; a simulated one is carried back at once."""
-        return not self.base.abilities.simulated and not self.safety.is_at_home(self.senses.state)
+        return not self.base.abilities.simulated and not self.safety.is_at_home(self.state)
+
+    def read(self) -> BaseState:
+        """Return the state now, with each hazard since the last safety check. Raises BaseLost.
+
+        Nothing else may read the base: it retains a hazard until it is read, and no longer.
+        """
+        state = self.base.read()
+        self._hazards |= state.sensors.hazards
+        self._stop_pressed |= state.sensors.stop_pressed
+        sensors = replace(state.sensors, hazards=self._hazards, stop_pressed=self._stop_pressed)
+        self.state = replace(state, sensors=sensors)
+        return self.state
 
     def refusal_reason(self, gesture: Gesture, state: BaseState) -> str:
         """Return what keeps it from performing a gesture; empty where it may."""
@@ -72,7 +89,7 @@ class Body:
     ) -> None:
         """Start a gesture that nothing refuses, and answer by it."""
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
-        pose = self.senses.read().pose  # a simulated base may have been put back
+        pose = self.read().pose  # a simulated base may have been put back
         self.player.start(gesture, now_s, pose, after_s, pace)
         self.expression.start(gesture.score.quiet if answer.is_quiet else gesture.score, now_s)
         self.safety.start_gesture(now_s, state)
@@ -84,7 +101,7 @@ class Body:
 
         The caller vouches for a person who watches. No base is carried home first.
         """
-        safety, state = self.safety, self.senses.read()
+        safety, state = self.safety, self.read()
         safety.is_watched = True
         reason = (
             safety.rejection_reason(gesture)
@@ -98,12 +115,18 @@ class Body:
             self.start(gesture.scaled(safety.share), now_s, state, answer)
         return reason
 
-    def tick(self, now_s: float, *, may_be_placed: bool) -> BaseState:
+    def tick(self, now_s: float, *, may_be_driven: bool) -> BaseState:
         """Order the base's next twist, and return what it reports. Raises BaseLost.
 
-        ``may_be_placed``: whether nobody walks, so that a person may drive it to its mark.
+        Parameters
+        ----------
+        now_s
+            The time [s].
+        may_be_driven
+            Whether nobody walks, so that a person may drive it to its place by hand.
         """
-        state, player = self.senses.judge(), self.player
+        state, player = self.read(), self.player
+        self._hazards, self._stop_pressed = frozenset(), False
         ordered = player.answered(now_s)
         self.expression.tick(now_s)
         found = self.safety.check(now_s, state, ordered, performing=player.is_busy)
@@ -111,12 +134,12 @@ class Body:
             self.stop_for(found)
         elif self.safety.may_recover(now_s):
             self.base.set_home()  # as a person would carry it back
-            self.safety.recover(now_s, self.senses.read())
-        was, placed = player.gesture, self.placing.twist(now_s)
-        if placed.is_still or not (may_be_placed and self._can_be_placed(state)):
+            self.safety.recover(now_s, self.read())
+        was, driven = player.gesture, self.manual_drive.twist(now_s)
+        if driven.is_still or not (may_be_driven and self._can_be_driven(state)):
             self.ordered = self.base.drive(player.step(now_s, state.pose))
         else:
-            self.ordered = self.base.drive(placed)
+            self.ordered = self.base.drive(driven)
             self.base.set_home()  # where it stands is home when the button is let go
         if was is not None and not player.is_busy:
             self.expression.stop()
@@ -129,7 +152,7 @@ class Body:
 
     def arm(self, now_s: float) -> None:
         """Let it move again, for a person; where it stands is home now."""
-        problem = self.safety.arm(now_s, self.senses.read())
+        problem = self.safety.arm(now_s, self.read())
         if problem:
             self.stop_for(problem)
         elif not self.player.is_busy:
@@ -137,7 +160,7 @@ class Body:
 
     def halt(self, reason: str) -> None:
         """Stand still at once."""
-        self.placing.end()
+        self.manual_drive.end()
         gesture = self.player.gesture
         self.player.halt(reason)
         self.expression.stop()
@@ -149,9 +172,9 @@ class Body:
     def stop_for(self, reason: str) -> None:
         """Stand still for a fault that is latched, and report it."""
         self.halt(reason)
-        self.status.report(stop_report(reason))
+        self.status.report({"kind": "stop", "reason": reason})
 
-    def _can_be_placed(self, state: BaseState) -> bool:
+    def _can_be_driven(self, state: BaseState) -> bool:
         """Whether it is armed, real and unhindered."""
         return (
             not self.player.is_busy

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from robot.bases import Answer, BaseState, MobileBase
 from robot.behavior.body import Body
 from robot.behavior.cue import QUIET_PACE, Cue
 from robot.behavior.gesture_library import GestureLibrary
-from robot.behavior.reports import Report, decision_report
 from robot.behavior.safety import AWAY, LAPSED_S, STOPPED
+from robot.behavior.status import Report
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
-from robot.motion.limits import DEFAULT_LIMITS, Limits
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
 
@@ -108,7 +108,7 @@ class Performer:
             and not self._has_hung
             and self.body.safety.is_watched
             and self.decider.cue.intensity > 0
-            and not self.body.safety.blocking_reason(self.body.senses.read())
+            and not self.body.safety.blocking_reason(self.body.read())
         )
 
     def handle(self, message: Message, now_s: float) -> None:
@@ -165,7 +165,7 @@ class Performer:
         if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
         nobody_walks = self._is_welcome and not self._is_running
-        self._report(now_s, self.body.tick(now_s, may_be_placed=nobody_walks))
+        self._report(now_s, self.body.tick(now_s, may_be_driven=nobody_walks))
 
     def _dispatch(self, message: Message, now_s: float) -> None:
         kind = message.get("type")
@@ -192,7 +192,7 @@ class Performer:
             case "arm":
                 self.body.arm(now_s)
             case "drive":
-                self.body.placing.order(message, now_s)
+                self.body.manual_drive.order(message, now_s)
             case _:
                 raise BadFrame(
                     "A robot understands welcome, step, state, cue, stop, arm, drive, heartbeat."
@@ -259,7 +259,7 @@ class Performer:
 
     def _respond(self, decision: Decision, now_s: float) -> None:
         """Report a decision, and start the gesture that follows from it."""
-        state, cue = self.body.senses.read(), self.decider.cue
+        state, cue = self.body.read(), self.decider.cue
         name, share = cue.gesture(decision.above), self.decider.share
         reason = self.decider.blocking_reason(decision, performing=self.body.player.is_busy)
         gesture = None
@@ -268,12 +268,12 @@ class Performer:
         if gesture is not None:
             reason = self.body.refusal_reason(gesture, state)
         if reason or gesture is None:
-            self.body.status.report(decision_report(decision, None, None, reason, share))
+            self.body.status.report_decision(decision, share, reason=reason)
             return
         # The paper's own gestures replicate it, and are the same every time.
         strength = 1.0 if gesture.name in ORIGINALS else decision.strength
         intensity = round(cue.intensity * strength * self.body.safety.share, 3)
-        self.body.status.report(decision_report(decision, gesture.name, intensity, "", share))
+        self.body.status.report_decision(decision, share, gesture.name, intensity)
         answer = Answer(gesture.name, decision.above, cue.is_quiet, intensity)
         pace = QUIET_PACE if cue.is_quiet else 1.0
         self.body.start(gesture.scaled(intensity), now_s, state, answer, pace)
@@ -304,8 +304,42 @@ class Performer:
                 now_s,
                 state,
                 there,
-                player.gesture,
-                self.body.expression.lights,
-                self.bad_messages,
-                counts,
+                gesture=player.gesture,
+                lights=self.body.expression.lights,
+                bad_messages=self.bad_messages,
+                counters=counts,
             )
+
+
+def control_loop(
+    performer: Performer,
+    monotonic: Callable[[], float],
+    is_over: Callable[[], bool] = lambda: False,
+) -> Iterator[float]:
+    """Tick a performer 50 times a second.
+
+    The caller waits, by sleeping, by awaiting, or by moving a virtual clock, and may read the
+    performer's state meanwhile.
+
+    Parameters
+    ----------
+    performer
+        The robot.
+    monotonic
+        The clock [s] that the performer is ticked by.
+    is_over
+        Called before each wait; the loop ends once it returns True.
+
+    Yields
+    ------
+    float
+        How long to wait until the next tick [s].
+
+    Raises
+    ------
+    BaseLost
+        Where the base does not answer any more.
+    """
+    while not is_over():
+        yield TICK_S
+        performer.tick(monotonic())

@@ -24,8 +24,6 @@ MISSED_M, MISSED_FADES_S = 0.03, 1.0
 # Wheels that slip miss no way, but their motors push. Rolling and speeding up take a TurtleBot 2
 # less than this force [N]; so much work beyond it [J] is the end. (Ours.)
 FREE_N, WORK_J = 12.0, 0.5
-# From a Kobuki's middle to a wheel (docs/reference/kobuki.md#odometry-and-gyro).
-HALF_TRACK_M = 0.115
 
 
 class Resistance:
@@ -48,7 +46,7 @@ class Resistance:
             How long ago the last moment was [s].
         """
         span_s = max(span_s, 0.0)
-        is_, should = _wheels(state.twist), _wheels(ordered)
+        is_, should = state.twist.wheels_m_s, ordered.wheels_m_s
         deviation_m_s = max(abs(one - other) for one, other in zip(should, is_, strict=True))
         speed_m_s = max(map(abs, should))
         limit_m_s = min(max(DEVIATION_SHARE * speed_m_s, DEVIATION_LEAST_M_S), DEVIATION_M_S)
@@ -66,9 +64,3 @@ class Resistance:
         self._work_j += max(state.sensors.push_n - FREE_N, 0.0) * speed_m_s * span_s
         has_deviated = self._deviated_s is not None and self._deviated_s >= DEVIATION_S - 1e-9
         return has_deviated or self._missed_m > MISSED_M or self._work_j > WORK_J
-
-
-def _wheels(twist: Twist) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel [m/s]."""
-    turning_m_s = HALF_TRACK_M * twist.w_rad_s
-    return twist.v_m_s - turning_m_s, twist.v_m_s + turning_m_s

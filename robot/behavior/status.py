@@ -1,13 +1,15 @@
-"""A robot's status: reports to the server, lights and sounds for people."""
+"""A robot's reports to the server (docs/protocol.md), and its status by lights and sounds."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any
 
 from robot.bases import BaseState, Indication, MobileBase
-from robot.behavior.reports import Report, gesture_report, status_report
 from robot.behavior.safety import BATTERY_WARN_V, battery_share
+from robot.behavior.window_decider import Decision
 from robot.motion.gesture import Gesture
 from robot.motion.score import Color
 
@@ -21,8 +23,10 @@ LIGHTS = {
 
 STATUS_MOVING_S = 0.25
 STATUS_IDLE_S = 1.0
-REPORTS_KEPT = 64  # while nobody sends them, the oldest are dropped
+MAX_REPORTS = 64  # while they cannot be sent, the oldest are dropped
+REPORTED = ("from_s", "until_s", "steps", "mean", "threshold", "above")  # of a decision
 
+Report = dict[str, Any]
 RobotState = tuple[str, str]  # the robot's state, and why it would not perform now
 
 
@@ -43,7 +47,7 @@ class StatusReporter:
     """
 
     def __init__(self, base: MobileBase) -> None:
-        self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self.reports: deque[Report] = deque(maxlen=MAX_REPORTS)
         self.on_report: Callable[[Report], None] = lambda _report: None
         self._base = base
         # Where the base has notes, a gesture's own score says aloud that it moves.
@@ -65,14 +69,41 @@ class StatusReporter:
 
     def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
         """Report that a gesture has started or ended."""
+        report = {"kind": "gesture", "name": gesture.name, "phase": phase, "outcome": outcome}
         is_open = not self._base.abilities.closed_loop
-        self.report(gesture_report(gesture.name, phase, outcome, open_loop=is_open))
+        self.report(report | {"open_loop": True} if is_open else report)
+
+    def report_decision(
+        self,
+        decision: Decision,
+        share: float | None,
+        gesture: str | None = None,
+        intensity: float | None = None,
+        reason: str = "",
+    ) -> None:
+        """Report a decision, and the gesture that follows or why none does.
+
+        Parameters
+        ----------
+        decision
+            The result of a window.
+        share
+            The share of windows that were above the threshold, 0 to 1.
+        gesture, intensity
+            The gesture's name, and the share of its size, 0.1 to 1; None where none follows.
+        reason
+            Why none follows, as a code.
+        """
+        report = {"kind": "decision", "gesture": gesture, "intensity": intensity, "reason": reason}
+        decided = {name: getattr(decision, name) for name in REPORTED}
+        self.report(report | decided | {"activated_share": share})
 
     def report_status(
         self,
         now_s: float,
         state: RobotState,
         there: BaseState,
+        *,
         gesture: Gesture | None,
         lights: tuple[Color, Color] | None,
         bad_messages: int,
@@ -80,19 +111,45 @@ class StatusReporter:
     ) -> None:
         """Report the status where it has changed, and every so often.
 
-        ``lights`` are those of the score that is played, None where none is.
+        Parameters
+        ----------
+        now_s
+            The time [s].
+        state
+            The robot's state, and why it would not perform now.
+        there
+            What its base reports.
+        gesture
+            What it plays; None for nothing.
+        lights
+            Those of the score that is played; None where none is.
+        bad_messages
+            How many messages broke the protocol.
+        counters
+            How often something went wrong, by name; those at 0 are omitted.
         """
         every_s = STATUS_IDLE_S if gesture is None else STATUS_MOVING_S
         due = self._reported_s is None or not 0 <= now_s - self._reported_s < every_s
         if not due and state == self._reported:
             return
         self._reported_s, self._reported = now_s, state
-        name = None if gesture is None else gesture.name
-        volts = there.sensors.battery_v
-        battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)
+        volts, abilities = there.sensors.battery_v, self._base.abilities
         self.report(
-            status_report(self._base, *state, name, there, battery, bad_messages, counters)
-            | {
+            {
+                "kind": "status",
+                "base": self._base.name,
+                "simulated": abilities.simulated,
+                "open_loop": not abilities.closed_loop,
+                "bumpers": abilities.bumpers,
+                "state": state[0],
+                "gesture": None if gesture is None else gesture.name,
+                "pose": asdict(there.pose),
+                "reason": state[1],
+                "battery_v": volts,
+                "battery_share": None if volts is None else battery_share(volts),
+                "battery_low": volts is not None and volts < BATTERY_WARN_V,
+                "bad_messages": bad_messages,
+                "counters": {name: count for name, count in counters.items() if count},
                 "lights": list(lights or LIGHTS[self._indication or Indication.WAITING]),
                 "mood": "calm" if gesture is None else gesture.score.mood,
             }

@@ -10,8 +10,17 @@
 docs/protocol.md is the contract; the close codes here are its table.
 """
 
-from robot.link.back_off import BackOff
-from robot.link.link import FrameTooLarge, Link, Message, Timing
+from robot.link.dialing import BackOff, Timing, dial
+from robot.link.link import FrameTooLarge, Link, Message
 from robot.link.refusals import REFUSALS, LinkRefused
 
-__all__ = ["REFUSALS", "BackOff", "FrameTooLarge", "Link", "LinkRefused", "Message", "Timing"]
+__all__ = [
+    "REFUSALS",
+    "BackOff",
+    "FrameTooLarge",
+    "Link",
+    "LinkRefused",
+    "Message",
+    "Timing",
+    "dial",
+]

@@ -9,15 +9,13 @@ import re
 import ssl
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
-from urllib.parse import urlsplit
 
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
-from robot.link.back_off import BackOff
+from robot.link.dialing import TIMING, BackOff, Timing, dial
 from robot.link.refusals import (
     PASSING_STATUSES,
     REFUSALS,
@@ -37,21 +35,6 @@ ADDRESS = re.compile(r"[A-Za-z0-9.:\[\]_-]{1,100}")
 
 class FrameTooLarge(ValueError):
     """A message of more than 64 KiB."""
-
-
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """How long a link waits [s].
-
-    A half-open link is noticed after at most ``ping_every_s + pong_within_s + close_within_s``.
-    """
-
-    retry_first_s: float = 0.2
-    retry_longest_s: float = 5.0
-    connect_within_s: float = 5.0
-    ping_every_s: float = 4.0
-    pong_within_s: float = 4.0
-    close_within_s: float = 1.0
 
 
 def _ignore_loss(_reason: str, _pause_s: float) -> None:
@@ -90,7 +73,7 @@ class Link:
         *,
         on_lost: Callable[[str, float], None] = _ignore_loss,
         keep_token: Callable[[str], bool] | None = None,
-        timing: Timing = Timing(),
+        timing: Timing = TIMING,
         jitter: Callable[[], float] = random.random,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
@@ -101,7 +84,7 @@ class Link:
         self._keep_token = keep_token
         self._timing = timing
         self._sleep = sleep
-        self._back_off = BackOff(timing.retry_first_s, timing.retry_longest_s, jitter)
+        self._back_off = BackOff(timing, jitter)
         self._socket: ClientConnection | None = None
         self._is_closed = False
         self._was_welcome = False  # ever: then a failure is likely to pass
@@ -201,22 +184,15 @@ class Link:
             await socket.close()
 
     async def _connect(self) -> None:
-        timing = self._timing
-        loopback = urlsplit(self.url).hostname in {"localhost", "127.0.0.1", "::1"}
         headers = {"Authorization": f"Bearer {self._token}"}
         if self._server:
             headers[SERVER_HEADER] = self._server
-        socket = await connect(
+        socket = await dial(
             self.url,
+            self._timing,
+            MAX_FRAME_BYTES,
             additional_headers=headers,
             user_agent_header="GARRY",
-            compression=None,  # frames are small; compression would only cost time
-            proxy=None if loopback else True,
-            max_size=MAX_FRAME_BYTES,
-            open_timeout=timing.connect_within_s,
-            ping_interval=timing.ping_every_s,
-            ping_timeout=timing.pong_within_s,
-            close_timeout=timing.close_within_s,
         )
         self._error, self._was_heard = "", False
         # A server that refuses us may have closed already; iterating then reads its reason.

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 from robot.motion.limits import LONGEST_STEP_S, TICK_S
 from robot.motion.pose import Pose
-from robot.motion.twist import STILL, Twist
+from robot.motion.twist import STILL, WHEELBASE_M, Twist
 
 LONGEST_S = 0.4  # delays up to here are looked for
 STEPS = round(LONGEST_S / TICK_S)
-HALF_TRACK_M = 0.115  # weighs turns against ways: from a Kobuki's middle to a wheel
+WHEEL_M = WHEELBASE_M / 2  # from the middle to a wheel: weighs turns against ways
 ENOUGH_S = 0.6  # of motion, before anything is concluded
 FADES_S = 20.0  # of motion: what is older counts less
 # The best delay has to leave no more than this share of the motion unexplained. Of a base that is
@@ -41,13 +42,15 @@ class DelayMeter:
         if all(order.is_still for order in self._orders):
             return
         elapsed_s = now_s - last[0]
-        ahead_m, turned_rad = _motion(last[1], pose)
-        v_m_s, turn_m_s = ahead_m / elapsed_s, HALF_TRACK_M * turned_rad / elapsed_s
+        before, turned_rad = last[1], pose.heading_rad - last[1].heading_rad
+        midway = replace(before, heading_rad=(before.heading_rad + pose.heading_rad) / 2)
+        v_m_s = pose.seen_from(midway).x_m / elapsed_s
+        turn_m_s = WHEEL_M * turned_rad / elapsed_s
         fading = math.exp(-elapsed_s / FADES_S)
         self._energy = self._energy * fading + (v_m_s**2 + turn_m_s**2) * elapsed_s
         self._moved_s = self._moved_s * fading + elapsed_s
         for ticks, order in enumerate(self._orders):
-            error = (order.v_m_s - v_m_s) ** 2 + (HALF_TRACK_M * order.w_rad_s - turn_m_s) ** 2
+            error = (order.v_m_s - v_m_s) ** 2 + (WHEEL_M * order.w_rad_s - turn_m_s) ** 2
             self._costs[ticks] = self._costs[ticks] * fading + error * elapsed_s
 
     @property
@@ -67,11 +70,3 @@ class DelayMeter:
         before, here, after = self._costs[best - 1 : best + 2]
         curve = before - 2 * here + after
         return (before - after) / (2 * curve) if curve > 0 else 0.0
-
-
-def _motion(before: Pose, now: Pose) -> tuple[float, float]:
-    """Return the way ahead [m] and the turn [rad] between two poses."""
-    x_m, y_m = now.x_m - before.x_m, now.y_m - before.y_m
-    along_rad = (before.heading_rad + now.heading_rad) / 2
-    ahead_m = x_m * math.cos(along_rad) + y_m * math.sin(along_rad)
-    return ahead_m, now.heading_rad - before.heading_rad

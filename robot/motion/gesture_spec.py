@@ -26,8 +26,9 @@ from robot.motion.gesture import (
 from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS
-from robot.motion.pose import HOME, Pose
+from robot.motion.pose import HOME, Pose, advance
 from robot.motion.score import read_score
+from robot.motion.twist import Twist
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
 MAX_MOVES = 16
@@ -197,11 +198,7 @@ def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
 
 def _ahead(pose: Pose, by_m: float) -> Pose:
     """Return the pose ahead; a place that is almost home becomes home."""
-    place = Pose(
-        pose.x_m + by_m * math.cos(pose.heading_rad),
-        pose.y_m + by_m * math.sin(pose.heading_rad),
-        pose.heading_rad,
-    )
+    place = advance(pose, Twist(by_m), 1.0)
     return Pose(heading_rad=pose.heading_rad) if place.distance_m(HOME) <= HOME_M else place
 
 

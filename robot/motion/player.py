@@ -214,9 +214,9 @@ def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
                 return None
             return Twist(w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2))
         case Drive():
-            cos, sin = math.cos(segment.heading_rad), math.sin(segment.heading_rad)
-            x_m, y_m = segment.x_m - pose.x_m, segment.y_m - pose.y_m
-            left_m, beside_m = x_m * cos + y_m * sin, x_m * sin - y_m * cos
+            goal = Pose(segment.x_m, segment.y_m)
+            left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))
+            left_m, beside_m = left.x_m, -left.y_m
             ahead = math.copysign(1.0, segment.by_m)
             if left_m * ahead <= NEAR_M:
                 return None

@@ -32,6 +32,14 @@ class Pose:
         """Return the angle between two headings [rad], 0 to π; full turns do not count."""
         return abs(wrap(other.heading_rad - self.heading_rad))
 
+    def seen_from(self, origin: Pose) -> Pose:
+        """Return this pose in the frame of another: its x axis is that one's heading."""
+        x_m, y_m = self.x_m - origin.x_m, self.y_m - origin.y_m
+        cos, sin = math.cos(origin.heading_rad), math.sin(origin.heading_rad)
+        return Pose(
+            x_m * cos + y_m * sin, y_m * cos - x_m * sin, self.heading_rad - origin.heading_rad
+        )
+
 
 HOME = Pose()
 

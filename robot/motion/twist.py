@@ -1,4 +1,4 @@
-"""Velocities of a base that drives and turns.
+"""Velocities of a base that drives and turns, and of its two wheels.
 
 Right-handed, as in ROS (REP 103): x ahead, y to the left, turns counter-clockwise.
 """
@@ -7,6 +7,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Self
+
+# Between the wheels of a Kobuki [m] (docs/reference/kobuki.md#odometry-and-gyro). Where a base's
+# own is unknown, this one weighs turns against ways.
+WHEELBASE_M = 0.23
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +20,28 @@ class Twist:
 
     v_m_s: float = 0.0
     w_rad_s: float = 0.0
+
+    @classmethod
+    def of_wheels(cls, left_m_s: float, right_m_s: float) -> Self:
+        """Return the twist of two wheels.
+
+        Parameters
+        ----------
+        left_m_s, right_m_s
+            Their speeds [m/s]; distances [m] give the distance ahead [m] and the turn [rad].
+        """
+        return cls((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / WHEELBASE_M)
+
+    @property
+    def wheels_m_s(self) -> tuple[float, float]:
+        """Speeds of the left and the right wheel [m/s]."""
+        turning_m_s = self.w_rad_s * WHEELBASE_M / 2
+        return self.v_m_s - turning_m_s, self.v_m_s + turning_m_s
+
+    @property
+    def fastest_wheel_m_s(self) -> float:
+        """Speed of the faster wheel, whichever way it turns [m/s]."""
+        return abs(self.v_m_s) + abs(self.w_rad_s) * WHEELBASE_M / 2
 
     @property
     def is_still(self) -> bool:

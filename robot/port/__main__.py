@@ -12,8 +12,8 @@ a JSON line each:
 
 ``once`` is sent one time. Times are of the computer's monotonic clock, which its processes share.
 A port that is lost is opened again as soon as it is back, with stops first. Where it was lost while
-the base moved, this process outlives whoever started it until the base is stopped. A guard stops
-the base if this process dies, whether or not its parent lives to do so.
+the base moved, this process outlives whoever started it until the base is stopped. An orphan stop
+(``orphan_stop``) stops the base if this process dies, whether or not its parent lives to do so.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from robot.port.guard import Guard
 from robot.port.opening import PortOpener
+from robot.port.orphan_stop import OrphanStop
 from robot.port.owner import PortOwner
 from robot.port.setpoint import MAX_FRAME_BYTES
 
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     options = parser.parse_args(arguments)
     opener = PortOpener(options.url, options.baud)
-    guard = Guard(opener, options.stop)  # before there are threads
+    orphan_stop = OrphanStop(opener, options.stop)  # before there are threads
     writer = PipeWriter(sys.stdout.fileno())
     owner = PortOwner(opener, options.stop, writer.write)
     owner.owes_stop = options.owes_stop
@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for work in (orders, partial(writer.run, owner.end)):
         threading.Thread(target=work, daemon=True).start()
     owner.run()
-    guard.dismiss()
+    orphan_stop.cancel()
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from collections.abc import Callable
 from robot.port.owner import READ_S, STOPS, SerialPort
 from robot.port.usb import find_port
 
+PTYS = ("/dev/pts/", "/dev/ttys")
 WRITE_S = 0.1  # a port that accepts nothing for this long is lost
 LOOK_EVERY_S = 0.25  # for a Kobuki that is plugged in; to list all ports takes a few milliseconds
 
@@ -59,8 +61,6 @@ class PortOpener:
             self.url, baudrate=self._baud, timeout=READ_S, write_timeout=WRITE_S, exclusive=True
         )
         if sys.platform != "win32" and isinstance(port, serial.Serial):
-            from robot.port.exclusive import claim
-
             try:
                 claim(port.fileno())
             except OSError:
@@ -83,3 +83,33 @@ def send_stops(open_port: Callable[[], SerialPort], stop: bytes) -> bool:
             port.close()
         return True
     return False
+
+
+def claim(port: int) -> None:
+    """Lock an open port, given its file descriptor. Raises OSError where another program has it.
+
+    pyserial's own lock is ``flock``; kobuki_node takes one by ``fcntl``, and neither sees the other
+    (docs/reference/kobuki.md#serial-link). ``TIOCEXCL`` keeps everybody else from opening it at
+    all. The modules are POSIX's: Windows lacks them, and needs none of this.
+
+    A pty, the port of a twin, is left without ``TIOCEXCL``: it would keep that after we are killed,
+    because the twin has it open too, and nobody could ever open it again.
+    """
+    import fcntl
+
+    try:
+        fcntl.lockf(port, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as problem:
+        raise OSError(
+            problem.errno, "another program has locked the port (kobuki_node?). Stop that one"
+        ) from None
+    if not os.ttyname(port).startswith(PTYS):
+        refuse_others(port)
+
+
+def refuse_others(port: int) -> None:
+    """Let no other program open a port while we have it; a superuser's still may."""
+    import fcntl
+    import termios
+
+    fcntl.ioctl(port, termios.TIOCEXCL)

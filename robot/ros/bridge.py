@@ -12,25 +12,30 @@ import random
 import threading
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable
-from contextlib import suppress
+from collections.abc import Awaitable, Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Protocol
 from urllib.parse import urlsplit
 
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
-from robot.link import BackOff
+from robot.link import BackOff, Timing, dial
 from robot.motion.limits import TICK_S
 from robot.ros.frames import MAX_FRAME_BYTES, BadRosFrame, Frame, Incoming, read_frame, to_text
 
 DEFAULT_URL = "ws://127.0.0.1:9090"
 
-PING_EVERY_S = PONG_WITHIN_S = 1.0
+# Quicker than to a server: a base that was moving has to be stopped.
+TIMING = Timing(
+    retry_first_s=0.05,
+    retry_longest_s=1.0,
+    connect_within_s=3.0,
+    ping_every_s=1.0,
+    pong_within_s=1.0,
+    close_within_s=0.5,
+)
 SEND_WITHIN_S = 0.5  # a bridge that accepts nothing for this long is lost
-CONNECT_WITHIN_S = 3.0
-CLOSE_WITHIN_S = 0.5
-RETRY_FIRST_S, RETRY_LONGEST_S = 0.05, 1.0  # a base that was moving is to be stopped
 END_S = 2.0
 
 
@@ -58,12 +63,8 @@ class Bridge:
 
     Parameters
     ----------
-    url
-        ws://host:9090.
     client
         What publishes and subscribes.
-    lock
-        Held during each call of the client, on the bridge's thread.
     monotonic
         The clock [s] of those calls.
     sleep, jitter
@@ -71,8 +72,10 @@ class Bridge:
 
     Attributes
     ----------
+    lock
+        Held during each call of the client, here on the bridge's thread.
     problem
-        Why there is no connection; empty while there is one.
+        Why there is no connection; empty while there is one, and before it is opened.
     counters
         How often a connection was made (``bridge_openings``), and how many frames were not
         understood (``bridge_bad``).
@@ -80,44 +83,55 @@ class Bridge:
 
     def __init__(
         self,
-        url: str,
         client: TopicClient,
-        lock: threading.Lock,
         monotonic: Callable[[], float] = time.monotonic,
         *,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
         jitter: Callable[[], float] = random.random,
     ) -> None:
-        self.url = url
-        self._client, self._lock = client, lock
+        self._client = client
+        self.lock = threading.Lock()
         self._monotonic = monotonic
         self._sleep = sleep
-        self._back_off = BackOff(RETRY_FIRST_S, RETRY_LONGEST_S, jitter)
-        self.problem = f"No connection to the rosbridge at {url} yet."
+        self._back_off = BackOff(TIMING, jitter)
+        self.url = self.problem = ""
         self.counters: Counter[str] = Counter(bridge_openings=0, bridge_bad=0)
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._wanted, self._closing = asyncio.Event(), asyncio.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
 
     @property
     def is_dead(self) -> bool:
         """Whether its thread has ended, so that nothing is sent any more."""
-        return not self._thread.is_alive()
+        return self._thread is not None and not self._thread.is_alive()
 
-    def wake(self) -> None:
-        """Send at once what is due. Never waits, never raises."""
-        with suppress(RuntimeError):  # it has been closed
-            self._loop.call_soon_threadsafe(self._wanted.set)
+    def open(self, url: str) -> None:
+        """Start to connect to ws://host:9090, and to reconnect."""
+        self.url, self.problem = url, f"No connection to the rosbridge at {url} yet."
+        loop = self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, args=(loop,), daemon=True)
+        self._thread.start()
+
+    @contextmanager
+    def sending(self) -> Iterator[None]:
+        """Hold the lock while the client is called; then send at once what is due. Never waits."""
+        with self.lock:
+            yield
+        self._call(self._wanted.set)
 
     def close(self) -> None:
         """Send the last frames and close. Never raises."""
-        with suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(self._closing.set)
-        self._thread.join(END_S)
+        self._call(self._closing.set)
+        if self._thread is not None:
+            self._thread.join(END_S)
 
-    def _run(self) -> None:
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+    def _call(self, callback: Callable[[], None]) -> None:
+        if self._loop is not None:
+            with suppress(RuntimeError):  # it has been closed
+                self._loop.call_soon_threadsafe(callback)
+
+    def _run(self, loop: asyncio.AbstractEventLoop) -> None:
+        with asyncio.Runner(loop_factory=lambda: loop) as runner:
             runner.run(self._run_until_closed())
 
     async def _run_until_closed(self) -> None:
@@ -133,18 +147,8 @@ class Bridge:
 
     async def _connect(self) -> None:
         """Stay on one connection until it is lost, then pause."""
-        loopback = urlsplit(self.url).hostname in {"localhost", "127.0.0.1", "::1"}
         try:
-            socket = await connect(
-                self.url,
-                compression=None,
-                proxy=None if loopback else True,
-                max_size=MAX_FRAME_BYTES,
-                open_timeout=CONNECT_WITHIN_S,
-                ping_interval=PING_EVERY_S,
-                ping_timeout=PONG_WITHIN_S,
-                close_timeout=CLOSE_WITHIN_S,
-            )
+            socket = await dial(self.url, TIMING, MAX_FRAME_BYTES)
         except (OSError, WebSocketException) as problem:
             self.problem = f"No rosbridge answers at {self.url} ({_explain(problem)})."
         else:
@@ -153,7 +157,7 @@ class Bridge:
             try:
                 await self._exchange_frames(socket)
             finally:
-                with self._lock:
+                with self.lock:
                     self._client.disconnect(self._monotonic())
                 self.problem = f"The connection to the rosbridge at {self.url} was lost."
         await self._sleep(self._back_off.next_s())
@@ -186,7 +190,7 @@ class Bridge:
     async def _send(
         self, socket: ClientConnection, next_frames: Callable[[float], Iterable[Frame]]
     ) -> None:
-        with self._lock:
+        with self.lock:
             frames = list(next_frames(self._monotonic()))
         for frame in frames:
             async with asyncio.timeout(SEND_WITHIN_S):
@@ -197,7 +201,7 @@ class Bridge:
             async for text in socket:
                 try:
                     incoming = read_frame(text)
-                    with self._lock:
+                    with self.lock:
                         self._client.handle(incoming, self._monotonic())
                 except BadRosFrame:
                     self.counters["bridge_bad"] += 1

@@ -13,7 +13,8 @@ import pytest
 
 pytest.importorskip("pybullet", reason="pybullet is not installed")
 
-from robot.bases.kobuki_protocol import FRAME_S, BaseControl, encode_commands
+from robot.bases.kobuki_protocol.commands import BaseControl, encode_commands
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.bullet import STEPS, BulletBody
 from robot.bases.twin.faults import Faults
 from robot.bases.twin.firmware import Firmware

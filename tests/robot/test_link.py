@@ -67,7 +67,7 @@ def closing(*codes, before=None):
 
 
 def test_pauses_grow_to_five_seconds_and_begin_again():
-    pauses = BackOff(0.2, 5.0, lambda: 0.0)
+    pauses = BackOff(Timing(), lambda: 0.0)
 
     assert [pauses.next_s() for _ in range(7)] == pytest.approx([0.2, 0.4, 0.8, 1.6, 3.2, 5, 5])
     for _ in range(5000):
@@ -77,7 +77,7 @@ def test_pauses_grow_to_five_seconds_and_begin_again():
 
 
 def test_jitter_takes_up_to_half_of_a_pause():
-    pauses = BackOff(0.2, 5.0, lambda: 0.999)
+    pauses = BackOff(Timing(), lambda: 0.999)
 
     assert pauses.next_s() == pytest.approx(0.1, rel=0.01)
 

@@ -4,8 +4,8 @@ import pytest
 
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.behavior.performer import Performer
+from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox
-from robot.black_box.witness import Witness
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
 from robot.play_gesture import VirtualClock
@@ -21,14 +21,14 @@ def recorded(tmp_path):
     box = BlackBox(tmp_path / "box", clock.monotonic)
     box.begin()
     performer = Performer(base)
-    witness = Witness(box, performer, base)
+    capture = Capture(box, performer, base)
     assert not performer.play_alone(GESTURES["celebrate"], clock.now_s)
     for tick in range(400):
         performer.tick(clock.now_s)
-        witness.see(clock.now_s)
+        capture.record_tick(clock.now_s)
         if tick == 90:
             performer.handle({"type": "stop"}, clock.now_s)
-            witness.hear({"type": "stop"})
+            capture.record_message({"type": "stop"})
         clock.sleep(TICK_S)
     box.write()
     (file,) = (tmp_path / "box").glob("incident-*-stopped.jsonl")

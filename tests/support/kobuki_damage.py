@@ -7,16 +7,11 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-    TICK_M,
+from robot.bases.kobuki_protocol.feedback import (
     CliffRaw,
     CoreSensors,
     DockIr,
-    Estimate,
     Feedback,
-    FrameFilter,
-    FrameReader,
     GpInput,
     GyroRaw,
     Inertia,
@@ -25,6 +20,9 @@ from robot.bases.kobuki_protocol import (
     decode_feedback,
     encode_feedback,
 )
+from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
+from robot.bases.kobuki_protocol.frames import FRAME_S, FrameReader
+from robot.bases.kobuki_protocol.wheels import TICK_M
 
 BUMP_EVERY = 500  # frames; it lasts 50
 DRIVE_TICKS = 47  # a frame: 0.2 m/s

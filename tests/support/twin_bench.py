@@ -11,9 +11,7 @@ from operator import xor
 
 import pytest
 
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-)
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.faults import Faults
 from robot.bases.twin.firmware import Firmware
 from robot.bases.twin.process import Twin

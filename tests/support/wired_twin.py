@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from robot.bases import Abilities, BaseState
 from robot.bases.kobuki import KobukiBase
-from robot.bases.kobuki_protocol import FRAME_S
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.__main__ import make_body
 from robot.bases.twin.faults import Faults
 from robot.bases.twin.firmware import Firmware

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 from robot.bases.kobuki_protocol.commands import BaseControl
-from robot.motion.twist import STILL, Twist
+from robot.motion.twist import STILL, WHEELBASE_M, Twist
 
-# Between the wheels [m], and one tick of an encoder [m]
-# (docs/reference/kobuki.md#odometry-and-gyro).
-WHEELBASE_M = 0.23
+# One tick of an encoder [m] (docs/reference/kobuki.md#odometry-and-gyro).
 TICK_M = 8.5292090497737556558e-5
 # Largest speed of a wheel [m/s] (docs/reference/kobuki.md#limits).
 WHEEL_MAX_M_S = 0.70
@@ -31,8 +29,7 @@ def slow_to_wheels(twist: Twist) -> Twist:
     """
     if not twist.is_finite:
         return STILL
-    outer_m_s = abs(twist.v_m_s) + abs(twist.w_rad_s) * WHEELBASE_M / 2
-    too_fast = max(outer_m_s / WHEEL_MAX_M_S, 1.0)
+    too_fast = max(twist.fastest_wheel_m_s / WHEEL_MAX_M_S, 1.0)
     return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
 
 
@@ -81,9 +78,3 @@ def control_to_twist(control: BaseControl) -> Twist:
         return Twist(0.0, speed / HALF_MM)
     w_rad_s = speed / (radius + math.copysign(HALF_MM, radius))
     return Twist(w_rad_s * radius / 1000, w_rad_s)
-
-
-def wheel_speeds(twist: Twist) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel [m/s]."""
-    turning_m_s = twist.w_rad_s * WHEELBASE_M / 2
-    return twist.v_m_s - turning_m_s, twist.v_m_s + turning_m_s

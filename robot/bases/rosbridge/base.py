@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable, Mapping
@@ -33,8 +32,6 @@ class RosbridgeBase(MobileBase):
         self, monotonic: Callable[[], float], topics: Topics = PROFILES[DEFAULT_PROFILE]
     ) -> None:
         self._monotonic = monotonic
-        self._lock = threading.Lock()  # the bridge has a thread of its own
-        self._bridge: Bridge | None = None
         self._set_topics(topics)
 
     @classmethod
@@ -49,42 +46,35 @@ class RosbridgeBase(MobileBase):
 
     def open(self) -> None:
         """Connect, and wait a moment for the base's odometry."""
-        self._bridge = Bridge(self.port or find_bridge(), self._client, self._lock, self._monotonic)
+        self._bridge.open(self.port or find_bridge())
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and self.read().sensors.silent_s == math.inf:
             time.sleep(0.02)
 
     def close(self) -> None:
         """Send the last frames, which are stops, and close the connection."""
-        if self._bridge is not None:
-            self._bridge.close()
+        self._bridge.close()
 
     @property
     def counters(self) -> Mapping[str, int]:
         """How often something went wrong with the connection, with orders, and with odometry."""
-        with self._lock:
-            counts = dict(self._client.counters)
-        return counts if self._bridge is None else counts | self._bridge.counters
+        with self._bridge.lock:
+            return self._client.counters | self._bridge.counters
 
     @property
     def problem(self) -> str:
         """Why the base cannot be reached; empty where it can."""
-        if self._bridge is None:
-            return ""
-        with self._lock:
+        with self._bridge.lock:
             return self._bridge.problem or self._client.problem(self._monotonic())
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
-        if self._bridge is not None and self._bridge.is_dead:
+        if self._bridge.is_dead:
             raise BaseLost(
                 "The thread that talks to the rosbridge has ended: see its messages above."
             )
-        with self._lock:
-            ordered = self._client.orders.order(twist, self._monotonic())
-        if self._bridge is not None:
-            self._bridge.wake()
-        return ordered
+        with self._bridge.sending():
+            return self._client.orders.order(twist, self._monotonic())
 
     def stop(self) -> None:
         """Stand still at once."""
@@ -93,28 +83,25 @@ class RosbridgeBase(MobileBase):
 
     def read(self) -> BaseState:
         """Return its state now."""
-        with self._lock:
+        with self._bridge.lock:
             return self._client.state(self._monotonic())
 
     def set_home(self) -> None:
         """Make this place home."""
-        with self._lock:
+        with self._bridge.lock:
             self._client.odometry.set_home()
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
         """Show its state by its light, and by a short sound."""
-        with self._lock:
+        with self._bridge.sending():
             self._client.show(str(indication), aloud=aloud)
-        if self._bridge is not None:
-            self._bridge.wake()
 
     def answer(self, answer: Answer) -> None:
         """Send its words, and raise or lower head or arms, where it has any."""
-        with self._lock:
+        with self._bridge.sending():
             self._client.answer(answer)
-        if self._bridge is not None:
-            self._bridge.wake()
 
     def _set_topics(self, topics: Topics) -> None:
         self.abilities = topics.abilities
         self._client = BaseClient(topics, self._monotonic())
+        self._bridge = Bridge(self._client, self._monotonic)

@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 from robot.bases.base import Answer, BaseState, SensorState
-from robot.bases.hazards import UNORDERED, StillWatch, rim_speed_m_s
 from robot.bases.rosbridge.orders import Orders
 from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
 from robot.bases.rosbridge.topics import ALL_HAZARDS, RELAY_ALIVE, Topics
 from robot.bases.rosbridge.voice_and_joints import VoiceAndJoints
+from robot.bases.unordered_motion import UNORDERED, UnorderedMotion
 from robot.motion.twist import STILL, Twist
 from robot.ros.frames import (
     BadRosFrame,
@@ -66,7 +66,7 @@ class BaseClient:
         )
         self.sensors = HazardSensors()
         self._voice_and_joints = VoiceAndJoints(topics.voice, topics.joints)
-        self._still_watch = StillWatch()
+        self._unordered = UnorderedMotion()
         self._is_open = False
         self._opened_s = now_s
         self._called_s = -math.inf
@@ -115,7 +115,7 @@ class BaseClient:
         if twist is not None:
             self.odometry.order(twist, now_s)
             if not twist.is_still:
-                self._still_watch.order_motion(now_s)
+                self._unordered.order_motion(now_s)
             yield from self._order(twist)
         while self._signals:
             yield self._signals.pop(0)
@@ -137,7 +137,7 @@ class BaseClient:
                 self.sensors.record(OTHER_DRIVER)
         elif odometry is not None and incoming.topic == odometry.name:
             pose, twist = read_odometry(incoming.message)
-            if self._still_watch.update(rim_speed_m_s(twist), now_s):
+            if self._unordered.update(twist.fastest_wheel_m_s, now_s):
                 self.sensors.record(UNORDERED)
             if isinstance(self.odometry, ReportedOdometry) and self.odometry.update(
                 pose, twist, now_s

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 
-from robot.bases.hazards import UnreadHazards
 from robot.motion.limits import ORDER_HOLDS_S
 from robot.motion.pose import HOME, Pose, advance, wrap
 from robot.motion.twist import STILL, Twist
@@ -47,8 +47,7 @@ class ReportedOdometry:
 
     def set_home(self) -> None:
         """Make the present place home."""
-        last = self._last
-        self._home = Pose(last.x_m, last.y_m, self._heading_rad)
+        self._home = replace(self._last, heading_rad=self._heading_rad)
         self._update_pose()
 
     def move(self, now_s: float) -> None:
@@ -58,12 +57,8 @@ class ReportedOdometry:
         """Do nothing: the base reports how it follows."""
 
     def _update_pose(self) -> None:
-        home = self._home or HOME
-        x_m, y_m = self._last.x_m - home.x_m, self._last.y_m - home.y_m
-        cos, sin = math.cos(home.heading_rad), math.sin(home.heading_rad)
-        self.pose = Pose(
-            x_m * cos + y_m * sin, y_m * cos - x_m * sin, self._heading_rad - home.heading_rad
-        )
+        here = replace(self._last, heading_rad=self._heading_rad)
+        self.pose = here.seen_from(self._home or HOME)
 
 
 class DeadReckoning:
@@ -105,7 +100,7 @@ class HazardSensors:
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter(jumped=0)
         self._pressed: dict[str, set[int]] = {}
-        self._unread = UnreadHazards()
+        self._unread: set[str] = set()
 
     def update(self, hazard: str, which: int, is_detected: bool) -> None:
         """Store an event of one sensor."""
@@ -117,7 +112,7 @@ class HazardSensors:
     def replace(self, hazards: frozenset[str]) -> None:
         """Store all hazards that hold now, of a base that reports them together."""
         self._pressed = {hazard: {0} for hazard in hazards}
-        self._unread.add(*hazards)
+        self._unread |= hazards
 
     def record(self, hazard: str) -> None:
         """Store something that happened."""
@@ -129,4 +124,5 @@ class HazardSensors:
 
     def hazards(self) -> frozenset[str]:
         """Return the hazards of now, and those that have not been read yet."""
-        return self._unread.take() | {name for name, on in self._pressed.items() if on}
+        unread, self._unread = self._unread, set()
+        return frozenset(unread | {name for name, on in self._pressed.items() if on})

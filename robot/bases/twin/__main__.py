@@ -31,13 +31,14 @@ from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 
-from robot.bases.kobuki_protocol import FRAME_S, Version
+from robot.bases.kobuki_protocol.feedback import Version
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.bodies import KinematicBody, WheeledBody
+from robot.bases.twin.bullet import BulletBody, redirect_output
 from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
 from robot.bases.twin.lines import Line, PtyLine, SocketLine
-from robot.bases.twin.output import redirect_output
 from robot.bases.twin.process import Twin
 
 
@@ -48,8 +49,6 @@ def make_body(name: str, notice: Callable[[str], None]) -> WheeledBody:
     """
     if name != "kinematic":
         try:
-            from robot.bases.twin.bullet import BulletBody
-
             return BulletBody(FRAME_S)
         except ImportError:
             if name == "bullet":

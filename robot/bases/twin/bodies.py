@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from robot.bases.kobuki_protocol import WHEELBASE_M
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import Twist
 
@@ -76,7 +75,7 @@ class KinematicBody:
 
     def roll(self, left_m_s: float, right_m_s: float) -> None:
         """Turn its wheels for one frame's time at these speeds [m/s]."""
-        twist = Twist((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / WHEELBASE_M)
+        twist = Twist.of_wheels(left_m_s, right_m_s)
         self.pose = advance(self.pose, twist, self._frame_s)
         self.turn_rad_s = twist.w_rad_s
         left_m, right_m = self.rolled_m

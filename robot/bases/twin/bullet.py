@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
 from collections.abc import Sequence
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Any
 
-from robot.bases.kobuki_protocol import SensorSide, Wheel
+from robot.bases.kobuki_protocol.feedback import SensorSide, Wheel
 from robot.bases.twin.bodies import Touch
-from robot.motion.pose import HOME, Pose, wrap
+from robot.motion.pose import HOME, Pose, advance, wrap
+from robot.motion.twist import Twist
 
 # Of 2.5 ms each in a frame: 400 Hz, finer than the 240 Hz of docs/reference/kobuki.md#twin.
 STEPS = 8
@@ -38,6 +42,22 @@ TOUCH_M = 0.001
 ROBOT, SURROUNDINGS = 1, 2  # collision groups, so that rays do not meet the robot itself
 FLOOR_SIZE_M = (10.0, 10.0, 0.5)
 WALL_SIZE_M = (0.05, 1.0, 0.25)
+
+
+def redirect_output() -> int:
+    """Return a file for answers alone in place of standard output, and import pybullet.
+
+    pybullet prints past Python: its build date when it is imported, and more when it ends.
+    """
+    answers, errors = os.dup(1), os.dup(2)
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    with contextlib.suppress(ImportError):
+        import pybullet  # noqa: F401
+    os.dup2(errors, 2)
+    os.close(errors)
+    return answers
 
 
 class BulletBody:
@@ -190,12 +210,8 @@ class BulletBody:
         return [SENSOR_RANGE_M * hit[2] for hit in hits]
 
     def _place_ahead(self, away_m: float, z_m: float) -> tuple[float, float, float]:
-        pose = self.pose
-        return (
-            pose.x_m + away_m * math.cos(pose.heading_rad),
-            pose.y_m + away_m * math.sin(pose.heading_rad),
-            z_m,
-        )
+        place = advance(self.pose, Twist(away_m), 1.0)
+        return place.x_m, place.y_m, z_m
 
     def _put_box(
         self, size_m: tuple[float, float, float], middle_m: tuple[float, ...], heading_rad: float

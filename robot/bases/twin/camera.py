@@ -20,7 +20,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from robot.bases.twin.output import redirect_output
+from robot.bases.twin.bullet import redirect_output
 from robot.motion.pose import Pose
 
 INTERVAL_S = 0.2

@@ -8,38 +8,41 @@ from collections import deque
 from typing import NamedTuple
 
 from robot.bases.drive_train import DriveTrain
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-    STOP,
-    TICK_M,
-    WHEEL_MAX_M_S,
+from robot.bases.kobuki_protocol.commands import (
     BaseControl,
-    CliffRaw,
     Command,
-    ControllerInfo,
-    CoreSensors,
-    DockIr,
     Extra,
-    Feedback,
-    FrameReader,
     GetGain,
-    GpInput,
     GpOutput,
-    GyroRaw,
-    Inertia,
-    MotorCurrent,
     Output,
     RequestExtra,
-    SensorSide,
     SetGain,
     Sound,
     SoundSequence,
+    decode_commands,
+)
+from robot.bases.kobuki_protocol.feedback import (
+    CliffRaw,
+    ControllerInfo,
+    CoreSensors,
+    DockIr,
+    Feedback,
+    GpInput,
+    GyroRaw,
+    Inertia,
+    MotorCurrent,
+    SensorSide,
     Udid,
     Version,
-    control_to_twist,
-    decode_commands,
     encode_feedback,
-    wheel_speeds,
+)
+from robot.bases.kobuki_protocol.frames import FRAME_S, FrameReader
+from robot.bases.kobuki_protocol.wheels import (
+    STOP,
+    TICK_M,
+    WHEEL_MAX_M_S,
+    control_to_twist,
+    slow_to_wheels,
 )
 from robot.bases.twin.bodies import WheeledBody
 from robot.bases.twin.faults import Faults
@@ -157,10 +160,8 @@ class Firmware:
         return self.drive_train.wheels_m_s
 
     def _order(self, control: BaseControl, now_s: float) -> None:
-        left_m_s, right_m_s = wheel_speeds(control_to_twist(control))
-        too_fast = max(abs(left_m_s) / WHEEL_MAX_M_S, abs(right_m_s) / WHEEL_MAX_M_S, 1.0)
         self.control = control
-        self.drive_train.order((left_m_s / too_fast, right_m_s / too_fast), now_s)
+        self.drive_train.order(slow_to_wheels(control_to_twist(control)).wheels_m_s, now_s)
 
     def carry_home(self) -> None:
         """Carry the body to where it began, unnoticed by the gyro."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from robot.bases.kobuki_protocol import FRAME_S
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.faults import BadFault
 from robot.bases.twin.firmware import Firmware
 from robot.bases.twin.lines import Line

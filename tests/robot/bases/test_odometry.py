@@ -7,17 +7,17 @@ import pytest
 from robot.bases.kinematic import Imperfections
 from robot.bases.odometry import Odometry
 from robot.motion.gestures import GESTURES
+from robot.motion.twist import WHEELBASE_M
 from tests.support.gesture_runs import play_in_a_row
 
 FRAME_S = 0.02
-WHEELBASE_M = 0.23
 
 
 class Walk:
     """An odometry that is fed frames of a base with a gyro that drifts."""
 
     def __init__(self, drift_deg_s, **more):
-        self.odometry = Odometry(WHEELBASE_M, **more)
+        self.odometry = Odometry(**more)
         self.drift_rad_s = math.radians(drift_deg_s)
         self.now_s = self.left_m = self.right_m = self.gyro_rad = 0.0
         self.odometry.add(0.0, 0.0, 0.0, 0.0, 0.0)

@@ -229,7 +229,7 @@ def test_a_bump_of_50_ms_in_a_hang_of_0_2_s_is_never_lost(reader):
         stage.now_s += 0.2
         stage.hear(type="heartbeat")
         if reader == "a step":
-            stage.robot.body.senses.read()
+            stage.robot.body.read()
         elif reader == "an arming":
             stage.hear(type="arm")
         stage.robot.tick(stage.now_s)

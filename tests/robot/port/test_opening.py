@@ -72,7 +72,7 @@ def test_a_real_port_cannot_even_be_opened(kobuki, monkeypatch):
     import fcntl
     import termios
 
-    monkeypatch.setattr("robot.port.exclusive.PTYS", ("/nowhere",))
+    monkeypatch.setattr("robot.port.opening.PTYS", ("/nowhere",))
     port: Any = PortOpener(kobuki.url, 115200)()
     exclusive = 0x80045440  # TIOCGEXCL
     assert fcntl.ioctl(port.fileno(), exclusive, b"\0" * 4) == b"\1\0\0\0"

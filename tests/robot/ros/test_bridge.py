@@ -22,7 +22,7 @@ from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
 from robot.play_gesture import main, play_gesture
-from robot.ros.bridge import RETRY_LONGEST_S, Bridge
+from robot.ros.bridge import TIMING, Bridge
 from tests.support.driven_ros import (
     PLAIN,
     come_back,
@@ -195,12 +195,13 @@ def test_pauses_between_attempts_grow_to_five_seconds_and_no_further():
 
     with socket.create_server(("127.0.0.1", 0)) as nobody:
         url = f"ws://127.0.0.1:{nobody.getsockname()[1]}"
-    bridge = Bridge(url, Silent(), threading.Lock(), sleep=sleep, jitter=lambda: 0.0)
+    bridge = Bridge(Silent(), sleep=sleep, jitter=lambda: 0.0)
+    bridge.open(url)
     assert enough.wait(10)
     bridge.close()
     assert bridge.is_dead
     assert pauses[:6] == [0.05, 0.1, 0.2, 0.4, 0.8, 1.0]
-    assert max(pauses) == RETRY_LONGEST_S
+    assert max(pauses) == TIMING.retry_longest_s
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

@@ -7,17 +7,10 @@ import random
 
 import pytest
 
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-    TICK_M,
-    Button,
-    CoreSensors,
-    Estimate,
-    Feedback,
-    FrameFilter,
-    Inertia,
-    Version,
-)
+from robot.bases.kobuki_protocol.feedback import Button, CoreSensors, Feedback, Inertia, Version
+from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
+from robot.bases.kobuki_protocol.frames import FRAME_S
+from robot.bases.kobuki_protocol.wheels import TICK_M
 from tests.support import kobuki_damage as damage
 
 # --- the frame filter ----------------------------------------------------------------------------

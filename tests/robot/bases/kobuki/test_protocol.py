@@ -10,46 +10,47 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.bases.kobuki_protocol import (
-    STOP,
-    WHEEL_MAX_M_S,
+from robot.bases.kobuki_protocol.commands import (
     BaseControl,
-    Button,
     ChangeFrame,
+    Extra,
+    GetGain,
+    GpOutput,
+    MelodyCode,
+    Output,
+    RequestEeprom,
+    RequestExtra,
+    SetGain,
+    Sound,
+    SoundSequence,
+    decode_commands,
+    encode_commands,
+)
+from robot.bases.kobuki_protocol.feedback import (
+    Button,
     CliffRaw,
     ControllerInfo,
     CoreSensors,
     DockIr,
     Eeprom,
-    Extra,
     Feedback,
-    FrameReader,
-    GetGain,
     GpInput,
-    GpOutput,
     GyroRaw,
     Inertia,
-    Malformed,
-    MelodyCode,
     MotorCurrent,
-    Output,
-    RequestEeprom,
-    RequestExtra,
     SensorSide,
-    SetGain,
-    Sound,
-    SoundSequence,
     Udid,
     Version,
-    control_to_twist,
-    decode_commands,
     decode_feedback,
-    encode_commands,
     encode_feedback,
-    frame,
+)
+from robot.bases.kobuki_protocol.frames import FrameReader, Malformed, frame
+from robot.bases.kobuki_protocol.wheels import (
+    STOP,
+    WHEEL_MAX_M_S,
+    control_to_twist,
     slow_to_wheels,
     twist_to_control,
-    wheel_speeds,
 )
 from robot.motion.twist import STILL, Twist
 
@@ -284,7 +285,7 @@ def test_an_order_means_the_twist_it_was_made_from(twist):
 @settings(deadline=None)
 @given(TWISTS)
 def test_no_wheel_is_ordered_to_go_too_fast(twist):
-    speeds = wheel_speeds(slow_to_wheels(twist))
+    speeds = slow_to_wheels(twist).wheels_m_s
     assert max(map(abs, speeds)) <= WHEEL_MAX_M_S + 1e-9
     assert abs(twist_to_control(twist).speed_mm_s) <= 1000 * WHEEL_MAX_M_S
 

@@ -2,9 +2,7 @@
 
 import pytest
 
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-)
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.__main__ import make_body
 from robot.bases.twin.bodies import KinematicBody
 from robot.bases.twin.bullet import BulletBody

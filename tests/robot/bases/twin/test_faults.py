@@ -8,11 +8,8 @@ import sys
 
 import pytest
 
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-    FrameReader,
-    decode_feedback,
-)
+from robot.bases.kobuki_protocol.feedback import decode_feedback
+from robot.bases.kobuki_protocol.frames import FRAME_S, FrameReader
 from robot.bases.twin.__main__ import make_body, make_parser
 from robot.bases.twin.bodies import KinematicBody
 from robot.bases.twin.faults import LIMITS, BadFault, Faults

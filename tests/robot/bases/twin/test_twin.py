@@ -8,13 +8,9 @@ from itertools import pairwise
 
 import pytest
 
-from robot.bases.kobuki_protocol import (
-    FRAME_S,
-    Estimate,
-    FrameFilter,
-    Version,
-    decode_feedback,
-)
+from robot.bases.kobuki_protocol.feedback import Version, decode_feedback
+from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
+from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.bodies import KinematicBody
 from robot.bases.twin.faults import BadFault
 from tests.support.twin_bench import (

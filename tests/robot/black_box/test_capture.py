@@ -1,28 +1,28 @@
 """What a black box is told of a robot, and when it keeps what it has."""
 
 from robot.bases import SensorState
+from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox
-from robot.black_box.witness import Witness
 from robot.motion.limits import TICK_S
 from tests.support.robot_stage import WELCOME, FeelingBase, Stage
 
 
 class Watched:
-    """A robot on a stage with a witness, whose box writes nothing."""
+    """A robot on a stage with its capture, whose box writes nothing."""
 
     def __init__(self, tmp_path):
         self.stage = Stage(FeelingBase)
         self.box = BlackBox(tmp_path, lambda: self.stage.now_s)
-        self.witness = Witness(self.box, self.stage.robot, self.stage.base)
+        self.capture = Capture(self.box, self.stage.robot, self.stage.base)
 
     def hear(self, **message):
         self.stage.hear(**message)
-        self.witness.hear(message)
+        self.capture.record_message(message)
 
     def run(self, span_s):
         for _ in range(round(span_s / TICK_S)):
             self.stage.wait(TICK_S)
-            self.witness.see(self.stage.now_s)
+            self.capture.record_tick(self.stage.now_s)
 
     def noted(self, what):
         return [one[what] for one in self.box._waiting if what in one]

@@ -1,4 +1,4 @@
-"""Tells a black box what a robot hears, orders, does and reports, and what is to be kept."""
+"""Records in a black box what a robot receives, orders, does and reports, and when to retain it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from robot.bases import MobileBase
 from robot.behavior.performer import NO_LINK, Message, Performer
-from robot.behavior.reports import Report
+from robot.behavior.status import Report
 from robot.black_box.recorder import BlackBox
 
 # While it stands at ease, a tick this often [s] is enough; a disk may be a card that wears.
@@ -14,8 +14,8 @@ AT_EASE_S = 1.0
 AWAKE_S = 3.0  # after it moved or felt something last
 
 
-class Witness:
-    """Watches one performer and its base, on the loop that ticks them.
+class Capture:
+    """Captures one performer and its base, on the loop that ticks them.
 
     Parameters
     ----------
@@ -36,17 +36,17 @@ class Witness:
             performer.body.status.on_report = self._record_report
             base.on_bytes = self._record_bytes
 
-    def hear(self, message: Message) -> None:
+    def record_message(self, message: Message) -> None:
         """Record a message of the server that was handled just now."""
         if self._box is not None:
             self._box.note(heard=message)
             self._look_for_stop()
 
-    def see(self, now_s: float) -> None:
+    def record_tick(self, now_s: float) -> None:
         """Record a tick: what was ordered, and what the base reports."""
         if self._box is None:
             return
-        ordered, state = self._performer.body.ordered, self._performer.body.senses.state
+        ordered, state = self._performer.body.ordered, self._performer.body.state
         hazards = sorted(state.sensors.hazards)
         if not ordered.is_still or not state.twist.is_still or hazards:
             self._awake_s = now_s
@@ -59,8 +59,8 @@ class Witness:
             self._box.note(tick=tick, **({"hazards": hazards} if hazards else {}))
         self._look_for_stop()
 
-    def lose(self, reason: str) -> None:
-        """Keep the recording: the base is lost."""
+    def record_loss(self, reason: str) -> None:
+        """Retain the recording: the base is lost."""
         if self._box is not None:
             self._box.keep(reason, self._performer.session)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robot.behavior.placing import HOLDS_S, SPEED_M_S
+from robot.behavior.manual_drive import HOLDS_S, SPEED_M_S
 from robot.motion.pose import HOME
 from tests.support.robot_stage import FeelingBase, Stage
 

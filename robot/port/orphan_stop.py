@@ -11,11 +11,11 @@ from typing import NoReturn
 from robot.port.opening import send_stops
 from robot.port.owner import RETRY_S, SerialPort
 
-GUARD_S = 5.0  # how long it tries: whoever has the port meanwhile has begun with stops
-DISMISSED = b"."
+TRY_S = 5.0  # how long it tries: whoever has the port meanwhile has begun with stops
+CANCELED = b"."
 
 
-class Guard:
+class OrphanStop:
     """A process beside this one that waits for its death. None where a system cannot fork.
 
     To be made before there are threads, and before the port is open.
@@ -38,16 +38,16 @@ class Guard:
             _watch(waiting, open_port, stop)
         os.close(waiting)
 
-    def dismiss(self) -> None:
-        """Let it go: the base has been stopped."""
+    def cancel(self) -> None:
+        """End that process: the base has been stopped."""
         if self._pipe is not None:
-            os.write(self._pipe, DISMISSED)
+            os.write(self._pipe, CANCELED)
             os.close(self._pipe)
             self._pipe = None
 
 
 def _watch(pipe: int, open_port: Callable[[], SerialPort], stop: bytes) -> NoReturn:
-    """Wait for the end of a pipe; stop the base unless it was dismissed before."""
+    """Wait for the end of a pipe; stop the base unless that was canceled before."""
     try:
         os.setsid()  # what ends the group of the others does not end it
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
@@ -55,8 +55,8 @@ def _watch(pipe: int, open_port: Callable[[], SerialPort], stop: bytes) -> NoRet
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):  # who reads them waits for their end
             os.dup2(nowhere, stream)
-        if os.read(pipe, 1) != DISMISSED:
-            until_s = time.monotonic() + GUARD_S
+        if os.read(pipe, 1) != CANCELED:
+            until_s = time.monotonic() + TRY_S
             while not send_stops(open_port, stop) and time.monotonic() < until_s:
                 time.sleep(RETRY_S)
     finally:

@@ -1,7 +1,7 @@
-"""Driving a robot to its mark by a button that is held. Time is a parameter.
+"""Drives a robot to its place by a button that a person holds. Time is a parameter.
 
-A dead man's button: whoever lets go, or whose page or network is gone, stops it. It drives ahead
-and turns; it does not back up, since nothing feels what is behind it (docs/safety.md).
+A dead man's switch: whoever lets go of it, or loses page or network, stops the robot. It drives
+ahead and turns; it does not back up, since no bumper is behind it (docs/safety.md).
 """
 
 from __future__ import annotations
@@ -18,14 +18,22 @@ SPEED_M_S, TURN_RAD_S = 0.1, 0.5
 HOLDS_S = 0.3  # a page that is held repeats its order every 0.1 s
 
 
-class Placing:
-    """What the held button orders now."""
+class ManualDrive:
+    """The order of the button that is held now."""
 
     def __init__(self) -> None:
         self._twist, self._ordered_s = STILL, -math.inf
 
     def order(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Store an order: shares of the speeds, ahead 0 to 1 and to the left -1 to 1."""
+        """Store an order. Raises BadFrame.
+
+        Parameters
+        ----------
+        message
+            Shares of the speeds: ``ahead`` from 0 to 1, ``left`` from -1 to 1.
+        now_s
+            The time [s].
+        """
         ahead, left = read_number(message, "ahead", 0, 1), read_number(message, "left", -1, 1)
         self._twist, self._ordered_s = Twist(ahead * SPEED_M_S, left * TURN_RAD_S), now_s
 
