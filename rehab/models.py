@@ -1,7 +1,8 @@
 """The models of all rooms, and the list of those with a change history."""
 
+from rehab.boards.changes import BoardChange
 from rehab.boards.models import Leaderboard
-from rehab.boards.rows import BoardCount, BoardEntry
+from rehab.boards.snapshots import BoardSnapshot
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients.family import FamilyLink
@@ -55,8 +56,8 @@ __all__ = [
     "Arm",
     "AuditEntry",
     "Authenticator",
-    "BoardCount",
-    "BoardEntry",
+    "BoardChange",
+    "BoardSnapshot",
     "Clinic",
     "ComposedGesture",
     "Consent",

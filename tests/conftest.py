@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import sys
 from collections.abc import Callable, Generator, Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -64,11 +65,13 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """End what the tests before have shared and this one does not."""
+    """End what the tests before have shared and this one does not, and empty the boards' cache."""
     for name, (shares, end) in list(SHARED.items()):
         if not shares(item):
             del SHARED[name]
             end()
+    if (boards := sys.modules.get("rehab.boards.cache")) is not None:
+        boards.clear_cache()
 
 
 def pytest_unconfigure() -> None:
@@ -121,16 +124,11 @@ def _is_migrated(django_db_modify_db_settings: None) -> Iterator[bool]:
 
 @pytest.fixture(scope="session")
 def _without_durability() -> Iterator[None]:
-    """Wait for no disk, hash passwords quickly and build boards in no thread, which would outlive
-    its test: rows of this process need not outlive a power cut. Servers and commands that tests
-    start keep the product's own settings.
+    """Wait for no disk and hash passwords quickly: rows of this process need not outlive a power
+    cut. Servers and commands that tests start keep the product's own settings.
     """
     from django.conf import settings
     from django.test import override_settings
-
-    from rehab.boards.building.scheduler import board_builder
-
-    board_builder.wake = lambda: None  # type: ignore[method-assign]
 
     options = settings.DATABASES["default"].get("OPTIONS", {})
     if "init_command" in options:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import datetime
 from typing import Any
 
 from django import forms
@@ -15,23 +14,48 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.boards.building import entries
 from rehab.boards.choices import Aggregation, Occasion, Participants
-from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.viewer import BoardViewer
-from rehab.boards.ranking.eligibility import find_group
-from rehab.boards.ranking.results import Result, read_results
+from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.people.access import user_of
 from rehab.people.models import BoardsConsent, Patient
 from rehab.people.models.blinding import hidden_patients
 from rehab.people.roles import Role
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
+from rehab.people.web.row_forms import ClinicForm
 from rehab.people.web.row_keys import read_key
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
+from rehab.training.valences import VALENCES
 
 MAX_SEEN_AS = 60  # patients that the preview offers as viewers, the latest to walk first
+MAX_GROUP = 1_000  # the preview's URL contains each key; servers refuse URLs beyond 16 kB
+
+
+class LeaderboardForm(ClinicForm):
+    """All settings of a board on one page; the defaults are safe ones."""
+
+    valences = forms.MultipleChoiceField(
+        label=_("Which types"),
+        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+        widget=forms.CheckboxSelectMultiple,
+        required=False,
+    )
+
+    def clean(self) -> dict[str, Any]:
+        """Refuse a group that is too small ever to be shown, or too large to be sent."""
+        cleaned: dict[str, Any] = super().clean() or self.cleaned_data
+        group = cleaned.get("group")
+        if group is not None:
+            self.instance.chosen = [patient.pk for patient in group]
+        fewest = cleaned.get("min_participants") or 0
+        if cleaned.get("among") == Participants.GROUP and len(group or []) < fewest:
+            few = _("Choose at least %(fewest)d patients.") % {"fewest": fewest}
+            self.add_error("group", few)
+        elif len(group or []) > MAX_GROUP:
+            many = _("Choose at most %(most)d patients, or all of the clinic.")
+            self.add_error("group", many % {"most": MAX_GROUP})
+        return cleaned
 
 
 @admin.register(Leaderboard)
@@ -126,8 +150,6 @@ class LeaderboardAdmin(PreviewAdmin):
     ) -> HttpResponse:
         """Show the form, with the patients that the preview offers as viewers."""
         context["seen_as"] = self._patients_who_walked(request)[:MAX_SEEN_AS]
-        board: Leaderboard | None = kwargs.get("obj")
-        context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
     def render_preview(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
@@ -149,7 +171,7 @@ class LeaderboardAdmin(PreviewAdmin):
     def _viewer(self, request: HttpRequest, board: Leaderboard) -> BoardViewer:
         """Return the viewer of the preview: a patient after the newest session, or anybody."""
         now = timezone.now()
-        anybody = BoardViewer(board, now, results=self._compute(request, board, now))
+        anybody = BoardViewer(board, now)
         if board.occasion == Occasion.WAITING:
             return anybody
         finished = TrainingSession.objects.visible_to(request.user).filter(
@@ -165,19 +187,6 @@ class LeaderboardAdmin(PreviewAdmin):
             patient = walkers.filter(pk=typical or 0).first() or walkers.first()
         session = newest.filter(patient=patient).first()
         return replace(anybody, patient=patient, session=session)
-
-    def _compute(
-        self, request: HttpRequest, board: Leaderboard, now: datetime
-    ) -> list[Result] | None:
-        """Return the results that a board would have; None where the stored rows are the same."""
-        saved = self.get_queryset(request).filter(pk=board.pk, built_to=None).first()
-        if (
-            saved is not None
-            and saved.defining_fields == board.defining_fields
-            and (not board.has_group or set(find_group(saved)) == set(find_group(board)))
-        ):
-            return None
-        return [] if board.is_own else list(read_results(board, now))
 
     def _patients_who_walked(self, request: HttpRequest) -> QuerySet[Patient]:
         """Return the patients who have walked, those who agreed to boards first.

@@ -11,7 +11,7 @@ from ninja import Path, Query, Router, Schema
 
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels.panel import BoardPanel
-from rehab.boards.panels.viewer import BoardViewer, make_session_panels
+from rehab.boards.panels.shared_panels import BoardViewer, make_session_panels
 from rehab.people.access import for_roles
 from rehab.people.roles import Role
 from rehab.people.web.api_base import Key, Page, Paging, caller, paginate, responses

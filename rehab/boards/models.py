@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from django.core.exceptions import ValidationError
 from django.db import models
@@ -29,7 +30,9 @@ from rehab.people.scope import ClinicModel, Scope
 # How rows are shown, and when. All other fields decide what a board's rows are.
 DISPLAY_FIELDS = frozenset(
     {
+        "id",
         "name",
+        "active",
         "display",  # what it changes about eligibility is in `accepted_levels`
         "top_n",
         "total_goal",
@@ -38,7 +41,6 @@ DISPLAY_FIELDS = frozenset(
         "names",
         "min_participants",
         "occasion",
-        "built_to",
     }
 )
 
@@ -156,12 +158,6 @@ class Leaderboard(ClinicModel):
         _("shown"), max_length=16, choices=Occasion.choices, default=Occasion.AFTER_SESSION
     )
 
-    built_to = models.BigIntegerField(
-        null=True,
-        editable=False,
-        help_text="Key of the last patient whose rows are built; empty when all are.",
-    )
-
     class Meta(ClinicModel.Meta):
         verbose_name = _("leaderboard")
         verbose_name_plural = _("leaderboards")
@@ -190,13 +186,6 @@ class Leaderboard(ClinicModel):
     def __str__(self) -> str:
         return self.name
 
-    def save(self, *args: Any, **kwargs: Any) -> None:
-        """Save the board except ``built_to``, which the builder may be advancing meanwhile."""
-        if not self._state.adding and kwargs.get("update_fields") is None:
-            names = {field.name for field in self._meta.concrete_fields if not field.primary_key}
-            kwargs["update_fields"] = names - {"built_to"}
-        super().save(*args, **kwargs)
-
     def clean(self) -> None:
         """Refuse boards that would mislead or expose somebody, with the cure at the field."""
         if errors := dict(find_invalid_settings(self)):
@@ -222,11 +211,6 @@ class Leaderboard(ClinicModel):
         return ranked.exclude(pk=self.pk).first()
 
     @property
-    def is_being_built(self) -> bool:
-        """Whether its rows are still being built; it is not shown until they are."""
-        return self.built_to is not None
-
-    @property
     def is_own(self) -> bool:
         """Whether it compares a patient's own sessions only."""
         return self.among == Participants.SELF
@@ -245,10 +229,11 @@ class Leaderboard(ClinicModel):
         return [*total, BoardsConsent.CLINIC, BoardsConsent.ACROSS]
 
     @property
-    def defining_fields(self) -> list[Any]:
-        """The values that its rows depend on, besides sessions and patients."""
+    def definition(self) -> str:
+        """The values that its results depend on, besides sessions, patients and its group."""
         fields = [field for field in self._meta.concrete_fields if field.name not in DISPLAY_FIELDS]
-        return [self.accepted_levels, *(getattr(self, field.attname) for field in fields)]
+        values = {field.attname: getattr(self, field.attname) for field in fields}
+        return json.dumps(values | {"levels": self.accepted_levels}, default=str)
 
     @property
     def counted_valences(self) -> list[str]:

@@ -10,8 +10,9 @@ from typing import Any
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.boards.cache import read_lists
 from rehab.boards.models import Leaderboard
-from rehab.boards.rows import BoardEntry
+from rehab.boards.snapshots import shared_boards
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.selection import Selection
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
@@ -65,16 +66,16 @@ def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple
     title = gettext("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
     # Translated now: the rest is written while it is sent, after the request's language has ended.
     readme = write_readme(title, list(FILES), now)
-    return chain([("README.txt", [readme])], _patient_tables(user, patient))
+    return chain([("README.txt", [readme])], _patient_tables(user, patient, now))
 
 
-def _patient_tables(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
+def _patient_tables(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
     yield "patient.json", write_json(describe_patient(patient))
     yield "consent.json", write_json(list_consents(user, patient))
     yield "visits.json", write_json(list_visits(user, patient))
     yield "family.json", write_json(list_family_links(user, patient))
-    yield "boards.json", write_json(list_boards(user, patient))
+    yield "boards.json", write_json(list_boards(user, patient, now))
     yield "studies.json", write_json(list_studies(user, patient))
     yield "changes.json", write_json(list_changes(user, patient))
     yield from _session_tables(Selection(user, sessions, named=True))
@@ -165,18 +166,24 @@ def list_family_links(user: User, patient: Patient) -> list[dict[str, Any]]:
     ]
 
 
-def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
+def list_boards(user: User, patient: Patient, now: datetime) -> list[dict[str, Any]]:
     """Return the patient's rows on boards, and the boards whose group the patient is in."""
-    rows = BoardEntry.everywhere.filter(patient=patient).select_related("board").order_by("pk")
+    boards = shared_boards([patient.clinic_id]).filter(active=True)
+    rows = [
+        (board, valence, row)
+        for board in boards.select_related("clinic")
+        for valence, standings in read_lists(board, now).items()
+        if (row := standings.find(patient.pk)) is not None
+    ]
     grouped = Leaderboard.objects.visible_to(user).filter(group=patient)
     return [
         {
-            "board": row.board.name,
-            "feedback_type": row.valence or None,
+            "board": board.name,
+            "feedback_type": valence or None,
             "figure": row.figure,
             "could_be_kept": row.points_at_stake,
         }
-        for row in rows
+        for board, valence, row in rows
     ] + [{"in_the_group_of_the_board": board.name} for board in grouped]
 
 

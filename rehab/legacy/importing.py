@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 from rehab.legacy.database import LegacyDatabase, LegacySession
 from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.log import SessionMetric
+from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.training.changes import State
@@ -130,6 +130,7 @@ class Importer:
         )
         if plan.valence.has_points and legacy.score is not None:
             SessionMetric.everywhere.create(session=session, slug="score", value=legacy.score)
+            figures_stored.send(SessionMetric, patients={patient.pk})
 
     @property
     def is_complete(self) -> bool:

@@ -112,8 +112,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.ALL,
         Role.RESEARCHER: Right.VIEW,
     },
-    "BoardEntry": {},
-    "BoardCount": {},
+    "BoardChange": {},
+    "BoardSnapshot": {},
 }
 
 

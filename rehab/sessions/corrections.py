@@ -20,6 +20,7 @@ from rehab.people.models import Patient, User
 from rehab.people.roles import may_see_names
 from rehab.people.scope import ScopedModel
 from rehab.sessions.formatting import clinic_time
+from rehab.sessions.log import figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, State
 
@@ -146,7 +147,7 @@ def correct_session(
     stored = rows.select_related("patient").get(pk=session.pk)
     if not can_correct(stored):
         raise ValidationError(gettext("This session still runs. End it first."))
-    before = current_values(stored, by)
+    before, walker = current_values(stored, by), stored.patient_id
     if expected is not None and expected != before:
         raise ValidationError(_describe_conflict(stored, before, expected, by))
     if CorrectedField.PATIENT in changes:
@@ -167,6 +168,7 @@ def correct_session(
     ]
     for correction in corrections:
         correction.save()
+    figures_stored.send(TrainingSession, patients={walker, stored.patient_id}, corrected=True)
     return corrections
 
 

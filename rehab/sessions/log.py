@@ -190,7 +190,8 @@ class SessionEvent(ScopedModel):
         return self.get_kind_display()
 
 
-# Sent once figures of sessions are committed; their ``boards_due`` is set.
+# Sent in the transaction in which figures of sessions are stored or corrected, with the keys of the
+# patients; ``corrected`` where earlier figures were wrong.
 figures_stored = Signal()
 
 

@@ -175,8 +175,6 @@ class TrainingSession(ClinicModel):
     last_number = models.PositiveIntegerField(default=0, editable=False)
     # Of an open session: the fold of its first steps, so that the rest is quickly folded.
     checkpoint = models.JSONField(null=True, editable=False)
-    # Its figures are stored, and leaderboards have not followed yet.
-    boards_due = models.BooleanField(default=False, editable=False)
     # The process that writes the log; a new owner raises the epoch, which locks the old one out.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False, db_index=True)
@@ -189,7 +187,6 @@ class TrainingSession(ClinicModel):
             models.Index(fields=["clinic", "-created_at"], name="session_by_clinic_and_date"),
             models.Index(fields=["patient", "-created_at"], name="session_by_patient_and_date"),
             models.Index(fields=["station", "state"], name="session_by_station_and_state"),
-            models.Index(fields=["id"], condition=Q(boards_due=True), name="session_boards_due"),
         ]
         constraints: ClassVar = [
             models.UniqueConstraint(

@@ -161,14 +161,10 @@ def test_sessions_and_boards_of_anybody_are_caught(monkeypatch):
 
 
 def snapshot(world: World) -> list[Any]:
-    """Return a clinic's rows as they are, but for what its own programs add.
-
-    A page of boards notes that it has counted a session that has just ended.
-    """
+    """Return a clinic's rows as they are."""
     rows: dict[type[Model], Any] = {kind: row.pk for kind, row in world.rows.items()}
     seen = (Patient, TrainingSession, Leaderboard)
-    rows_of = [kind.everywhere.filter(pk=rows[kind]).values() for kind in seen]
-    return [[row | {"boards_due": None} for row in found] for found in rows_of]
+    return [list(kind.everywhere.filter(pk=rows[kind]).values()) for kind in seen]
 
 
 def test_every_call_says_what_it_may_answer_and_is_in_the_documentation():

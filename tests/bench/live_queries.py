@@ -77,7 +77,6 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from asgiref.sync import async_to_sync
     from django.utils import timezone
 
-    from rehab.boards.building.scheduler import find_ended
     from rehab.sessions.live import auth
     from rehab.sessions.live.database import owners
     from rehab.sessions.live.protocol import backlog
@@ -133,7 +132,6 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "a station's open session", lambda: async_to_sync(auth.find_open_session)(device, None)
     yield "its newest", lambda: loading.find_newest_open(device.station_id)
     yield "may a tablet open it", lambda: async_to_sync(auth.may_open)(tablet, keys[0])
-    yield "ended, boards due", lambda: find_ended(10)
     yield "release", lambda: owners.release_all(keys[:52])
 
 
@@ -167,13 +165,7 @@ def _find_scans(sql: str) -> list[str]:
         cursor.execute(f"EXPLAIN {'QUERY PLAN ' if is_sqlite else ''}{sql}")
         plan = [str(row[3] if is_sqlite else row[0]) for row in cursor.fetchall()]
     pattern = r"\bSCAN (\w+)" if is_sqlite else r"Seq Scan on (\w+)"
-    return [
-        line
-        for line in plan
-        if (match := re.search(pattern, line))
-        and match[1] in GROWING
-        and "session_boards_due" not in line  # a partial index, of what is due
-    ]
+    return [line for line in plan if (match := re.search(pattern, line)) and match[1] in GROWING]
 
 
 def main(rows: int) -> None:

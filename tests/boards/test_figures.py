@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.boards.rows import BoardEntry
 from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.boards import (
     board_of,
+    figures_of,
     patient_of,
     people_of,
     see,
@@ -28,8 +28,7 @@ def test_what_stands_in_a_row(clinic, aggregation, value):
     person = patient_of(clinic, "A")
     for days_ago, hits in ((3, 8), (2, 7), (1, 4)):
         walk(person, "positive", strides(hits, 10 - hits), days_ago=days_ago)
-    (row,) = BoardEntry.everywhere.filter(board=board)
-    assert f"{row.figure}%" == value
+    assert f"{figures_of(board)[person.pk]}%" == value
 
 
 def test_only_sessions_that_are_long_enough_ended_and_walked_count(clinic):
@@ -41,15 +40,15 @@ def test_only_sessions_that_are_long_enough_ended_and_walked_count(clinic):
     walk(person, "positive", strides(90, 0), simulated=True)
     walk(person, "positive", strides(90, 0), end=ChangeKind.ABORT)
     walk(person, "positive", strides(90, 0), end=None)
-    assert not BoardEntry.everywhere.exists()
+    assert not figures_of(board)
     walk(person, "binary", strides(10, 0))
-    assert BoardEntry.everywhere.get().figure == 1
+    assert figures_of(board)[person.pk] == 1
     board.min_minutes = 1
     board.include_simulated = True
     board.save()
-    assert BoardEntry.everywhere.get().figure == 2
+    assert figures_of(board)[person.pk] == 2
     walk(person, "positive", strides(70, 0), phases=(make_phase("washout"),))
-    assert BoardEntry.everywhere.get().figure == 3
+    assert figures_of(board)[person.pk] == 3
 
 
 def test_minutes_of_a_day_are_counted_up_to_an_hour_and_targets_by_the_day(clinic):
@@ -60,8 +59,8 @@ def test_minutes_of_a_day_are_counted_up_to_an_hour_and_targets_by_the_day(clini
         walk(person, "positive", strides(2400, 0), days_ago=2, wanted=0.5)
     walk(person, "positive", strides(600, 0), days_ago=1, wanted=0.5)
     walk(person, "positive", strides(0, 600), wanted=0.5)
-    assert BoardEntry.everywhere.get(board=minutes).figure == 60 + 10 + 10
-    assert BoardEntry.everywhere.get(board=days).figure == 2
+    assert figures_of(minutes)[person.pk] == 60 + 10 + 10
+    assert figures_of(days)[person.pk] == 2
 
 
 def test_a_total_is_reached_together_and_hidden_below_five(clinic):

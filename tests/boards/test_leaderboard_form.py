@@ -8,10 +8,10 @@ import pytest
 from django.core.exceptions import ValidationError
 from django.urls import reverse, reverse_lazy
 
-from rehab.boards import admin
+from rehab.boards import cache
+from rehab.boards.changes import BoardChange
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking import results
-from rehab.boards.rows import BoardEntry
 from rehab.boards.validation import FIRST_DAY, LAST_DAY
 from rehab.people.aliases import MANNERS, draw_alias, split_list
 from rehab.people.models import Clinic, Patient, User
@@ -139,7 +139,7 @@ def test_one_name_is_enough_to_save_a_board(world):
 def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
     fill_board(world)
     client = client_of(world)
-    counts = [model.everywhere.count() for model in (Leaderboard, BoardEntry)]
+    counts = [model.everywhere.count() for model in (Leaderboard, BoardChange)]
     wanted = filled(
         among="clinic", aggregation="best", names="code", min_valid_strides=1, period="all", name=""
     )
@@ -149,7 +149,7 @@ def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
     assert 'data-facts="5 patients on it now."' in page
     alone = client.get(PREVIEW, wanted | {"min_participants": 6}).content.decode()
     assert "Fewer than 6 people so far." in alone
-    assert [model.everywhere.count() for model in (Leaderboard, BoardEntry)] == counts
+    assert [model.everywhere.count() for model in (Leaderboard, BoardChange)] == counts
     assert client.post(PREVIEW).status_code == 405
 
 
@@ -185,9 +185,7 @@ def test_the_first_and_the_last_day_can_be_chosen_and_none_beyond(world, zone):
         )
 
 
-def test_a_saved_board_is_previewed_as_it_is_stored_until_its_rows_would_be_others(
-    world, monkeypatch
-):
+def test_a_preview_is_computed_once_for_each_definition_and_group(world, monkeypatch):
     fill_board(world)
     board = Leaderboard.everywhere.get(among="clinic")
     Patient.everywhere.create(clinic=world.clinic, code="N", nickname="N", boards="clinic")
@@ -204,22 +202,22 @@ def test_a_saved_board_is_previewed_as_it_is_stored_until_its_rows_would_be_othe
         read.append(True)
         return results.read_results(*given)
 
-    monkeypatch.setattr(admin, "read_results", read_results)
-    shown: tuple[dict[str, Any], ...] = ({}, {"top_n": 3}, {"ties": "dense", "name": "Renamed"})
+    monkeypatch.setattr(cache, "read_results", read_results)
+    shown: tuple[dict[str, Any], ...] = ({}, {"top_n": 3}, {"name": "Renamed", "show_ranks": ""})
     for other in shown:
         page = client.get(PREVIEW, fields | {"group": group} | other).content.decode()
         assert "5 patients on it now." in page
-    assert not read
+    assert len(read) == 1
     made: tuple[dict[str, Any], ...] = (
         {"metric": "steps"},
         {"group": group[1:]},
         {"frozen_on": "2026-01-01"},
     )
-    for number, other in enumerate(made, start=1):
+    for number, other in enumerate(made, start=2):
         client.get(PREVIEW, fields | {"group": group} | other)
         assert len(read) == number
     client.get(PREVIEW, fields | {"among": "self", "aggregation": "each"})
-    assert len(read) == 3
+    assert len(read) == 4
 
 
 def test_a_preview_says_what_cannot_be(world):

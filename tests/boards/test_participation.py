@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
-from rehab.boards.panels.viewer import make_session_panels
-from rehab.boards.rows import BoardEntry
+from rehab.boards.panels.shared_panels import make_session_panels
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 from tests.support.boards import (
     board_of,
+    figures_of,
     page_of,
     patient_of,
     people_of,
@@ -31,7 +31,7 @@ def test_who_has_not_agreed_stands_on_none_and_sees_none(clinic):
     alone = patient_of(clinic, "S", "own")
     shown = see(walk(alone, "positive", strides(20, 0)))
     assert (shown.shared, shown.note) == (False, "These are your own sessions.")
-    assert not BoardEntry.everywhere.filter(board=board, patient=alone).exists()
+    assert alone.pk not in figures_of(board)
     assert see(sessions[0]).rows[0].rank == 1
     totals_only = patient_of(clinic, "T", "total")
     assert not see(walk(totals_only, "positive", strides(20, 0))).shared
@@ -80,7 +80,7 @@ def test_in_a_blinded_study_there_is_no_board_and_no_score(clinic):
     page = page_of(sessions[0])
     assert "This walk is over. Your study shows no scores." in " ".join(page.split())
     assert 'class="value"' not in page
-    assert not BoardEntry.everywhere.filter(board=board, patient=people[0]).exists()
+    assert people[0].pk not in figures_of(board)
 
 
 def test_initials_and_codes_are_unique_on_what_is_shown(clinic):
@@ -124,7 +124,7 @@ def test_across_clinics_stand_those_who_agreed_of_clinics_that_take_part(clinic)
     for place in (clinic, oak, elsewhere):
         walk_down(people_of(place, 3, boards="across"))
     walk(patient_of(clinic, "X", "clinic"), "positive", strides(30, 0))
-    assert BoardEntry.everywhere.filter(board=board).count() == 6
+    assert len(figures_of(board)) == 6
     session = TrainingSession.everywhere.filter(clinic=oak).first()
     assert see(session).shared
     assert (
@@ -132,7 +132,7 @@ def test_across_clinics_stand_those_who_agreed_of_clinics_that_take_part(clinic)
     )
     oak.boards_across = False
     oak.save()
-    assert BoardEntry.everywhere.filter(board=board).count() == 3
+    assert len(figures_of(board)) == 3
 
 
 def test_a_group_compares_the_chosen_alone(clinic):

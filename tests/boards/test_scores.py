@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from rehab.boards.choices import CountedTypes
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.own_sessions import Scale, make_board, scale_of
+from rehab.boards.panels.own_panels import Scale, make_board, scale_of
+from rehab.boards.ranking.anonymity import MAX_OWN, find_visible_own_rows
 from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import CountedSession
-from rehab.boards.ranking.standings import ComputedStandings
-from rehab.boards.ranking.visibility import MAX_OWN, find_visible_own_rows
+from rehab.boards.ranking.standings import Standings
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric
@@ -238,11 +238,11 @@ def own_session(pk: int, valence: str = "", cost: int = 1, **values: float) -> C
     return CountedSession(pk, 1, valence, False, NOW, NOW.date(), values, cost)
 
 
-def rank(scale: Scale, sessions: list[CountedSession], **fields: str) -> ComputedStandings:
+def rank(scale: Scale, sessions: list[CountedSession], **fields: str) -> Standings:
     board = make_board(scale, CountedTypes.ALL)
     vars(board).update(fields)
     period = period_of(board, NOW)
-    return ComputedStandings(board, own_results(board, sessions, "", period))
+    return Standings(own_results(board, sessions, "", period), board.ties)
 
 
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)).filter(any), max_size=30))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.boards.panels.own_sessions import make_own_panels
-from rehab.boards.panels.viewer import BoardViewer
+from rehab.boards.panels.own_panels import make_own_panels
+from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.sessions.log import SessionMetric
 from tests.support.boards import board_of, patient_of, people_of, walk_down
 from tests.support.walks import strides, walk

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import pytest
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.building import entries
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.viewer import BoardViewer, make_waiting_panels
-from rehab.boards.ranking.results import read_results
-from rehab.boards.rows import BoardEntry
+from rehab.boards.panels.shared_panels import BoardViewer, make_waiting_panels
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -21,7 +17,9 @@ from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.boards import (
+    all_rows,
     board_of,
+    figures_of,
     page_of,
     patient_of,
     people_of,
@@ -60,9 +58,7 @@ def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clin
     walk_down(people[1:])
     session = walk_two_types(people[0])
     assert (session.valence, session.changed_to) == ("positive", "negative")
-    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
-    entries.refresh(board, now=NOW)
-    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
+    assert (people[0].pk in figures_of(board)) == stands
 
 
 def test_a_type_that_nobody_walked_with_keeps_no_session_away(clinic):
@@ -72,7 +68,7 @@ def test_a_type_that_nobody_walked_with_keeps_no_session_away(clinic):
     by_mistake = [Change(ChangeKind.VALENCE_NOW, slug) for slug in ("negative", "positive")]
     session = walk(people[0], "positive", [*strides(5, 0), *by_mistake, *strides(5, 0)])
     assert session.changed_to == ""
-    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists()
+    assert people[0].pk in figures_of(board)
 
 
 @pytest.mark.parametrize("language", ["en", "es"])
@@ -161,16 +157,14 @@ def test_simulated_patients_hide_no_person(clinic):
     people = people_of(clinic, 5)
     walk(people[0], "positive", strides(9, 1))
     for viewer in (BoardViewer(board, NOW, simulated[0]), BoardViewer(board, NOW, people[0])):
-        for made in (None, list(read_results(board, NOW))):
-            shown = replace(viewer, results=made).make_panel()
-            assert not shown.shared
-            assert "C-0" not in [row.title for row in shown.rows]
-            assert shown.summary.startswith("1 patient on it now. Under 5")
+        shown = viewer.make_panel()
+        assert not shown.shared
+        assert "C-0" not in [row.title for row in shown.rows]
+        assert shown.summary.startswith("1 patient on it now. Under 5")
     walk_down(people[1:])
-    for made in (None, list(read_results(board, NOW))):
-        shown = BoardViewer(board, NOW, people[0], results=made).make_panel()
-        assert shown.shared
-        assert shown.summary == "10 patients on it now."
+    shown = BoardViewer(board, NOW, people[0]).make_panel()
+    assert shown.shared
+    assert shown.summary == "10 patients on it now."
 
 
 def test_nobody_is_shown_in_the_last_half_and_who_is_there_sees_the_own_sessions(clinic):
@@ -253,15 +247,12 @@ def test_lost_points_without_a_stake_are_told_to_nobody(clinic, gone):
     sessions = walk_down(people, "negative")
     imported = SessionMetric.everywhere.filter(session=sessions[0])
     imported.filter(slug__in=gone).delete()
-    entries.refresh(board, now=NOW)
-    assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
-        one.pk for one in people[1:]
-    }
+    assert figures_of(board).keys() == {one.pk for one in people[1:]}
     assert "−" not in page_of(sessions[0]).split('id="board-')[1].split("</section>")[0]
 
 
 def test_a_patient_with_mixed_types_has_a_row_on_each_list(clinic):
-    board = board_of(clinic, metric="score")
+    board_of(clinic, metric="score")
     people = people_of(clinic, 5)
     positive = walk_down(people)
     binary = walk_down(people, "binary")
@@ -275,7 +266,7 @@ def test_a_patient_with_mixed_types_has_a_row_on_each_list(clinic):
         (None, "19", "20"),
         (None, "18", "20"),
     ]
-    assert BoardEntry.everywhere.filter(board=board).count() == 15
+    assert [len(rows) for rows in all_rows().values()] == [5, 5, 5]
     explicit = walk(people[0], "explicit", strides(9, 1))
     assert see(explicit).rows == []
 

@@ -19,7 +19,6 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
-from rehab.boards.rows import BoardEntry
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.selection import PAGE_ROWS, Selection
 from rehab.exports.tables import STEPS, TABLES
@@ -36,6 +35,7 @@ from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.archives import body_of, open_archive, rows_of
+from tests.support.boards import figures_of
 from tests.support.marks import mark
 from tests.support.walks import walk
 from tests.support.world import NOW, World, build_world, client_of
@@ -102,7 +102,6 @@ TOLD_IN = {
     "Consent": "consent.json",
     "Visit": "visits.json",
     "FamilyLink": "family.json",
-    "BoardEntry": "boards.json",
     "Leaderboard_group": "boards.json",
     "TrainingSession": "sessions.csv",
     "Step": "steps.csv",
@@ -156,7 +155,7 @@ def test_visits_boards_and_earlier_values_are_told(world):
     visits = json.loads(files["visits.json"])
     assert {"day": "2031-02-03", "at": "09:15:00"} in visits
     row, *groups = json.loads(files["boards.json"])
-    assert (row["board"], row["figure"]) == (board.name, world.rows[BoardEntry].figure)
+    assert (row["board"], row["figure"]) == (board.name, figures_of(board)[patient.pk])
     assert {"in_the_group_of_the_board": board.name} in groups
     last = json.loads(files["changes.json"])[-1]
     assert last["before_and_after"]["nickname"] == [patient.nickname, "Rosa"]

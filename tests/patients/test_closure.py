@@ -13,7 +13,7 @@ from django.core.serializers import serialize
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.rows import BoardEntry
+from rehab.boards.models import Leaderboard
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase, months_before, patients_past_retention
 from rehab.patients.visits import Visit
@@ -28,6 +28,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from tests.support.boards import figures_of
 from tests.support.marks import mark
 from tests.support.world import NOW, World, build_world, client_of, scoped_models
 
@@ -159,7 +160,7 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     assert patient.erased_at is not None
     assert patient.pseudonym == patient.code
     assert not AuditEntry.everywhere.filter(patient=patient).exists()
-    assert not BoardEntry.everywhere.filter(patient=patient).exists()
+    assert all(patient.pk not in figures_of(board) for board in Leaderboard.everywhere.all())
     assert not Visit.everywhere.filter(patient=patient).exists()
     walked = SessionCorrection.everywhere.filter(field=CorrectedField.PATIENT).order_by("pk")
     assert [row.new for row in walked][-2:] == [other.pseudonym, patient.pseudonym]

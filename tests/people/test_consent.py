@@ -7,7 +7,7 @@ from django.core.exceptions import ValidationError
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.rows import BoardEntry
+from rehab.boards.models import Leaderboard
 from rehab.people.consent.models import Consent, ConsentText, ImmutableConsentText, Purpose
 from rehab.people.consent.services import (
     active_consents,
@@ -24,6 +24,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from tests.support.boards import figures_of
 from tests.support.world import NOW, World, client_of
 
 pytestmark = pytest.mark.django_db
@@ -197,10 +198,10 @@ def test_every_level_of_boards_is_noted_and_who_goes_further_agrees_again(world,
 
 
 def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
-    assert BoardEntry.everywhere.filter(patient=world.patient).exists()
+    assert world.patient.pk in figures_of(world.rows[Leaderboard])
     patient = tap(pt, world.patient, "boards", "own")
     assert patient.boards == BoardsConsent.OWN
-    assert not BoardEntry.everywhere.filter(patient=patient).exists()
+    assert patient.pk not in figures_of(world.rows[Leaderboard])
     assert tap(pt, patient, "boards", "total").boards == BoardsConsent.TOTAL
     assert "boards" in active_consents(patient)
 

@@ -11,8 +11,9 @@ from django.db import connections
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.building import entries
-from rehab.boards.rows import BoardEntry
+from rehab.boards.cache import clear_cache
+from rehab.boards.changes import BoardChange
+from rehab.boards.models import Leaderboard
 from rehab.patients.erasure import erase
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (
@@ -29,6 +30,7 @@ from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.defaults import install_defaults
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from tests.support.boards import figures_of
 from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
@@ -88,7 +90,7 @@ def test_who_leaves_the_boards_while_somebody_saves_has_left_them(save, world, m
     stored = Patient.everywhere.get(pk=world.patient.pk)
     assert stored.boards == BoardsConsent.OWN
     assert "boards" not in active_consents(stored)
-    assert not BoardEntry.everywhere.filter(patient=stored).exists()
+    assert stored.pk not in figures_of(world.rows[Leaderboard])
 
 
 def test_whoever_read_the_patient_before_withdraws_and_erases_what_is_there_now(world):
@@ -100,7 +102,7 @@ def test_whoever_read_the_patient_before_withdraws_and_erases_what_is_there_now(
     erase(erasing, ErasureReason.ASKED, None, NOW)
     stored = Patient.everywhere.get(pk=early.pk)
     assert (stored.boards, stored.alias) == (BoardsConsent.OWN, None)
-    assert not BoardEntry.everywhere.filter(patient=stored).exists()
+    assert stored.pk not in figures_of(world.rows[Leaderboard])
 
 
 def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
@@ -125,25 +127,23 @@ def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
 
 
 def test_who_no_longer_agrees_stands_on_no_board_whatever_the_row_says(world):
-    board = BoardEntry.everywhere.get(patient=world.patient).board
+    board = world.rows[Leaderboard]
     Consent.everywhere.filter(patient=world.patient).update(withdrawn_at=NOW)
-    entries.refresh(board, now=NOW)
-    assert not BoardEntry.everywhere.filter(patient=world.patient).exists()
+    assert world.patient.pk not in figures_of(board)
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)  # agrees to everything
-    entries.refresh(board, now=NOW)
-    assert BoardEntry.everywhere.filter(patient=world.patient).exists()
+    clear_cache()
+    assert world.patient.pk in figures_of(board)
 
 
 def test_a_screen_setting_costs_boards_nothing(world):
-    entry = BoardEntry.everywhere.get(patient=world.patient)
-    entry.delete()  # whoever looks at boards again would bring it back
+    before = BoardChange.everywhere.count()
     patient = Patient.everywhere.get(pk=world.patient.pk)
     patient.screen_still = True
     patient.save_fields("screen_still")
-    assert not BoardEntry.everywhere.exists()
+    assert BoardChange.everywhere.count() == before
     patient.blinded = False
     patient.save_fields("blinded")
-    assert BoardEntry.everywhere.exists()
+    assert BoardChange.everywhere.count() == before + 1
 
 
 # --- at the same time ---------------------------------------------------------------------------

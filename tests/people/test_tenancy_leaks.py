@@ -15,9 +15,8 @@ from django.views.decorators.http import require_POST
 from garry_site import urls as site_urls
 from rehab.boards.admin import LeaderboardAdmin
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels import rows, viewer
-from rehab.boards.ranking.standings import StoredStandings
-from rehab.boards.rows import BoardEntry
+from rehab.boards.panels import formatting, shared_panels
+from rehab.boards.ranking import results
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.audit import history_text
@@ -161,8 +160,8 @@ def test_a_public_page_with_patients_is_caught(worlds, settings, monkeypatch):
 
 
 def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
-    monkeypatch.setattr(StoredStandings, "find_rows", lambda self: BoardEntry.everywhere.all())
-    monkeypatch.setattr(rows, "eligible_patients", lambda board: Patient.everywhere.all())
+    for module in (results, formatting):
+        monkeypatch.setattr(module, "eligible_patients", lambda board: Patient.everywhere.all())
     leaks, _ = find_leaks(worlds, some_actors(worlds, "pt of amber"), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})
     assert f"pt of amber: {url} shows Patient of birch" in leaks
@@ -170,7 +169,7 @@ def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
 
 def test_a_board_of_another_clinic_is_caught(worlds, monkeypatch):
     monkeypatch.setattr(
-        viewer, "boards_on", lambda occasion, clinic: list(Leaderboard.everywhere.all())
+        shared_panels, "boards_on", lambda occasion, clinic: list(Leaderboard.everywhere.all())
     )
     leaks, _ = find_leaks(worlds, some_actors(worlds, "pt of amber"), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})

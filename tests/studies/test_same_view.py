@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 import pytest
 from django.urls import reverse
 
-from rehab.boards.building import entries
+from rehab.boards.cache import clear_cache
 from rehab.boards.choices import Participants
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
@@ -151,7 +151,7 @@ class Trial:
             )
         allocations = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
         exchange(list(allocations[:1]), list(allocations[1:]), {"enrollment_id"})
-        entries.refresh_patients([patient.pk for patient in self.patients], now=NOW)
+        clear_cache()
 
 
 def exchange(some: list[Any], others: list[Any], kept: set[str]) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from django.test import Client
 from django.urls import reverse
 
+from rehab.boards.cache import clear_cache, read_lists
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.viewer import make_session_panels
-from rehab.boards.rows import BoardCount, BoardEntry
+from rehab.boards.panels.shared_panels import make_session_panels
+from rehab.boards.ranking.standings import RankedRow, Standings
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
@@ -55,11 +58,27 @@ def told(shown) -> list[tuple[int | None, str, bool]]:
     return [(row.rank, row.value.replace("\N{NO-BREAK SPACE}", ""), row.you) for row in shown.rows]
 
 
-def everything() -> tuple[list[str], list[tuple[int, str, int, int]]]:
-    fields = ("board", "patient", "valence", "figure", "points_at_stake", "key", "stale_on")
-    rows = sorted(map(str, BoardEntry.everywhere.values_list(*fields)))
-    counts = sorted(BoardCount.everywhere.values_list("board", "valence", "figure", "rows"))
-    return rows, counts
+def figures_of(board: Leaderboard, now: datetime = NOW) -> dict[int, int]:
+    """Return the figures on a board with one list, by patient, the best first."""
+    stored = Leaderboard.everywhere.select_related("clinic").get(pk=board.pk)
+    (rows,) = [*read_lists(stored, now).values()] or [Standings(())]
+    return {row.patient_id: row.figure for row in rows.top(rows.count)}
+
+
+def all_rows(now: datetime = NOW) -> dict[tuple[int, str], list[RankedRow]]:
+    """Return the rows of all boards, by board and list."""
+    return {
+        (board.pk, valence): standings.top(standings.count)
+        for board in Leaderboard.everywhere.exclude(among="self").select_related("clinic")
+        for valence, standings in read_lists(board, now).items()
+        if standings.count
+    }
+
+
+def rows_computed_anew(now: datetime = NOW) -> dict[tuple[int, str], list[RankedRow]]:
+    """Return the rows of all boards as another server computes them."""
+    clear_cache()
+    return all_rows(now)
 
 
 def page_of(session: TrainingSession, client: Client | None = None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 
-from rehab.boards.building.scheduler import follow_sessions
 from rehab.people.models import Patient
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
@@ -65,7 +64,6 @@ def walk(
     if end is not None:
         rows += aggregate.change(Change(end), None, at_end(began, aggregate))
     store(aggregate, rows)
-    follow_sessions(10, now)  # as the boards' thread does
     session.refresh_from_db()
     return session
 
@@ -108,7 +106,6 @@ def visit(
         rows.append(aggregate.record_step(walker.next_stride(aggregate.fold.phase), at))
     rows += aggregate.change(Change(ChangeKind.FINISH), None, now - timedelta(days=days_ago))
     store(aggregate, rows)
-    follow_sessions(10, now)  # as the boards' thread does
     session.refresh_from_db()
     return session
 

@@ -10,8 +10,9 @@ from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model
 from django.test import Client
 
+from rehab.boards.changes import BoardChange
 from rehab.boards.models import Leaderboard
-from rehab.boards.rows import BoardCount, BoardEntry
+from rehab.boards.snapshots import BoardSnapshot
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients.family import FamilyLink
@@ -276,8 +277,8 @@ def build_world(name: str) -> World:
         SessionEvent.everywhere.filter(session=session).first(),
         SessionMetric.everywhere.filter(session=session).first(),
         board,
-        BoardEntry.everywhere.get(board=board),
-        BoardCount.everywhere.get(board=board),
+        BoardChange.everywhere.filter(patient_key=patient.pk).first(),
+        BoardSnapshot.everywhere.create(board=board, definition="", results=[]),
         text,
         Consent.everywhere.filter(patient=patient).last(),
         study,

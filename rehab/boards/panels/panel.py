@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rehab.boards.panels.rows import PanelRow
+from rehab.boards.panels.formatting import PanelRow
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class BoardPanel:
     Attributes
     ----------
     note
-        Why it shows the own sessions instead of the board.
+        Why it shows own sessions instead of the board.
     kept
         Whether its points are shown as kept, without ranks.
     shared

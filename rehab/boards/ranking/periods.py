@@ -16,15 +16,13 @@ LAST_DAYS = 30
 class Period:
     """From the first day to the last one, both included; None where it has no bound.
 
-    ``renews_on`` is the day on which a new week or month begins; ``keeps_for`` is how long a
-    session stays in a sliding period.
+    On a board that is frozen, sessions have also ended before ``frozen_at``.
     """
 
     first: date | None
     last: date | None
     zone: tzinfo
-    renews_on: date | None = None
-    keeps_for: timedelta | None = None
+    frozen_at: datetime | None = None
 
     @property
     def began(self) -> datetime | None:
@@ -34,17 +32,11 @@ class Period:
     @property
     def ended(self) -> datetime | None:
         """The first moment after it."""
-        if self.last is None:
-            return None
-        return datetime.combine(self.last + timedelta(days=1), time(), self.zone)
+        return None if self.last is None else _end_of(self.last, self.zone)
 
     def day_of(self, moment: datetime) -> date:
         """Return the day that a moment falls on."""
         return moment.astimezone(self.zone).date()
-
-    def stale_on(self, day: date) -> date | None:
-        """Return the day on which a session of ``day`` no longer counts; None for never."""
-        return self.renews_on if self.keeps_for is None else day + self.keeps_for
 
 
 def period_of(board: Leaderboard, now: datetime) -> Period:
@@ -54,7 +46,11 @@ def period_of(board: Leaderboard, now: datetime) -> Period:
     if not is_over(board, now):
         return period
     last = as_of if period.last is None else min(period.last, as_of)
-    return Period(period.first, last, zone)
+    return Period(period.first, last, zone, frozen_at=_end_of(as_of, zone))
+
+
+def _end_of(day: date, zone: tzinfo) -> datetime:
+    return datetime.combine(day + timedelta(days=1), time(), zone)
 
 
 def zone_of(board: Leaderboard) -> tzinfo:
@@ -79,15 +75,11 @@ def is_over(board: Leaderboard, now: datetime) -> bool:
 def _unfrozen_period(board: Leaderboard, today: date, zone: tzinfo) -> Period:
     match board.period:
         case PeriodKind.DAYS_30:
-            days = timedelta(days=LAST_DAYS)
-            return Period(today - days + timedelta(days=1), None, zone, keeps_for=days)
+            return Period(today - timedelta(days=LAST_DAYS - 1), None, zone)
         case PeriodKind.WEEK:
-            first = today - timedelta(days=today.weekday())
-            return Period(first, None, zone, renews_on=first + timedelta(days=7))
+            return Period(today - timedelta(days=today.weekday()), None, zone)
         case PeriodKind.MONTH:
-            first = today.replace(day=1)
-            after = (first + timedelta(days=32)).replace(day=1)
-            return Period(first, None, zone, renews_on=after)
+            return Period(today.replace(day=1), None, zone)
         case PeriodKind.DATES:
             return Period(board.period_from, board.period_to, zone)
     return Period(None, None, zone)

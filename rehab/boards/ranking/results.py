@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from datetime import date, datetime
 from itertools import groupby
+from typing import NamedTuple
 
 from rehab.boards.choices import Aggregation
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import Period, period_of
 from rehab.boards.ranking.sessions import CountedSession, is_kept, read_sessions
-from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 
 # The most that one day adds to a sum, so that no board tempts a patient to overdo it.
 MAX_PER_DAY = {"active_minutes": 60.0, "target_met": 1.0}
-MAX_FIGURE = 10**9  # figures are limited to this, so that all keys have the same length
+
+Key = tuple[int, ...]  # see `make_key`
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
+class Result(NamedTuple):
     """A patient's row before it is ranked.
 
     Attributes
@@ -31,9 +31,7 @@ class Result:
     points_at_stake
         The points that could be kept; None where points are not only lost.
     key
-        What rows are ordered by: the greater, the better.
-    stale_on
-        The day from which it is out of date without any new session; None for never.
+        What rows are ordered by: the smaller, the better.
     """
 
     patient_id: int
@@ -41,8 +39,7 @@ class Result:
     valence: str
     figure: int
     points_at_stake: int | None
-    key: str
-    stale_on: date | None
+    key: Key
 
 
 def read_results(
@@ -56,8 +53,8 @@ def read_results(
     if patients is not None:
         eligible = eligible.filter(pk__in=patients)
     period = period_of(board, now)
-    rows = SessionMetric.everywhere.filter(session__patient__in=eligible)
-    sessions = read_sessions(board, rows, period)
+    walked = TrainingSession.everywhere.filter(patient__in=eligible)
+    sessions = read_sessions(board, walked, period)
     for _, group in groupby(sessions, key=lambda session: session.patient_id):
         lists: dict[str, list[CountedSession]] = defaultdict(list)
         for session in group:
@@ -90,7 +87,7 @@ def aggregate(
     match board.aggregation:
         case Aggregation.BEST:
             results = [make_result(board, valence, [session], period) for session in sessions]
-            return max(results, key=lambda result: result.key)
+            return min(results, key=lambda result: result.key)
         case Aggregation.MEAN:
             sessions = sessions[-board.mean_of :]
         case Aggregation.LATEST:
@@ -101,7 +98,7 @@ def aggregate(
 def make_result(
     board: Leaderboard, valence: str, sessions: Sequence[CountedSession], period: Period
 ) -> Result:
-    """Return the result of some sessions, by their sum or their mean."""
+    """Return the result of some sessions: the sum or the mean of their figures."""
     add = board.aggregation == Aggregation.SUM
     figures = ((session.day, session.figure(board.metric)) for session in sessions)
     figure = combine(figures, board.metric, add)
@@ -120,7 +117,6 @@ def make_result(
         figure=figure,
         points_at_stake=points_at_stake if is_kept(board.metric, last.valence) else None,
         key=make_key(merit, tie, last.at, last.session_id),
-        stale_on=period.stale_on(min(session.day for session in sessions)),
     )
 
 
@@ -138,15 +134,12 @@ def combine(parts: Iterable[tuple[date, float]], slug: str, add: bool) -> int:
         total = sum(min(value, MAX_PER_DAY.get(slug, value)) for value in days.values())
     else:
         total = sum(days.values()) / count
-    return max(-MAX_FIGURE, min(MAX_FIGURE, round(total)))
+    return round(total)
 
 
-def make_key(merit: int, tie: int, at: datetime, session_id: int) -> str:
-    """Return what a row is ordered by, as digits: merit, tie-breaker, the earlier date.
+def make_key(merit: int, tie: int, at: datetime, session_id: int) -> Key:
+    """Return what a row is ordered by: merit, tie-breaker, the earlier time.
 
     The session's key at the end makes every key unique, so that no order is by chance.
     """
-    earlier = 10**10 - int(at.timestamp())
-    return (
-        f"{merit + MAX_FIGURE:010d}{tie + MAX_FIGURE:010d}{earlier:011d}{10**12 - session_id:013d}"
-    )
+    return (-merit, -tie, int(at.timestamp()), session_id)

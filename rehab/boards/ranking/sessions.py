@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
-from itertools import groupby
 from typing import Any
 
-from django.db.models import CharField, QuerySet
+from django.db.models import CharField, OuterRef, QuerySet, Subquery
 from django.db.models.functions import Cast
 
 from rehab.boards.choices import CountedTypes
@@ -16,6 +15,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.periods import Period
 from rehab.boards.validation import POINT_METRICS
 from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 from rehab.training.valences import VALENCES
 
@@ -77,7 +77,7 @@ class CountedSession:
 
 def read_sessions(
     board: Leaderboard,
-    rows: QuerySet[SessionMetric],
+    sessions: QuerySet[TrainingSession],
     period: Period,
     more_metrics: frozenset[str] = frozenset(),
     others: Sequence[Leaderboard] = (),
@@ -86,65 +86,67 @@ def read_sessions(
 
     Parameters
     ----------
-    rows
-        The metrics of the patients in question.
+    sessions
+        The sessions of the patients in question.
     more_metrics
         What to read besides the board's own metrics.
     others
         Boards on which a session may count instead, which admit no more sessions than this one.
     """
-    wanted = {board.metric, board.tie_breaker, "steps", "active_minutes", *more_metrics} - {""}
-    columns = [
-        *("session_id", "session__patient_id", "session__valence", "session__changed_to"),
-        *("session__started_at", "slug", "value"),
-    ]
-    if wanted & POINT_METRICS:
-        columns.append("session__plan__valence__miss_points")
-    # Valences and slugs are cast so that SQLite does not use their indexes, which would lead
-    # through the sessions and metrics of all patients.
+    slugs = sorted(
+        {board.metric, board.tie_breaker, "steps", "active_minutes", *more_metrics} - {""}
+    )
+    columns = ["pk", "patient_id", "valence", "changed_to", "started_at"]
+    columns += [f"metric_{slug}" for slug in slugs]
+    if POINT_METRICS & set(slugs):
+        columns.append("plan__valence__miss_points")
     ordered = (
-        _narrow(board, rows, period)
-        .alias(slug_text=Cast("slug", CharField()))
-        .filter(slug_text__in=wanted)
-        .order_by("session__patient_id", "session__started_at", "session_id")
+        _narrow(board, sessions, period)
+        .annotate(**{f"metric_{slug}": Subquery(_metric(slug)) for slug in slugs})
+        .order_by("patient_id", "started_at", "pk")
         .values_list(*columns)
     )
-    for (session_id, patient_id, valence, changed_to, at), group in groupby(
-        ordered.iterator(10_000), key=lambda row: row[:5]
-    ):
-        metrics: list[Any] = list(group)
+    for pk, patient_id, valence, changed_to, at, *values in ordered.iterator(10_000):
         session = CountedSession(
-            session_id=session_id,
+            session_id=pk,
             patient_id=patient_id,
             valence=valence,
             is_mixed=bool(changed_to),
             at=at,
             day=period.day_of(at),
-            values={row[5]: row[6] for row in metrics},
-            miss_cost=-(metrics[0][7] or 0) if len(columns) > 7 else 0,
+            values={
+                slug: value for slug, value in zip(slugs, values, strict=False) if value is not None
+            },
+            miss_cost=-(values[-1] or 0) if len(values) > len(slugs) else 0,
         )
         if any(session.counts_for(each) for each in (board, *others)):
             yield session
 
 
+def _metric(slug: str) -> QuerySet[SessionMetric, Any]:
+    return SessionMetric.everywhere.filter(session=OuterRef("pk"), slug=slug).values("value")
+
+
 def _narrow(
-    board: Leaderboard, rows: QuerySet[SessionMetric], period: Period
-) -> QuerySet[SessionMetric]:
-    """Return the metrics of sessions that a board's settings admit."""
-    rows = rows.filter(session__state=State.FINISHED.value, session__started_at__isnull=False)
-    rows = rows.filter(session__excluded=False)
+    board: Leaderboard, sessions: QuerySet[TrainingSession], period: Period
+) -> QuerySet[TrainingSession]:
+    """Return the sessions that a board's settings admit."""
+    sessions = sessions.filter(state=State.FINISHED.value, started_at__isnull=False, excluded=False)
     if not board.include_simulated:
-        rows = rows.filter(session__simulated=False)
+        sessions = sessions.filter(simulated=False)
     if needs_one_valence(board):
-        rows = rows.filter(session__changed_to="")
+        sessions = sessions.filter(changed_to="")
     if board.counted_valences:
-        rows = rows.alias(valence_text=Cast("session__valence", CharField()))
-        rows = rows.filter(valence_text__in=board.counted_valences)
+        # Cast so that SQLite does not use the index of valences, which has all patients' sessions.
+        sessions = sessions.alias(valence_text=Cast("valence", CharField()))
+        sessions = sessions.filter(valence_text__in=board.counted_valences)
     if period.began is not None:
-        rows = rows.filter(session__started_at__gte=period.began)
+        sessions = sessions.filter(started_at__gte=period.began)
     if period.ended is not None:
-        rows = rows.filter(session__started_at__lt=period.ended)
-    return rows
+        sessions = sessions.filter(started_at__lt=period.ended)
+    if period.frozen_at is not None:
+        sessions = sessions.exclude(ended_at__gte=period.frozen_at)
+    return sessions
 
 
 def needs_one_valence(board: Leaderboard) -> bool:

@@ -11,6 +11,7 @@ from django.core.management.base import BaseCommand
 from django.db import transaction
 from django.utils import timezone
 
+from rehab.boards.changes import delete_old_changes
 from rehab.exports.research.package import discard_old
 from rehab.patients.closure import SessionStillOpen
 from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
@@ -53,5 +54,6 @@ class Command(BaseCommand):
         if not dry_run:
             discard_old(Path(settings.DATA_DIR) / "exports", now)
             discard_old_uploads(now)
+            delete_old_changes(now)
         if dry_run:
             self.stdout.write("Nothing was changed (--dry-run).")

@@ -16,7 +16,6 @@ from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 from django.db import connection
 
-from rehab.boards.building.scheduler import board_builder
 from rehab.management.processes import Processes
 from rehab.people.sign_in.first_start import (
     FIRST_USERNAME,
@@ -113,7 +112,6 @@ class Command(BaseCommand):
             current().supervisor.start("robot", robot, given)
         for number, command in enumerate(commands, start=1):
             current().supervisor.start(f"child {number}", shlex.split(command))
-        board_builder.wake()  # for boards that the last run has left unbuilt
         self.stdout.write("Ready. Ctrl-C stops the server.")
         self.stdout.flush()
 

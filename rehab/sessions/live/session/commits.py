@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import msgspec
@@ -155,10 +155,8 @@ def commit(jobs: Sequence[Job]) -> None:
                     last_number=noted_end(), **job.summary
                 )
         if metrics:
-            # Boards are shared by sessions: they follow later, and no step waits for them.
-            ended = {row.session_id for row in metrics}
-            TrainingSession.everywhere.filter(pk__in=ended).update(boards_due=True)
-            transaction.on_commit(partial(figures_stored.send, TrainingSession), robust=True)
+            patients = {row.session.patient_id for row in metrics}
+            figures_stored.send(SessionMetric, patients=patients)
 
 
 def _is_armed(station_id: int | None) -> bool:

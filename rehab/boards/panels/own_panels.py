@@ -15,15 +15,14 @@ from django.utils.translation import pgettext
 
 from rehab.boards.choices import Aggregation, CountedTypes, Participants, PeriodKind
 from rehab.boards.models import Leaderboard
+from rehab.boards.panels.formatting import date_rows, format_rows
 from rehab.boards.panels.panel import BoardPanel
-from rehab.boards.panels.rows import date_rows, format_rows
+from rehab.boards.ranking.anonymity import find_visible_own_rows
 from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import read_sessions
-from rehab.boards.ranking.standings import ComputedStandings
-from rehab.boards.ranking.visibility import find_visible_own_rows
+from rehab.boards.ranking.standings import Standings
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Valence
 
@@ -81,11 +80,8 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
         board = make_board(scale, CountedTypes.SAME)
         boards.insert(0, ("same", pgettext("board", "This type"), scale, board))
     period = period_of(by_rate, now)
-    # Filtered so that indexes are used and no other patient's rows are read.
-    rows = SessionMetric.everywhere.filter(
-        session__patient=session.patient_id,
-        session__simulated=session.simulated,
-        slug__in=("hit_rate", "score", "steps"),
+    rows = TrainingSession.everywhere.filter(
+        patient=session.patient_id, simulated=session.simulated
     )
     # An imported session has points and no steps: it is on the first panel alone.
     by_points = [board for _slug, _label, _scale, board in boards if board is not by_rate]
@@ -98,7 +94,7 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
         ]
     visible = []
     for _slug, _label, _scale, board in boards:
-        standings = ComputedStandings(board, own_results(board, sessions, session.valence, period))
+        standings = Standings(own_results(board, sessions, session.valence, period))
         visible.append(find_visible_own_rows(standings, standings.find_session(session.pk)))
     walked = (
         TrainingSession.everywhere.only("created_at", "started_at", "active_s", "legacy_id")

@@ -1,4 +1,4 @@
-"""Which rows of a board a viewer may see: never other patients in its last half."""
+"""What a board shows so that patients stay anonymous: never the last half, never too few people."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rehab.boards.choices import DisplayMode, TieRule
 from rehab.boards.models import Leaderboard
-from rehab.boards.ranking.standings import ComputedStandings, RankedRow, Standings
+from rehab.boards.ranking.standings import RankedRow, Standings
 
 NEIGHBORS = 2  # on each side
 MAX_TIED = 10  # rows that may share the last rank shown, beyond the number of the best
@@ -14,6 +14,15 @@ MAX_TIED = 10  # rows that may share the last rank shown, beyond the number of t
 MAX_OWN = 50
 OWN_BEST = 10
 OWN_NEIGHBORS = 15
+
+
+def count_participants(standings: Standings, fewest: int) -> int:
+    """Return how many patients a board compares, for the check that there are ``fewest``.
+
+    Among fewer people than that, simulated patients do not count, since they make nobody anonymous.
+    Where there are no people they do, as in a clinic that tries GARRY.
+    """
+    return standings.people if 0 < standings.people < fewest else standings.count
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +79,7 @@ def _find_neighbors(
     ]
 
 
-def find_visible_own_rows(standings: ComputedStandings, me: RankedRow | None) -> list[VisibleRow]:
+def find_visible_own_rows(standings: Standings, me: RankedRow | None) -> list[VisibleRow]:
     """Return all own sessions; of more than ``MAX_OWN`` the best and those around ``me``."""
     rows = standings.top(standings.count)
     at = 0 if me is None else rows.index(me)

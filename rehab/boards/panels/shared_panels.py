@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 
-from django.db.models import Count
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
 
-from rehab.boards.building.scheduler import board_builder, catch_up
+from rehab.boards.cache import read_lists, read_standings
 from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.panel import BoardPanel, Total
-from rehab.boards.panels.rows import (
+from rehab.boards.panels.formatting import (
     PanelRow,
     date_rows,
     format_figure,
@@ -23,25 +21,18 @@ from rehab.boards.panels.rows import (
     name_rows,
     to_percent,
 )
+from rehab.boards.panels.panel import BoardPanel, Total
+from rehab.boards.ranking.anonymity import count_participants, find_visible_rows
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import period_of
-from rehab.boards.ranking.results import Result, own_results
+from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import is_kept, read_sessions
-from rehab.boards.ranking.standings import (
-    ComputedStandings,
-    RankedRow,
-    Standings,
-    StoredStandings,
-)
-from rehab.boards.ranking.visibility import find_visible_rows
-from rehab.boards.rows import BoardEntry
+from rehab.boards.ranking.standings import RankedRow, Standings
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 
 OWN_SESSIONS_NOTE = gettext_noop("These are your own sessions.")
-BEING_BUILT_NOTE = gettext_noop("This board is being built.")
 
 
 def boards_on(occasion: Occasion, clinic: Clinic) -> list[Leaderboard]:
@@ -66,29 +57,17 @@ def make_waiting_panels(clinic: Clinic, now: datetime) -> list[BoardPanel]:
     return [panel for panel in panels if panel.shared]
 
 
-def count_participants(standings: Standings, fewest: int) -> int:
-    """Return how many patients a board compares, for the check that there are ``fewest``.
-
-    Among fewer people than that, simulated patients do not count, since they make nobody anonymous.
-    Where there are no people they do, as in a clinic that tries GARRY.
-    """
-    people = standings.count_people(fewest)
-    return people if 0 < people < fewest else standings.count
-
-
 @dataclass(frozen=True)
 class BoardViewer:
     """The viewer of a board: a patient, with or without a session at hand, or anybody.
 
-    ``results`` are those of a board that is not stored as it is here, computed from the sessions.
-    ``staff``: a PT looks at it, and not for a patient.
+    The board may be a form that is not saved. ``staff``: a PT looks at it, and not for a patient.
     """
 
     board: Leaderboard
     now: datetime
     patient: Patient | None = None
     session: TrainingSession | None = None
-    results: Sequence[Result] | None = None
     staff: bool = False
 
     @property
@@ -100,20 +79,15 @@ class BoardViewer:
 
     @cached_property
     def _longest_list(self) -> str:
-        lists = BoardEntry.everywhere.filter(board=self.board).values_list("valence")
-        longest = lists.annotate(rows=Count("pk")).order_by("-rows", "valence").first()
-        return "" if longest is None else longest[0]
+        lists = read_lists(self.board, self.now)
+        return min(lists, key=lambda valence: (-lists[valence].count, valence), default="")
 
     def make_panel(self) -> BoardPanel:
         """Return the board, or the own sessions and why."""
         board, patient = self.board, self.patient
         if board.is_own:
             return self._own_panel("")
-        if self.results is None and not self._is_up_to_date():
-            return self._own_panel(
-                f"{_(BEING_BUILT_NOTE)} {_(OWN_SESSIONS_NOTE)}" if patient else _(BEING_BUILT_NOTE)
-            )
-        standings = self._standings()
+        standings = read_standings(board, self.valence, self.now)
         count = count_participants(standings, board.min_participants)
         people = ngettext("%(count)d patient on it now.", "%(count)d patients on it now.", count)
         people %= {"count": count}
@@ -135,25 +109,13 @@ class BoardViewer:
         why = _("Outside its first half, own sessions are shown.")
         return self._own_panel(_(OWN_SESSIONS_NOTE), f"{people} {why}")
 
-    def _is_up_to_date(self) -> bool:
-        if self.board.is_being_built:
-            board_builder.wake()  # the process that was building it may have been stopped
-            return False
-        return catch_up(self.board, self.now)
-
     def find_typical(self) -> int | None:
         """Return the patient in the middle of the first half; None on a board of own sessions."""
         if self.board.is_own:
             return None
-        standings = self._standings()
+        standings = read_standings(self.board, self.valence, self.now)
         ahead = standings.top((standings.count + 1) // 2)
         return ahead[len(ahead) // 2].patient_id if ahead else None
-
-    def _standings(self) -> Standings:
-        key = self.board.list_key(self.valence)
-        if self.results is None:
-            return StoredStandings(self.board, key)
-        return ComputedStandings(self.board, (row for row in self.results if row.valence == key))
 
     def _total(self, standings: Standings, me: RankedRow | None) -> Total:
         metric, goal = self.board.metric, self.board.total_goal
@@ -171,9 +133,9 @@ class BoardViewer:
         if patient is None:
             return self._panel(note=note, summary=summary)
         period = period_of(board, self.now)
-        metrics = SessionMetric.everywhere.filter(session__patient=patient)
-        sessions = read_sessions(board, metrics, period)
-        standings = ComputedStandings(board, own_results(board, sessions, self.valence, period))
+        sessions = read_sessions(board, TrainingSession.everywhere.filter(patient=patient), period)
+        results = own_results(board, sessions, self.valence, period)
+        standings = Standings(results, board.ties)
         if board.aggregation == Aggregation.SUM:
             mine = format_rows(board, find_visible_rows(self._own_board(), standings, None))
             rows = [replace(row, title="", rank=None, you=True) for row in mine]

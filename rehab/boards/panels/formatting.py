@@ -11,9 +11,9 @@ from django.utils.translation import gettext
 
 from rehab.boards.choices import NameStyle
 from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.anonymity import VisibleRow
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.sessions import PERCENT_METRICS
-from rehab.boards.ranking.visibility import VisibleRow
 from rehab.people.aliases import format_alias
 from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
@@ -80,7 +80,7 @@ def to_percent(value: int, full: int) -> int:
 def name_rows(board: Leaderboard, visible: Sequence[VisibleRow], me: int | None) -> list[PanelRow]:
     """Return rows with the names that their patients have on this board.
 
-    A patient who is no longer eligible has no row, even before the stored ones have followed.
+    Eligibility is checked here once more: a patient who is not eligible now is never shown.
     """
     eligible = eligible_patients(board).filter(pk__in=[each.row.patient_id for each in visible])
     found = {patient.pk: patient for patient in eligible}

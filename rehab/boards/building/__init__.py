@@ -1,1 +1,0 @@
-"""Storing the rows of boards and keeping them up to date."""
