@@ -20,22 +20,17 @@ from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
-from rehab.sessions.live.orders import SessionOrders
+from rehab.sessions.live.orders import Order, carry_out
+from rehab.sessions.live.recovery import Recovery
 from rehab.sessions.live.routines import Routines
-from rehab.sessions.live.servers.handover import Handover
 from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import Loader
 from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.supervisor import Supervisor
-from rehab.sessions.log import Remark
 from rehab.sessions.payloads import Message
-from rehab.training.changes import (
-    OPEN_STATES,
-    ChangeValue,
-    State,
-)
+from rehab.training.changes import OPEN_STATES, State
 from robot.wire.close_codes import CloseCode
 
 log = logging.getLogger(__name__)
@@ -58,8 +53,7 @@ class Runtime:
         self.writer = Writer(self._call)
         self.devices = Devices()
         self.robots = StationRobots(self.sessions)
-        self.orders = SessionOrders(self)
-        self.handover = Handover(self)
+        self.recovery = Recovery(self)
         self.audit_queue = AuditQueue()
         self.sockets: set[Any] = set()  # closed when the server stops
         self.requests: set[asyncio.Task[None]] = set()  # of pages, under way
@@ -71,8 +65,8 @@ class Runtime:
         self._held: set[int] = set()  # sessions that this process may be the owner of
         own = lease.held()
         # The other servers on the database, where there may be any.
-        self.servers = Servers(self, own) if own is not None and own.shares else None
-        self.routines = Routines(self)
+        self.servers = Servers(self, self.recovery, own) if own is not None and own.shares else None
+        self.routines = Routines(self, self.servers)
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
@@ -148,7 +142,7 @@ class Runtime:
         loaded = await self._loader.load(session_id)
         aggregate, stopped = loaded.aggregate, loaded.robot_stopped
         live = LiveSession(aggregate, self.writer, loaded.recent, self.drop, robot_stopped=stopped)
-        await self.handover.pause_orphaned(live, loaded.owned_before)
+        await self.recovery.pause_orphaned(live, loaded.owned_before)
         self.robots.inherit_stops(live)
         self.sessions[session_id] = live
         if self.servers is not None:
@@ -176,35 +170,26 @@ class Runtime:
             if getattr(socket, "live", None) is live:
                 socket.close_soon(CloseCode.RESTARTING)
 
-    async def change(self, session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
-        """Apply a change, here or where the session is; committed when this returns.
+    async def order(self, session_id: int, order: Order) -> None:
+        """Carry out an order, here or where the session is; committed when this returns.
 
         Raises InvalidSetting if it is refused and NotStored if it could not be committed.
         """
         try:
-            await self.orders.change(session_id, kind, value, by)
+            await carry_out(self, session_id, order)
         except OwnedElsewhere as problem:
             if self.servers is None:
                 raise
-            await self.servers.change(problem.owner, session_id, kind, value, by)
+            await self.servers.order(problem.owner, session_id, order)
 
-    async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
-        """Log a remark; committed when this returns. Raises what ``change`` raises."""
-        try:
-            await self.orders.remark(session_id, what, value, by)
-        except OwnedElsewhere as problem:
-            if self.servers is None:
-                raise
-            await self.servers.remark(problem.owner, session_id, what, value, by)
-
-    def stop_robots(self, live: LiveSession, by: User | None, told: Message) -> None:
+    def stop_robots(self, live: LiveSession, by: User | None, details: Message) -> None:
         """Stop the robot of a session of this process, and of the others there, on any server.
 
-        ``told``: which device stopped it, if it was no person.
+        ``details``: which device stopped it, if it was no person.
         """
-        self.robots.stop(live, by, told, again=self.servers is not None)
+        self.robots.stop(live, by, details, again=self.servers is not None)
         if self.servers is not None and live.station_id is not None:
-            self.servers.tell_of_stop(live.station_id, by, told)
+            self.servers.announce_stop(live.station_id, by, details)
 
     def announce(self, session_id: int, station_id: int | None) -> None:
         """Tell a station's devices, wherever they are, that a session has opened."""
@@ -219,7 +204,7 @@ class Runtime:
 
         Sessions that a process handed on when it was stopped go on as they are.
         """
-        paused = await self.handover.recover()
+        paused = await self.recovery.recover()
         self.is_ready = True
         return paused
 

@@ -28,22 +28,22 @@ class StationRobots:
         self._unlogged_stops: dict[str, RobotStop] = {}
 
     def stop(
-        self, live: LiveSession, by: User | None, told: Message, *, again: bool = False
+        self, live: LiveSession, by: User | None, details: Message, *, again: bool = False
     ) -> None:
         """Stop the robot of a session, and of the others at its station.
 
-        ``told``: which device stopped it, if it was no person. ``again``: where the robot is
+        ``details``: which device stopped it, if it was no person. ``again``: where the robot is
         stopped already, it is stored still, if another server has armed it meanwhile.
         """
-        live.robot_orders.stop(by, timezone.now(), told, again=again)
+        live.robot_orders.stop(by, timezone.now(), details, again=again)
         for session in self._others_at_location_of(live):
-            session.robot_orders.stop(by, timezone.now(), told)
+            session.robot_orders.stop(by, timezone.now(), details)
 
-    def stop_at(self, station_id: int, by: User | None, told: Message) -> None:
+    def stop_at(self, station_id: int, by: User | None, details: Message) -> None:
         """Stop the robot of a station, as another server says."""
         for session in list(self._sessions.values()):
             if session.station_id == station_id:
-                session.robot_orders.stop(by, timezone.now(), told)
+                session.robot_orders.stop(by, timezone.now(), details)
 
     async def stop_as_stored(
         self, find_stopped: Callable[[Collection[int]], Awaitable[Collection[int]]]

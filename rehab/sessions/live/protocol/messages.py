@@ -143,14 +143,6 @@ def read_remark(message: Message) -> tuple[Remark, float | None]:
     return what, read_number(message, "value", *REMARK_RANGES[what])
 
 
-def read_order(message: Message, *orders: str) -> str:
-    """Return the order for the robot. Raises BadFrame."""
-    try:
-        return _one_of(*orders)(message, "order")
-    except BadFrame as problem:
-        raise BadFrame(f"{problem} The robot is armed by a person.") from None
-
-
 def read_report(message: Message) -> dict[str, Any]:
     """Return a robot's report, its fields checked by ``REPORTS``. Raises BadFrame."""
     report = message.get("report")
