@@ -81,10 +81,6 @@ async def ask(scope: dict[str, Any]) -> list[dict[str, Any]]:
         ({"type": "http", "path": "/"}, {"type": "http.response.start", "status": 504}),
         ({"type": "http", "path": "/readyz"}, {"type": "inner"}),
         ({"type": "websocket", "path": "/ws/source/"}, {"type": "websocket.close"}),
-        (
-            {"type": "websocket", "extensions": {"websocket.http.response": {}}},
-            {"type": "websocket.http.response.start", "status": 504},
-        ),
     ],
 )
 async def test_nobody_but_a_watchdog_gets_in(monkeypatch, scope, first):

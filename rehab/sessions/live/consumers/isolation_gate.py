@@ -28,13 +28,10 @@ class IsolationGate:
         ):
             await self._inner(scope, receive, send)
             return
-        kind = scope["type"]
-        if kind == "websocket":
+        if scope["type"] == "websocket":
             await receive()
-            if "websocket.http.response" not in scope.get("extensions", {}):
-                await send({"type": "websocket.close"})  # daphne: the proxy sees 403
-                return
-            kind = "websocket.http"
+            await send({"type": "websocket.close"})  # the proxy sees 403
+            return
         headers = [(b"content-type", b"text/plain"), (b"retry-after", b"1")]
-        await send({"type": f"{kind}.response.start", "status": STATUS, "headers": headers})
-        await send({"type": f"{kind}.response.body", "body": WORDS})
+        await send({"type": "http.response.start", "status": STATUS, "headers": headers})
+        await send({"type": "http.response.body", "body": WORDS})
