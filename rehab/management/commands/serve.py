@@ -26,7 +26,7 @@ from rehab.people.sign_in.first_start import (
 )
 from rehab.sessions.live.database.lease import AnotherServer, Lease
 from rehab.sessions.live.runtime import current
-from rehab.sessions.live.sources import local_address
+from rehab.sessions.live.supervisor import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import Device
 from robot.bases import BASES

@@ -15,16 +15,16 @@ from django.utils import timezone
 from msgspec import Struct
 
 from rehab.people.models import User
-from rehab.sessions.live import sources
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.session.loading import find_newest_open
+from rehab.sessions.live.supervisor import source_name
 from rehab.sessions.log import Remark
 from rehab.training.changes import ENDED_STATES, Change, NotAllowed, State
 from rehab.training.controls import CONTROLS
 
 
 class ChangeOrder(Struct, frozen=True, tag="change"):
-    """Change a session. ``by``: nobody where a tablet or a command does."""
+    """Change a session. ``by``: None for a tablet or a command."""
 
     kind: str
     value: Any
@@ -82,7 +82,7 @@ async def _change(host: Host, session_id: int, order: ChangeOrder) -> None:
     await live.change(Change(order.kind, order.value), order.by, timezone.now())
     if live.aggregate.fold.state not in ENDED_STATES:
         return
-    await host.supervisor.stop(sources.child_name(live.id))
+    await host.supervisor.stop(source_name(live.id))
     if live.station_id is not None:
         waiting = await sync_to_async(find_newest_open)(live.station_id)
         if waiting is not None:

@@ -1,4 +1,4 @@
-"""What a runtime does again and again: heartbeats, sweeps, checkpoints, seals."""
+"""The periodic tasks of a runtime: heartbeats, sweeps, checkpoints, seals."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
-from rehab.sessions.live.process import move_database_log
+from rehab.sessions.live.process import end_tasks, move_database_log
 from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.instruments import LATE_S
-from rehab.sessions.live.tasks import end_tasks
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
@@ -47,7 +46,7 @@ class Routines:
         self._loop = asyncio.get_running_loop()
         self._beat = 0
         self._part = 0
-        self._trouble = Trouble.NONE  # as it was told last
+        self._trouble = Trouble.NONE  # as it was announced last
         self.tasks = [
             self._loop.create_task(self._repeat(beats, work), context=contextvars.Context())
             for beats, work in (
@@ -81,10 +80,10 @@ class Routines:
         self._part = (self._part + 1) % PARTS
         for live in self._host.sessions.values():
             if live.id % PARTS == self._part and live.robot is not None:
-                live.robot.tell_text(ROBOT_HEARTBEATS[live.is_watched])
+                live.robot.queue_text(ROBOT_HEARTBEATS[live.is_watched])
 
     async def _watch_storage(self) -> None:
-        """Tell monitors, robots and the log when steps cannot be stored, and when they can."""
+        """Report to monitors, robots and the log when steps cannot be stored, and when they can."""
         trouble = self._host.writer.trouble
         if trouble == self._trouble:
             return

@@ -14,7 +14,6 @@ from django.conf import settings
 from django.db import DatabaseError
 
 from rehab.people.models import User
-from rehab.sessions.live import sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.database.owners import OwnedElsewhere
@@ -28,7 +27,7 @@ from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import Loader
 from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.live.station_robots import StationRobots
-from rehab.sessions.live.supervisor import Supervisor
+from rehab.sessions.live.supervisor import Supervisor, local_address, run_source
 from rehab.sessions.payloads import Message
 from rehab.training.changes import OPEN_STATES, State
 from robot.wire.close_codes import CloseCode
@@ -59,7 +58,7 @@ class Runtime:
         self.requests: set[asyncio.Task[None]] = set()  # of pages, under way
         self.supervisor = Supervisor(settings.DATA_DIR / "children.json")
         # Where child processes connect.
-        self.address = sources.local_address(settings.HOST, settings.PORT)
+        self.address = local_address(settings.HOST, settings.PORT)
         self._loader = Loader()
         self._opening: dict[int, asyncio.Task[None]] = {}
         self._held: set[int] = set()  # sessions that this process may be the owner of
@@ -95,9 +94,9 @@ class Runtime:
         return live
 
     async def settled_session(self, session_id: int) -> LiveSession:
-        """Return a live session while nobody is subscribing. Raises what ``session`` does.
+        """Return a live session while none is subscribing to it. Raises what ``session`` does.
 
-        Until the next ``await`` it is the one in memory: what is attached to it hears of its end.
+        Until the next ``await`` it is the one in memory: what attaches to it learns of its end.
         """
         while True:
             live = await self.session(session_id)
@@ -120,7 +119,7 @@ class Runtime:
         return await self.servers.followed.follow(session_id)
 
     def find(self, session_id: int) -> LiveSession | None:
-        """Return a session that is in memory, if it is: this process's, or one that it follows."""
+        """Return a session if it is in memory: this process's own, or one that it follows."""
         followed = {} if self.servers is None else self.servers.followed.sessions
         return self.sessions.get(session_id) or followed.get(session_id)
 
@@ -143,19 +142,19 @@ class Runtime:
         aggregate, stopped = loaded.aggregate, loaded.robot_stopped
         live = LiveSession(aggregate, self.writer, loaded.recent, self.drop, robot_stopped=stopped)
         await self.recovery.pause_orphaned(live, loaded.owned_before)
-        self.robots.inherit_stops(live)
+        self.robots.restore_stops(live)
         self.sessions[session_id] = live
         if self.servers is not None:
             self.servers.followed.leave(session_id)  # it was another's
         if live.aggregate.fold.state in OPEN_STATES and not self.draining:
-            await sources.run_source(self.supervisor, aggregate.session, self.address)
+            await run_source(self.supervisor, aggregate.session, self.address)
 
     def drop(self, live: LiveSession, problem: Exception) -> None:
         """Drop a session that could not be written: its fold is ahead of its log.
 
         A stop of the robot stays in force.
         """
-        self.robots.bequeath_stop(live)
+        self.robots.pass_stop_on(live)
         if self.sessions.get(live.id) is live:
             log.error("Session %s is rebuilt from its log: %s", live.id, problem)
             del self.sessions[live.id]
@@ -192,7 +191,7 @@ class Runtime:
             self.servers.announce_stop(live.station_id, by, details)
 
     def announce(self, session_id: int, station_id: int | None) -> None:
-        """Tell a station's devices, wherever they are, that a session has opened."""
+        """Notify a station's devices, at any server, of a session that has opened."""
         if station_id is None:
             return
         self.devices.announce(session_id, station_id)
@@ -209,7 +208,7 @@ class Runtime:
         return paused
 
     async def close(self, live: LiveSession) -> None:
-        """Unload a session that nobody uses; it can be rebuilt from its log."""
+        """Unload a session that is not in use; it can be rebuilt from its log."""
         if live.aggregate.fold.state is State.RUNNING:
             return  # its source may reconnect
         self.sessions.pop(live.id, None)
@@ -241,9 +240,9 @@ class Runtime:
 
 
 async def _finish(*work: Awaitable[Any]) -> None:
-    """Wait until work is done, but not for long.
+    """Wait until work is done, for FINISH_S at most.
 
-    A client that does not listen or a query that hangs must not keep sessions from being handed on.
+    An unresponsive client or a hanging query must not keep sessions from being handed on.
     """
     await asyncio.wait([asyncio.gather(*work, return_exceptions=True)], timeout=FINISH_S)
 

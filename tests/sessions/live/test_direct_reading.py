@@ -69,6 +69,16 @@ def connect(take: Callable[[str], bool]) -> tuple[DirectProtocol, FakeDaphne]:
     return protocol, daphne
 
 
+def keep(texts: list[str]) -> Callable[[str], bool]:
+    """Return a function that takes each text."""
+
+    def take(text: str) -> bool:
+        texts.append(text)
+        return True
+
+    return take
+
+
 def stream() -> bytes:
     """Return the texts as a client's frames: a ping among them, the last one in two parts."""
     frames = [Frame(Opcode.TEXT, text.encode()) for text in TEXTS[:-1]]
@@ -106,7 +116,7 @@ def test_a_frame_inside_a_texts_bytes_is_no_message():
     text = bytes(byte ^ 0x80 for byte in b"\xe1" + inner + b"\xe2")
     pieces = [bytes((0x81, 0x80 | len(text))) + mask + b"\xe1", inner, b"\xe2"]
     taken: list[str] = []
-    protocol, daphne = connect(lambda text: not taken.append(text))
+    protocol, daphne = connect(keep(taken))
     for piece in pieces:
         protocol.dataReceived(piece)
     assert taken + daphne.texts() == [text.decode()]
@@ -114,7 +124,7 @@ def test_a_frame_inside_a_texts_bytes_is_no_message():
 
 def test_whole_texts_are_taken_past_the_queue():
     taken: list[str] = []
-    protocol, daphne = connect(lambda text: not taken.append(text))
+    protocol, daphne = connect(keep(taken))
     for text in TEXTS:
         protocol.dataReceived(Frame(Opcode.TEXT, text.encode()).serialize(mask=True))
     assert (taken, daphne.texts()) == (TEXTS, [])

@@ -23,8 +23,8 @@ class World:
         self.lease = lease
         self.isolation = Isolation(lease, lambda: self.now_s)
 
-    def applies(self, others: set[str] = OTHER, *, is_deaf: bool = False) -> bool:
-        return self.isolation.applies(others, is_deaf=is_deaf)
+    def applies(self, others: set[str] = OTHER, *, is_silent: bool = False) -> bool:
+        return self.isolation.applies(others, is_silent=is_silent)
 
 
 @pytest.fixture
@@ -39,12 +39,12 @@ def test_clients_stay_while_the_database_answers_or_is_gone_for_all(world):
     world.isolation.hear("other", is_current=True)
     assert world.applies()
     world.lease.is_current = True
-    assert not world.applies(is_deaf=True)
+    assert not world.applies(is_silent=True)
 
 
 def test_who_hears_nobody_is_cut_off_itself(world):
-    assert world.applies(is_deaf=True)
-    assert not world.applies(set(), is_deaf=True)  # one server alone keeps its clients
+    assert world.applies(is_silent=True)
+    assert not world.applies(set(), is_silent=True)  # one server alone keeps its clients
 
 
 def test_what_another_said_counts_for_three_seconds(world):

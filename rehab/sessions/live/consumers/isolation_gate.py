@@ -6,13 +6,13 @@ from typing import Any
 
 from rehab.sessions.live import runtime as runtimes
 
-WATCHED = ("/healthz", "/readyz", "/metrics")  # what watchdogs ask, of this server and no other
+WATCHED = ("/healthz", "/readyz", "/metrics")  # for watchdogs, which ask this server and no other
 STATUS = 504  # deploy/nginx: the proxy asks another server
 WORDS = b"This server is cut off from its database. Try again: another one answers.\n"
 
 
 class IsolationGate:
-    """An ASGI application that answers nobody but watchdogs while this server is cut off."""
+    """An ASGI application that answers watchdogs alone while this server is cut off."""
 
     def __init__(self, inner: Any) -> None:
         self._inner = inner

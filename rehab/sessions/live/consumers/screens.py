@@ -47,9 +47,9 @@ from robot.wire.frames import BadFrame, read_name, read_number, read_whole
 log = logging.getLogger(__name__)
 
 # For programs; pages have their own words.
-_UNHEARD = {
-    "stop": "The stop was not heard. If the robot moves, use its own switch.",
-    "arm": "The order was not heard. Try again.",
+_NOT_DELIVERED = {
+    "stop": "The stop did not arrive. If the robot moves, use its own switch.",
+    "arm": "The order did not arrive. Try again.",
 }
 
 
@@ -88,7 +88,7 @@ class ScreenConsumer(Socket):
             raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
-            live.tablet_heard_at = timezone.now()
+            live.tablet_seen_at = timezone.now()
         self.language = live.aggregate.fold.plan.language  # what the patient reads
         if self.audience is Audience.MONITOR and isinstance(self.actor, User):
             theirs = await database_sync_to_async(language_of)(self.actor)
@@ -133,19 +133,19 @@ class ScreenConsumer(Socket):
         self, live: LiveSession, subscriber: Subscriber, after: int, until: int
     ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
+        plan, announced = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
         while after < until:
             steps = await read_backlog(live.id, after, until)
             if not steps:
                 return
-            entries = (history_entry(self.audience, plan, step, told) for step in steps)
+            entries = (history_entry(self.audience, plan, step, announced) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
                 await subscriber.send_backlog(texts)
             after = steps[-1].number
 
     def handle_now(self, text: str) -> bool:
-        """Note what the page has seen, as most frames say; all else takes its turn."""
+        """Note what the page confirms, as most frames do; all else takes its turn."""
         frame = read_seen(text)
         if frame is not None:
             self._confirm(frame)
@@ -155,7 +155,7 @@ class ScreenConsumer(Socket):
         if self.subscriber is not None:
             self.subscriber.confirm(frame)
         if isinstance(self.actor, Device) and self.live is not None:
-            self.live.tablet_heard_at = timezone.now()
+            self.live.tablet_seen_at = timezone.now()
 
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame of a page."""
@@ -257,9 +257,9 @@ class ScreenConsumer(Socket):
         try:
             await servers.order(live.owner, live.id, order)
         except NotStored as problem:
-            log.error("Session %s: %s was not heard: %s", live.id, wanted, problem)
-            unheard = {"type": "error", "code": "robot_unheard", "order": wanted}
-            await self.send_message(unheard | {"message": _UNHEARD[wanted]})
+            log.error("Session %s: %s did not arrive: %s", live.id, wanted, problem)
+            undelivered = {"type": "error", "code": "robot_unheard", "order": wanted}
+            await self.send_message(undelivered | {"message": _NOT_DELIVERED[wanted]})
 
     def _drive_robot(self, message: Message) -> None:
         """Pass on that a person holds a button to drive the robot to its mark."""

@@ -63,7 +63,7 @@ class SourceConsumer(DeviceSocket):
         self, live: LiveSession, step: Measurement, received_at: datetime, *, is_marked: bool
     ) -> None:
         _check_open_steps(live)
-        # What a source calls late tells nothing of its clock, which may be another one by now.
+        # What a source calls late is no measure of its clock, which may be another one by now.
         late = is_marked or self.lateness.is_late(step.time_s, time.monotonic())
         live.record_step(step, received_at, late=late)
 

@@ -68,13 +68,13 @@ _decode = msgspec.json.Decoder().decode
 
 
 def read_frame(text: str | None) -> dict[str, Any]:
-    """Return a frame as a JSON object with a type. Raises BadFrame, as ``read_object`` says."""
+    """Return a frame as a JSON object with a type. Raises what ``read_object`` raises."""
     if text is None or len(text) > MAX_FRAME_BYTES:
         return read_object(text)
     try:
         message = _decode(text)
     except (msgspec.MsgspecError, RecursionError, UnicodeError):
-        return read_object(text)  # says why, or reads what is rare (half a pair of surrogates)
+        return read_object(text)  # has the cure, or reads what is rare (half a surrogate pair)
     is_one = isinstance(message, dict) and isinstance(message.get("type", ""), str)
     return message if is_one else read_object(text)
 
@@ -88,7 +88,7 @@ def read_seen(text: str) -> int | None:
 
 
 def read_after(query: bytes) -> int | None:
-    """Return which step a page has already, as its address says; None for a new page."""
+    """Return which step a page has already, by its address; None for a new page."""
     words = parse_qs(query.decode("latin-1")).get("after", [])
     return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None
 

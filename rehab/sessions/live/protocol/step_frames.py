@@ -15,7 +15,7 @@ from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 Message = Mapping[str, Any]
 
 
-# 64 bits, as the database keeps them; read_steps tells what to do with more.
+# 64 bits, as the database has them; the error of read_steps has the cure for more.
 _Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 _Name = Annotated[str, msgspec.Meta(pattern=rf"\A(?:{NAME.pattern})\Z")]
 
@@ -39,7 +39,7 @@ _decode_step = msgspec.json.Decoder(_StepFrame).decode
 def read_single_step(text: str) -> Measurement | None:
     """Return a frame's step, the same as ``read_steps`` does.
 
-    None for any other frame, also for one of a step with a fault (``read_steps`` says which), and
+    None for any other frame, also for one of a step with a fault (``read_steps`` names it), and
     for one that its source calls late.
     """
     if len(text) > MAX_FRAME_BYTES:

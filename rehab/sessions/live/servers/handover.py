@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from asgiref.sync import sync_to_async
 
-from rehab.sessions.live import sources
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.session.commits import Fenced
+from rehab.sessions.live.supervisor import source_name
 from rehab.sessions.models import TrainingSession
 from robot.wire.close_codes import CloseCode
 
@@ -22,9 +22,9 @@ async def give_up(host: Host, session_id: int, slot: str) -> bool:
     is_needed = live is None or live.source is not None or host.draining
     if live is None or is_needed or (slot == "robot" and live.robot is not None):
         return False
-    if sources.child_name(session_id) in host.supervisor.children:
+    if source_name(session_id) in host.supervisor.children:
         return False  # its source dials in here
-    del host.sessions[session_id]  # from here on nobody gets it
+    del host.sessions[session_id]  # from here on it is closed to everyone
     try:
         await live.wait_until_committed()
         epoch = live.aggregate.session.epoch
@@ -43,4 +43,4 @@ async def drop_taken(host: Host) -> None:
     for live in list(host.sessions.values()):
         if epochs.get(live.id, live.aggregate.session.epoch) != live.aggregate.session.epoch:
             host.drop(live, Fenced("Another server has taken the session over."))
-            await host.supervisor.stop(sources.child_name(live.id))
+            await host.supervisor.stop(source_name(live.id))
