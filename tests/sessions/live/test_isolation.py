@@ -34,9 +34,9 @@ def world() -> World:
 
 def test_clients_stay_while_the_database_answers_or_is_gone_for_all(world):
     assert not world.applies()  # the other one does not say that it has it
-    world.isolation.hear("other", is_current=False)
+    world.isolation.record("other", is_current=False)
     assert not world.applies()
-    world.isolation.hear("other", is_current=True)
+    world.isolation.record("other", is_current=True)
     assert world.applies()
     world.lease.is_current = True
     assert not world.applies(is_silent=True)
@@ -48,13 +48,13 @@ def test_who_hears_nobody_is_cut_off_itself(world):
 
 
 def test_what_another_said_counts_for_three_seconds(world):
-    world.isolation.hear("other", is_current=True)
+    world.isolation.record("other", is_current=True)
     world.now_s += 2.9
     assert world.applies()
     world.now_s += 0.2
     assert not world.applies()
-    world.isolation.hear("other", is_current=True)
-    world.isolation.hear("other", is_current=False)
+    world.isolation.record("other", is_current=True)
+    world.isolation.record("other", is_current=False)
     assert not world.applies()
     assert not world.applies({"a third"})
 
