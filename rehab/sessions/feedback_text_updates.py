@@ -18,6 +18,7 @@ from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession
 from rehab.training.bands import bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
@@ -65,7 +66,8 @@ async def _update_session(session_id: int, valence: Valence, by: User) -> None:
         if known is None or known.bands == valence.bands:
             return
         value = {"valence": valence.slug, "bands": bands_to_json(valence.bands)}
-        await live_runtime.change(session_id, ChangeKind.FEEDBACK_TEXT, value, by)
+        order = ChangeOrder(ChangeKind.FEEDBACK_TEXT, value, by)
+        await live_runtime.order(session_id, order)
     finally:
         if not in_server:
             await live_runtime.drain()

@@ -15,6 +15,7 @@ from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
 from rehab.people.models.blinding import hidden_patients
 from rehab.sessions.live import runtime
+from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import ask
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
@@ -235,7 +236,7 @@ async def _change(session_id: int, kind: str, value: ChangeValue, by: User | Non
     in_server = runtime.peek() is not None  # else a command, which must not leave anything running
     live = runtime.current()
     try:
-        await live.change(session_id, kind, value, by)
+        await live.order(session_id, ChangeOrder(kind, value, by))
     finally:
         if not in_server:
             await live.drain()

@@ -1,16 +1,17 @@
 """The relay as Channels' own tutorial has it: consumers, and a group of the Redis layer a session.
 
-`python stock_channels.py PORT REDIS_URL`: one process, by uvicorn; nothing is checked or stored.
+`python stock_channels.py PORT REDIS_URL`: one process, by daphne; nothing is checked or stored.
 """
 
 from __future__ import annotations
 
 import sys
+from functools import partial
 from typing import Any
 
-import uvicorn
 from channels.generic.websocket import AsyncWebsocketConsumer
 from channels.routing import URLRouter
+from daphne.server import Server
 from django.conf import settings
 from django.urls import path
 
@@ -36,23 +37,15 @@ class Viewer(AsyncWebsocketConsumer):
         await self.send(text_data=event["text"])
 
 
-class Announced(uvicorn.Server):
-    """Says when it is ready."""
-
-    async def startup(self, sockets: Any = None) -> None:
-        """Start, then say so."""
-        await super().startup(sockets)
-        print("Ready", flush=True)
-
-
 def main(port: int, redis: str) -> None:
     """Serve until killed."""
     layer = {"BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer"}
     settings.configure(CHANNEL_LAYERS={"default": layer | {"CONFIG": {"hosts": [redis]}}})
     consumers: dict[str, Any] = {"source/<str:key>": Source, "viewer/<str:key>": Viewer}
     router = URLRouter([*(path(route, one.as_asgi()) for route, one in consumers.items())])
-    options = uvicorn.Config(router, port=port, log_level="critical", ws_per_message_deflate=False)
-    Announced(options).run()
+    endpoint = f"tcp:port={port}:interface=127.0.0.1"
+    ready = partial(print, "Ready", flush=True)
+    Server(router, endpoints=[endpoint], ready_callable=ready, verbosity=0).run()
 
 
 if __name__ == "__main__":

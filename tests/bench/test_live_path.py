@@ -19,7 +19,6 @@ def chosen(name: str, usual: str) -> list[str]:
 
 SIZES = [int(n) for n in chosen("SIZES", "100,500,1000,1500")]
 VIEWERS = [int(n) for n in chosen("VIEWERS", "1,3")]
-SERVERS = chosen("SERVERS", "daphne,uvicorn")
 MINUTES = float(os.environ.get("GARRY_TEST_MINUTES", "0.5"))  # of steps, until memory is read
 MAX_RSS_MB = 400  # of a thousand sessions
 
@@ -31,7 +30,6 @@ def many_files():
 
 def run_ours(
     tmp_path: Path,
-    server_name: str,
     count: int,
     viewers: int,
     *,
@@ -40,17 +38,15 @@ def run_ours(
 ) -> dict[str, Any]:
     rows, seen = tmp_path / "rows.json", tmp_path / "seen.json"
     program = ("-m", "tests.bench.watched", str(seen))
-    with serve(tmp_path / "data", "--server", server_name, program=program) as server:
+    with serve(tmp_path / "data", program=program) as server:
         rows.write_text(json.dumps(seed(server, count)))
         pid = server.process.pid
         how: dict[str, Any] = {"seconds": seconds, "slices": slices, "seen": seen}
         return drive("garry", server.port, pid, rows, viewers, **how)
 
 
-def measure(
-    tmp_path: Path, server_name: str, count: int, viewers: int
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    ours, rows = run_ours(tmp_path, server_name, count, viewers), tmp_path / "rows.json"
+def measure(tmp_path: Path, count: int, viewers: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    ours, rows = run_ours(tmp_path, count, viewers), tmp_path / "rows.json"
     with relay() as (port, pid):
         floor = drive("relay", port, pid, rows, viewers)
     return ours, floor
@@ -60,9 +56,7 @@ def tell_thread(ours: dict[str, Any], name: str) -> str:
     return f"{1e6 * ours['threads_s'][name] / ours['steps']:.0f}"
 
 
-def tell(
-    server_name: str, count: int, viewers: int, ours: dict[str, Any], floor: dict[str, Any]
-) -> float:
+def tell(count: int, viewers: int, ours: dict[str, Any], floor: dict[str, Any]) -> float:
     ratio = ours["us_per_step"] / floor["us_per_step"]
     times = (
         f"step→viewer p50 {ours['view_p50_ms']:.2f} p99 {ours['view_p99_ms']:.1f} "
@@ -74,7 +68,7 @@ def tell(
     if floor["view_p99_ms"] > BUSY_MS:
         times = "times: machine too busy"
     print(
-        f"\nN={count:5} viewers={viewers} {server_name} {times}; "
+        f"\nN={count:5} viewers={viewers} {times}; "
         f"arrived {ours['arrived']}/{ours['expected']}; "
         f"CPU {ours['us_per_step']:.0f} us/step (event loop {tell_thread(ours, 'MainThread')}, "
         f"writer {tell_thread(ours, 'garry-writer')}), {ours['rows_a_commit']:.1f} steps a commit, "
@@ -88,27 +82,25 @@ def tell(
 
 @pytest.mark.parametrize("count", SIZES)
 @pytest.mark.parametrize("viewers", VIEWERS)
-@pytest.mark.parametrize("server_name", SERVERS)
-def test_step_to_screen(tmp_path, server_name, count, viewers):
-    ours, floor = measure(tmp_path, server_name, count, viewers)
-    ratio = tell(server_name, count, viewers, ours, floor)
+def test_step_to_screen(tmp_path, count, viewers):
+    ours, floor = measure(tmp_path, count, viewers)
+    ratio = tell(count, viewers, ours, floor)
     assert ours["arrived"] == ours["expected"]
     if viewers == 1:
         assert ratio < 12
 
 
 @pytest.mark.timeout(0)
-@pytest.mark.parametrize("server_name", SERVERS)
-def test_memory_is_flat(tmp_path, server_name):
+def test_memory_is_flat(tmp_path):
     """Of the largest size up to 1000, for GARRY_TEST_MINUTES (0.5; the aim is said for 10).
 
     Flat in the second half: in the first the latest steps, and the database's pages, are kept.
     """
     count = max((size for size in SIZES if size <= 1000), default=min(SIZES))
-    ours = run_ours(tmp_path, server_name, count, 1, seconds=60 * MINUTES, slices=10)
+    ours = run_ours(tmp_path, count, 1, seconds=60 * MINUTES, slices=10)
     rss_mb = [ours["first_rss_mb"], *(part["rss_mb"] for part in ours["slices"])]
     told = " ".join(f"{mb:.0f}" for mb in rss_mb)
-    print(f"\nN={count} {server_name} RSS in {MINUTES:g} min, from tenth to tenth [MB]: {told}")
+    print(f"\nN={count} RSS in {MINUTES:g} min, from tenth to tenth [MB]: {told}")
     assert rss_mb[-1] <= MAX_RSS_MB
     assert rss_mb[-1] <= 1.1 * rss_mb[5] + 10
 
@@ -119,8 +111,8 @@ def test_how_many_sessions_one_process_holds(tmp_path):
     for count in range(1000, 3001, 250):
         folder = tmp_path / str(count)
         folder.mkdir()
-        ours, floor = measure(folder, "daphne", count, 1)
-        tell("daphne", count, 1, ours, floor)
+        ours, floor = measure(folder, count, 1)
+        tell(count, 1, ours, floor)
         if floor["view_p99_ms"] > BUSY_MS:
             pytest.skip("machine too busy")
         if ours["view_p99_ms"] > 100 or ours["arrived"] < ours["expected"]:

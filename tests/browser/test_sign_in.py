@@ -15,9 +15,9 @@ from tests.support.servers import Server, serve
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
-def server(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data"), "--server", request.param) as running:
+@pytest.fixture
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serve(tmp_path_factory.mktemp("data")) as running:
         yield running
 
 

@@ -81,18 +81,11 @@ class NoRedirect(urllib.request.HTTPRedirectHandler):
         """Follow nothing."""
 
 
-@pytest.fixture(params=["uvicorn", "daphne"])
-def server_name(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
 @pytest.fixture
-def hosted(tmp_path: Path, server_name: str) -> Iterator[Hosted]:
+def hosted(tmp_path: Path) -> Iterator[Hosted]:
     """Return a set after the commands of docs/hosting.md: tables made, static files collected."""
     with run_postgres() as database:
-        torture = Torture(
-            tmp_path / "garry", seed=17, rate=20, database=database, serve=["--server", server_name]
-        )
+        torture = Torture(tmp_path / "garry", seed=17, rate=20, database=database)
         torture.folder.mkdir()
         torture.environment |= {
             "GARRY_HOSTED": "1",
@@ -116,7 +109,6 @@ def test_a_walk_through_the_proxy_outlives_restarts_and_a_kill(hosted: Hosted) -
     assert sum(walk.acknowledged for walk in hosted.torture.walks) > 100
 
 
-@pytest.mark.parametrize("server_name", ["uvicorn"], indirect=True)
 def test_what_the_proxy_lets_through(hosted: Hosted, tmp_path: Path) -> None:
     assert hosted.get(f"{hosted.secure}/readyz")[0] == 502  # no server yet
     assert hosted.get(f"{hosted.secure}/family/{SECRET}/")[0] == 502
@@ -146,7 +138,6 @@ def test_what_the_proxy_lets_through(hosted: Hosted, tmp_path: Path) -> None:
         assert hosted.get(f"{hosted.secure}/metrics", **allowed)[0] == 404
 
 
-@pytest.mark.parametrize("server_name", ["uvicorn"], indirect=True)
 def test_a_second_server_on_the_database_waits_until_the_first_has_ended(hosted: Hosted) -> None:
     with hosted.serve() as first:
         second = subprocess.Popen(

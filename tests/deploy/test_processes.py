@@ -33,7 +33,7 @@ class Served(Pair):
     def begin(self, place: int) -> None:
         """Start both with the first."""
         if place == 0:
-            words = ["serve", "--server", "uvicorn", "--port", str(self.ports[0])]
+            words = ["serve", "--port", str(self.ports[0])]
             with self.log.open("w") as log:
                 self.command = subprocess.Popen(
                     [sys.executable, "manage.py", *words, "--processes", "2"],

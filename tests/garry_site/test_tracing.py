@@ -59,13 +59,12 @@ def read_spans(sent: list[bytes]) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("server_name", ["daphne", "uvicorn"])
-def test_requests_are_traced_by_their_route(tmp_path, collector, server_name):
+def test_requests_are_traced_by_their_route(tmp_path, collector):
     settings = {
         "OTEL_EXPORTER_OTLP_ENDPOINT": f"http://127.0.0.1:{collector.server_port}",
         "OTEL_BSP_SCHEDULE_DELAY": "50",  # ms between batches
     }
-    with serve(tmp_path, "--server", server_name, settings=settings) as server:
+    with serve(tmp_path, settings=settings) as server:
         for path in ("/sign-in/", f"/family/{TOKEN}/"):
             asked = urllib.request.Request(
                 f"http://127.0.0.1:{server.port}{path}",

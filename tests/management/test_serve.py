@@ -20,9 +20,9 @@ from tests.support.servers import ROOT, clean_environment, serve
 pytestmark = pytest.mark.server
 
 
-@pytest.fixture(params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
-def server(request, tmp_path):
-    with serve(tmp_path, "--server", request.param, new_machine=True) as running:
+@pytest.fixture
+def server(tmp_path):
+    with serve(tmp_path, new_machine=True) as running:
         yield running
 
 

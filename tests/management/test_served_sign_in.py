@@ -1,4 +1,4 @@
-"""Signing in at the real servers: in, wrong, locked out, by a code; and many attempts at once."""
+"""Signing in at a real server: in, wrong, locked out, by a code; and many attempts at once."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ pytestmark = pytest.mark.server
 AT_ONCE = 100
 
 
-@pytest.fixture(scope="module", params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
-def server(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     # Behind a proxy of ours, so that each test comes from addresses of its own.
     folder = tmp_path_factory.mktemp("data")
-    with serve(folder, "--server", request.param, settings={"GARRY_PROXIES": "1"}) as running:
+    with serve(folder, settings={"GARRY_PROXIES": "1"}) as running:
         yield running
 
 

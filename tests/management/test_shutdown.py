@@ -88,9 +88,8 @@ async def walk_until_closed(
 
 @pytest.mark.essential
 @pytest.mark.realtime
-@pytest.mark.parametrize("by", ["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
-def test_sigterm_with_fifty_viewers(tmp_path, by):
-    with serve(tmp_path, "--server", by) as server:
+def test_sigterm_with_fifty_viewers(tmp_path):
+    with serve(tmp_path) as server:
         rows = json.loads(python(server, "-m", "tests.support.live_seed", "10"))
         codes, acknowledged = asyncio.run(
             walk_until_closed(

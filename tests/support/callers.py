@@ -14,6 +14,7 @@ from channels.testing import WebsocketCommunicator
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.live.protocol.frames import READ_NOW
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -371,9 +372,8 @@ def open_session(
 
 async def change(session: TrainingSession, kind: str, value: float | None = None) -> None:
     """Change a session as a page does; committed when this returns."""
-    from rehab.sessions.live import runtime
-
-    await runtime.current().change(session.pk, ChangeKind(kind), value, None)
+    order = ChangeOrder(ChangeKind(kind), value, None)
+    await runtimes.current().order(session.pk, order)
 
 
 async def numbers(session: TrainingSession) -> list[int]:

@@ -106,11 +106,8 @@ class Dialed:
 class Pair:
     """Servers 0 and 1, and their database's rows."""
 
-    def __init__(
-        self, folder: Path, database: str, redis: str, server: str = "uvicorn", count: int = 2
-    ) -> None:
+    def __init__(self, folder: Path, database: str, redis: str, count: int = 2) -> None:
         self.ports = [free_port() for _ in range(count)]
-        self.server = server
         self.log = folder / "log"
         self.environment = clean_environment(folder, self.ports[0]) | {
             "DJANGO_SETTINGS_MODULE": "garry_site.settings",
@@ -161,7 +158,7 @@ class Pair:
     def begin(self, place: int) -> None:
         """Start a server."""
         port = str(self.ports[place])
-        command = [*self.programs[place], "serve", "--port", port, "--server", self.server]
+        command = [*self.programs[place], "serve", "--port", port]
         environment = self.environment | self.own_environments[place]
         with self.log.open("a") as log:
             self.processes[place] = subprocess.Popen(

@@ -25,7 +25,7 @@ from rehab.people.sign_in.first_start import (
 )
 from rehab.sessions.live.database.lease import AnotherServer, Lease
 from rehab.sessions.live.runtime import current
-from rehab.sessions.live.sources import local_address
+from rehab.sessions.live.supervisor import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import Device
 from robot.bases import BASES
@@ -40,7 +40,6 @@ class Command(BaseCommand):
         """Add the options."""
         parser.add_argument("--host", default=settings.HOST)
         parser.add_argument("--port", type=int, default=settings.PORT)
-        parser.add_argument("--server", choices=("daphne", "uvicorn"), default="daphne")
         parser.add_argument(
             "--processes",
             type=int,
@@ -69,7 +68,6 @@ class Command(BaseCommand):
         *args: Any,
         host: str,
         port: int,
-        server: str,
         processes: int,
         child: list[str],
         robot: str,
@@ -84,7 +82,7 @@ class Command(BaseCommand):
             for one in ports:
                 check_port(host, one)
             prepare_database()
-            Processes([serve_command(host, one, server) for one in ports]).run()
+            Processes([serve_command(host, one) for one in ports]).run()
             return
         if robot != "none" and settings.HOSTED:
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
@@ -93,11 +91,8 @@ class Command(BaseCommand):
         lease = take_lease(host, port) if settings.HOSTED else None
         self._print_address(local_address(host, port))
         token = robot_token() if robot != "none" else None
-        SERVERS[server](
-            host,
-            port,
-            lambda: self._start_children(child, local_address(host, port), robot, token),
-        )
+        address = local_address(host, port)
+        run_server(host, port, lambda: self._start_children(child, address, robot, token))
         if lease is not None:
             lease.release()
 
@@ -125,7 +120,7 @@ class Command(BaseCommand):
         self.stdout.flush()
 
 
-def serve_by_daphne(host: str, port: int, on_ready: Callable[[], None]) -> None:
+def run_server(host: str, port: int, on_ready: Callable[[], None]) -> None:
     """Serve until stopped."""
     from rehab.sessions.live.server import LiveServer  # installs a reactor: not at import
 
@@ -138,25 +133,9 @@ def serve_by_daphne(host: str, port: int, on_ready: Callable[[], None]) -> None:
     ).run()
 
 
-def serve_by_uvicorn(host: str, port: int, on_ready: Callable[[], None]) -> None:
-    """Serve until stopped. Raises CommandError, with the cure, where uvicorn is not installed."""
-    try:
-        from rehab.sessions.live.uvicorn_server import UvicornLiveServer
-    except ImportError as problem:
-        raise CommandError(
-            "uvicorn is not installed. Run pip install -c constraints.txt '.[server,hosted]', or "
-            "serve by daphne."
-        ) from problem
-    UvicornLiveServer(get_default_application(), host, port, on_ready).run()
-
-
-SERVERS = {"daphne": serve_by_daphne, "uvicorn": serve_by_uvicorn}
-
-
-def serve_command(host: str, port: int, server: str) -> list[str]:
+def serve_command(host: str, port: int) -> list[str]:
     """Return the command of one of several servers."""
-    at = ["--host", host, "--port", str(port), "--server", server]
-    return [sys.executable, sys.argv[0], "serve", *at]
+    return [sys.executable, sys.argv[0], "serve", "--host", host, "--port", str(port)]
 
 
 def check_sharing(processes: int) -> None:

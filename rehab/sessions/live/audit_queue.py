@@ -24,7 +24,7 @@ from rehab.sessions.models import TrainingSession
 log = logging.getLogger(__name__)
 
 RETRY_S = 1.0
-MAX_WAITING = 10_000  # entries; newer ones are told in the server's log alone
+MAX_WAITING = 10_000  # entries; newer ones are in the server's log alone
 
 
 class PendingEntry(NamedTuple):
@@ -67,19 +67,19 @@ class AuditQueue:
                 except Error as problem:  # the training goes on
                     is_away = isinstance(problem, OperationalError | InterfaceError)
                     if self._is_ending or not is_away:
-                        log.exception("The audit log missed what sockets told it: %s", entries)
+                        log.exception("The audit log lacks entries of sockets: %s", entries)
                     else:
-                        self._keep(entries)
+                        self._requeue(entries)
                         await asyncio.sleep(RETRY_S)
         finally:
             self._write_task = None
 
-    def _keep(self, entries: list[PendingEntry]) -> None:
-        """Let entries wait that could not be written, before those that came meanwhile."""
+    def _requeue(self, entries: list[PendingEntry]) -> None:
+        """Queue entries again that could not be written, before those that came meanwhile."""
         waiting = [*entries, *self._pending]
         self._pending = waiting[:MAX_WAITING]
         if waiting[MAX_WAITING:]:
-            log.error("The audit log missed what sockets told it: %s", waiting[MAX_WAITING:])
+            log.error("The audit log lacks entries of sockets: %s", waiting[MAX_WAITING:])
 
     async def join(self) -> None:
         """Wait until all entries are written, or cannot be."""
@@ -108,7 +108,7 @@ def _store(entries: list[PendingEntry]) -> None:
 
 
 def _may_repeat(entry: AuditEntry) -> bool:
-    """Return whether an entry is a stop from a tablet, which anybody may press again and again."""
+    """Return whether an entry is a stop from a tablet, which anyone may press again and again."""
     return entry.act == Act.ROBOT_STOP and entry.by_id is None
 
 

@@ -1,24 +1,38 @@
-"""The sources and robots that are connected to this process, by station."""
+"""Sources and robots that are connected to this process."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from typing import Protocol
 
+from rehab.sessions.payloads import Message
+
 
 class ConnectedDevice(Protocol):
-    """A source or robot that is connected, with a session or without one."""
+    """A connected source or robot, with a session or without one."""
 
     @property
     def device_id(self) -> int | None:
         """The device's key."""
+
+    def queue(self, message: Message) -> None:
+        """Queue a message."""
+
+    def queue_text(self, text: str) -> None:
+        """Queue a message that is a frame's text already."""
+
+    def acknowledge(self, number: int) -> None:
+        """Queue the acknowledgment of the steps up to this one."""
+
+    def evict(self, code: int, error: str, message: str) -> None:
+        """Close its connection with an error."""
 
     def on_session_opened(self, session_id: int) -> None:
         """Attach to a session that was just created for its station, unless it has one."""
 
 
 class Devices:
-    """Sources and robots, while they are connected."""
+    """The connected sources and robots, by station."""
 
     def __init__(self) -> None:
         self._at: defaultdict[int, set[ConnectedDevice]] = defaultdict(set)
@@ -28,7 +42,7 @@ class Devices:
         self._at[station_id].add(device)
 
     def discard(self, station_id: int, device: ConnectedDevice) -> None:
-        """Forget a device that has left."""
+        """Remove a device that has left."""
         self._at[station_id].discard(device)
 
     def at(self, station_id: int) -> frozenset[ConnectedDevice]:
@@ -36,10 +50,10 @@ class Devices:
         return frozenset(self._at.get(station_id, ()))
 
     def announce(self, session_id: int, station_id: int) -> None:
-        """Tell a station's devices that a session has opened."""
+        """Notify a station's devices of a session that has opened."""
         for device in self.at(station_id):
             device.on_session_opened(session_id)
 
     def connected_ids(self) -> set[int | None]:
-        """Return the devices' keys. Any thread may ask."""
+        """Return the devices' keys. Any thread may call this."""
         return {device.device_id for there in list(self._at.values()) for device in list(there)}

@@ -12,6 +12,7 @@ from typing import Any
 from django.utils import timezone
 
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -60,13 +61,13 @@ async def run_session(
     try:
         live = await runtime.session(session_id)
         fold = live.aggregate.fold
-        await runtime.change(session_id, ChangeKind.START, None, None)
+        await runtime.order(session_id, ChangeOrder(ChangeKind.START, None, None))
         try:
             await _send_strides(live, strides(fold), pace)
         except BaseException:
-            await runtime.change(session_id, ChangeKind.ABORT, None, None)
+            await runtime.order(session_id, ChangeOrder(ChangeKind.ABORT, None, None))
             raise
-        await runtime.change(session_id, ChangeKind.FINISH, None, None)
+        await runtime.order(session_id, ChangeOrder(ChangeKind.FINISH, None, None))
         return fold
     finally:
         await runtime.drain()

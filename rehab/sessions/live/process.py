@@ -1,4 +1,4 @@
-"""The process that serves: its interpreter's settings, its end in time, its database's own log."""
+"""The process that serves: its interpreter's settings, its end in time, its database's log."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import os
 import sys
 import threading
 from collections import Counter
+from collections.abc import Collection
 from typing import Any
 
 from django.db import DatabaseError, connection
@@ -20,15 +21,16 @@ log = logging.getLogger(__name__)
 # them rare. One of 50,000 young objects takes 15 to 30 ms while 1,000 sessions begin, of 5,000 at
 # most 9 ms (docs/performance.md).
 GC_THRESHOLDS = (5_000, 500, 100)
-# How long a thread may keep the interpreter's lock while another one wants it (default 5 ms). The
+# How long a thread may hold the interpreter's lock while another one wants it (default 5 ms). The
 # event loop of daphne gives it up at each system call: while a thread computes a page, each step
 # takes so long several times (docs/performance.md#while-strangers-try-to-sign-in).
 SWITCH_S = 0.0002
 STOP_S = 30.0  # more than a stuck database may hold up the writer
+CANCEL_AGAIN_S = 0.2
 
 
 def end_in_time() -> None:
-    """End the process if stopping takes too long, and say what it waited for.
+    """End the process if stopping takes too long, and log what it waited for.
 
     Nothing acknowledged is lost by that. Called on the event loop.
     """
@@ -78,3 +80,16 @@ def move_database_log() -> None:
         log.warning("The database's log could not be moved: %s", problem)
     finally:
         connection.close()
+
+
+async def end_tasks(tasks: Collection[asyncio.Task[Any]]) -> None:
+    """Cancel tasks, again and again until all have ended; their errors are dropped.
+
+    A task may lose a cancellation: ``asyncio.wait_for`` of Python 3.11, by which redis-py sends,
+    does where what it waits for is done in the same turn of the event loop.
+    """
+    while pending := [task for task in tasks if not task.done()]:
+        for task in pending:
+            task.cancel()
+        await asyncio.wait(pending, timeout=CANCEL_AGAIN_S)
+    await asyncio.gather(*tasks, return_exceptions=True)

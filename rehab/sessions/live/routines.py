@@ -1,4 +1,4 @@
-"""What a runtime does again and again: heartbeats, sweeps, checkpoints, seals."""
+"""The periodic tasks of a runtime: heartbeats, sweeps, checkpoints, seals."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import contextvars
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from channels.db import database_sync_to_async
 from django.utils import timezone
@@ -15,12 +15,10 @@ from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.database.trouble import WORDS, Trouble
-from rehab.sessions.live.process import move_database_log
+from rehab.sessions.live.host import Host
+from rehab.sessions.live.process import end_tasks, move_database_log
 from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.instruments import LATE_S
-from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.live.session.writer import Writer
-from rehab.sessions.live.tasks import end_tasks
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
@@ -39,29 +37,18 @@ HEARTBEAT = to_text({"type": "heartbeat"})
 ROBOT_HEARTBEATS = [to_text({"type": "heartbeat", "watched": one}) for one in (False, True)]
 
 
-class Process(Protocol):
-    """What routines look after: the sessions of a process."""
-
-    loop: asyncio.AbstractEventLoop
-    sessions: dict[int, LiveSession]
-    sockets: set[Any]
-    writer: Writer
-    servers: Servers | None
-
-    async def close(self, live: LiveSession) -> None:
-        """Unload a session that nobody uses."""
-
-
 class Routines:
     """One task each: robots stop without heartbeats, so none may wait for the disk."""
 
-    def __init__(self, process: Process) -> None:
-        self._process = process
+    def __init__(self, host: Host, servers: Servers | None) -> None:
+        self._host = host
+        self._servers = servers
+        self._loop = asyncio.get_running_loop()
         self._beat = 0
         self._part = 0
-        self._trouble = Trouble.NONE  # as it was told last
+        self._trouble = Trouble.NONE  # as it was announced last
         self.tasks = [
-            process.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
+            self._loop.create_task(self._repeat(beats, work), context=contextvars.Context())
             for beats, work in (
                 (1 / PARTS, self._send_robot_heartbeats),
                 (1, self._watch_storage),
@@ -80,9 +67,9 @@ class Routines:
     async def _repeat(self, beats: float, work: Callable[[], Awaitable[None]]) -> None:
         """Call a function periodically; log its failures and go on."""
         while True:
-            due_s = self._process.loop.time() + beats * ROBOT_HEARTBEAT_S
+            due_s = self._loop.time() + beats * ROBOT_HEARTBEAT_S
             await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
-            LATE_S.observe(self._process.loop.time() - due_s)
+            LATE_S.observe(self._loop.time() - due_s)
             try:
                 await work()
             except Exception:
@@ -91,26 +78,25 @@ class Routines:
     async def _send_robot_heartbeats(self) -> None:
         """Send heartbeats to a part of the robots: to all of them within an interval."""
         self._part = (self._part + 1) % PARTS
-        for live in self._process.sessions.values():
+        for live in self._host.sessions.values():
             if live.id % PARTS == self._part and live.robot is not None:
-                live.robot.tell_text(ROBOT_HEARTBEATS[live.is_watched])
+                live.robot.queue_text(ROBOT_HEARTBEATS[live.is_watched])
 
     async def _watch_storage(self) -> None:
-        """Tell monitors, robots and the log when steps cannot be stored, and when they can."""
-        trouble = self._process.writer.trouble
+        """Report to monitors, robots and the log when steps cannot be stored, and when they can."""
+        trouble = self._host.writer.trouble
         if trouble == self._trouble:
             return
         self._trouble = trouble
         log.error("%s", WORDS.get(trouble, "Steps are stored again."))
-        for live in self._process.sessions.values():
+        for live in self._host.sessions.values():
             live.announce_storage(timezone.now())
 
     async def _send_page_heartbeats(self) -> None:
         """Send heartbeats to the pages of some sessions: of all of them within an interval."""
         self._beat = (self._beat + 1) % SWEEP
-        servers = self._process.servers
-        followed = () if servers is None else servers.followed.sessions.values()
-        for live in (*self._process.sessions.values(), *followed):
+        followed = () if self._servers is None else self._servers.followed.sessions.values()
+        for live in (*self._host.sessions.values(), *followed):
             if live.id % SWEEP != self._beat or not live.feed.subscribers:
                 continue
             presence = live.presence(timezone.now())
@@ -124,17 +110,13 @@ class Routines:
                     subscriber.queue_heartbeat(HEARTBEAT)
 
     async def _close_idle(self) -> None:
-        for live in list(self._process.sessions.values()):
-            if (
-                self._process.sessions.get(live.id) is live
-                and live.is_idle
-                and not live.recently_used
-            ):
-                await self._process.close(live)
+        for live in list(self._host.sessions.values()):
+            if self._host.sessions.get(live.id) is live and live.is_idle and not live.recently_used:
+                await self._host.close(live)
             live.recently_used = False  # who gets it now has until the next sweep to subscribe
 
     async def _checkpoint_log(self) -> None:
-        await self._process.loop.run_in_executor(None, move_database_log)
+        await self._loop.run_in_executor(None, move_database_log)
 
     async def _seal_logs(self) -> None:
         await database_sync_to_async(seal_logs)(timezone.now())
@@ -144,7 +126,7 @@ class Routines:
 
         A few sockets at a time: steps wait while another thread has the interpreter.
         """
-        sockets = [socket for socket in self._process.sockets if socket.actor is not None]
+        sockets = [socket for socket in self._host.sockets if socket.actor is not None]
         for first in range(0, len(sockets), CHECKED_SOCKETS):
             if first:
                 await asyncio.sleep(CHECK_PAUSE_S)

@@ -14,28 +14,22 @@ from django.conf import settings
 from django.db import DatabaseError
 
 from rehab.people.models import User
-from rehab.sessions.live import sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
-from rehab.sessions.live.orders import SessionOrders
+from rehab.sessions.live.orders import Order, carry_out
+from rehab.sessions.live.recovery import Recovery
 from rehab.sessions.live.routines import Routines
-from rehab.sessions.live.servers.handover import Handover
 from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import Loader
 from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.live.station_robots import StationRobots
-from rehab.sessions.live.supervisor import Supervisor
-from rehab.sessions.log import Remark
+from rehab.sessions.live.supervisor import Supervisor, local_address, run_source
 from rehab.sessions.payloads import Message
-from rehab.training.changes import (
-    OPEN_STATES,
-    ChangeValue,
-    State,
-)
+from rehab.training.changes import OPEN_STATES, State
 from robot.wire.close_codes import CloseCode
 
 log = logging.getLogger(__name__)
@@ -58,21 +52,20 @@ class Runtime:
         self.writer = Writer(self._call)
         self.devices = Devices()
         self.robots = StationRobots(self.sessions)
-        self.orders = SessionOrders(self)
-        self.handover = Handover(self)
+        self.recovery = Recovery(self)
         self.audit_queue = AuditQueue()
         self.sockets: set[Any] = set()  # closed when the server stops
         self.requests: set[asyncio.Task[None]] = set()  # of pages, under way
         self.supervisor = Supervisor(settings.DATA_DIR / "children.json")
         # Where child processes connect.
-        self.address = sources.local_address(settings.HOST, settings.PORT)
+        self.address = local_address(settings.HOST, settings.PORT)
         self._loader = Loader()
         self._opening: dict[int, asyncio.Task[None]] = {}
         self._held: set[int] = set()  # sessions that this process may be the owner of
         own = lease.held()
         # The other servers on the database, where there may be any.
-        self.servers = Servers(self, own) if own is not None and own.shares else None
-        self.routines = Routines(self)
+        self.servers = Servers(self, self.recovery, own) if own is not None and own.shares else None
+        self.routines = Routines(self, self.servers)
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
@@ -101,9 +94,9 @@ class Runtime:
         return live
 
     async def settled_session(self, session_id: int) -> LiveSession:
-        """Return a live session while nobody is subscribing. Raises what ``session`` does.
+        """Return a live session while none is subscribing to it. Raises what ``session`` does.
 
-        Until the next ``await`` it is the one in memory: what is attached to it hears of its end.
+        Until the next ``await`` it is the one in memory: what attaches to it learns of its end.
         """
         while True:
             live = await self.session(session_id)
@@ -126,7 +119,7 @@ class Runtime:
         return await self.servers.followed.follow(session_id)
 
     def find(self, session_id: int) -> LiveSession | None:
-        """Return a session that is in memory, if it is: this process's, or one that it follows."""
+        """Return a session if it is in memory: this process's own, or one that it follows."""
         followed = {} if self.servers is None else self.servers.followed.sessions
         return self.sessions.get(session_id) or followed.get(session_id)
 
@@ -148,20 +141,20 @@ class Runtime:
         loaded = await self._loader.load(session_id)
         aggregate, stopped = loaded.aggregate, loaded.robot_stopped
         live = LiveSession(aggregate, self.writer, loaded.recent, self.drop, robot_stopped=stopped)
-        await self.handover.pause_orphaned(live, loaded.owned_before)
-        self.robots.inherit_stops(live)
+        await self.recovery.pause_orphaned(live, loaded.owned_before)
+        self.robots.restore_stops(live)
         self.sessions[session_id] = live
         if self.servers is not None:
             self.servers.followed.leave(session_id)  # it was another's
         if live.aggregate.fold.state in OPEN_STATES and not self.draining:
-            await sources.run_source(self.supervisor, aggregate.session, self.address)
+            await run_source(self.supervisor, aggregate.session, self.address)
 
     def drop(self, live: LiveSession, problem: Exception) -> None:
         """Drop a session that could not be written: its fold is ahead of its log.
 
         A stop of the robot stays in force.
         """
-        self.robots.bequeath_stop(live)
+        self.robots.pass_stop_on(live)
         if self.sessions.get(live.id) is live:
             log.error("Session %s is rebuilt from its log: %s", live.id, problem)
             del self.sessions[live.id]
@@ -176,38 +169,29 @@ class Runtime:
             if getattr(socket, "live", None) is live:
                 socket.close_soon(CloseCode.RESTARTING)
 
-    async def change(self, session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
-        """Apply a change, here or where the session is; committed when this returns.
+    async def order(self, session_id: int, order: Order) -> None:
+        """Carry out an order, here or where the session is; committed when this returns.
 
         Raises InvalidSetting if it is refused and NotStored if it could not be committed.
         """
         try:
-            await self.orders.change(session_id, kind, value, by)
+            await carry_out(self, session_id, order)
         except OwnedElsewhere as problem:
             if self.servers is None:
                 raise
-            await self.servers.change(problem.owner, session_id, kind, value, by)
+            await self.servers.order(problem.owner, session_id, order)
 
-    async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
-        """Log a remark; committed when this returns. Raises what ``change`` raises."""
-        try:
-            await self.orders.remark(session_id, what, value, by)
-        except OwnedElsewhere as problem:
-            if self.servers is None:
-                raise
-            await self.servers.remark(problem.owner, session_id, what, value, by)
-
-    def stop_robots(self, live: LiveSession, by: User | None, told: Message) -> None:
+    def stop_robots(self, live: LiveSession, by: User | None, details: Message) -> None:
         """Stop the robot of a session of this process, and of the others there, on any server.
 
-        ``told``: which device stopped it, if it was no person.
+        ``details``: which device stopped it, if it was no person.
         """
-        self.robots.stop(live, by, told, again=self.servers is not None)
+        self.robots.stop(live, by, details, again=self.servers is not None)
         if self.servers is not None and live.station_id is not None:
-            self.servers.tell_of_stop(live.station_id, by, told)
+            self.servers.announce_stop(live.station_id, by, details)
 
     def announce(self, session_id: int, station_id: int | None) -> None:
-        """Tell a station's devices, wherever they are, that a session has opened."""
+        """Notify a station's devices, at any server, of a session that has opened."""
         if station_id is None:
             return
         self.devices.announce(session_id, station_id)
@@ -219,12 +203,12 @@ class Runtime:
 
         Sessions that a process handed on when it was stopped go on as they are.
         """
-        paused = await self.handover.recover()
+        paused = await self.recovery.recover()
         self.is_ready = True
         return paused
 
     async def close(self, live: LiveSession) -> None:
-        """Unload a session that nobody uses; it can be rebuilt from its log."""
+        """Unload a session that is not in use; it can be rebuilt from its log."""
         if live.aggregate.fold.state is State.RUNNING:
             return  # its source may reconnect
         self.sessions.pop(live.id, None)
@@ -256,9 +240,9 @@ class Runtime:
 
 
 async def _finish(*work: Awaitable[Any]) -> None:
-    """Wait until work is done, but not for long.
+    """Wait until work is done, for FINISH_S at most.
 
-    A client that does not listen or a query that hangs must not keep sessions from being handed on.
+    An unresponsive client or a hanging query must not keep sessions from being handed on.
     """
     await asyncio.wait([asyncio.gather(*work, return_exceptions=True)], timeout=FINISH_S)
 

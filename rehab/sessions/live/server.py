@@ -17,8 +17,8 @@ from twisted.internet import defer, reactor
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
-from rehab.sessions.live.tasks import end_tasks
 from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
 from robot.wire.limits import MAX_FRAME_BYTES
 
@@ -97,9 +97,9 @@ class LiveServer(Server):  # type: ignore[misc]
     def _begin(self) -> None:
         # The reactor runs before its event loop does.
         loop = asyncio.get_event_loop()
-        loop.call_soon(lambda: self._keep(loop.create_task(self._start())))
+        loop.call_soon(lambda: self._hold(loop.create_task(self._start())))
 
-    def _keep(self, task: asyncio.Task[None]) -> None:
+    def _hold(self, task: asyncio.Task[None]) -> None:
         self._starting = task  # tasks without a reference may be collected
 
     async def _start(self) -> None:

@@ -28,27 +28,27 @@ class StationRobots:
         self._unlogged_stops: dict[str, RobotStop] = {}
 
     def stop(
-        self, live: LiveSession, by: User | None, told: Message, *, again: bool = False
+        self, live: LiveSession, by: User | None, details: Message, *, again: bool = False
     ) -> None:
         """Stop the robot of a session, and of the others at its station.
 
-        ``told``: which device stopped it, if it was no person. ``again``: where the robot is
-        stopped already, it is stored still, if another server has armed it meanwhile.
+        ``details``: which device stopped it, if it was no person. ``again``: where the robot is
+        stopped already, the stop is stored all the same if another server has armed it meanwhile.
         """
-        live.robot_orders.stop(by, timezone.now(), told, again=again)
+        live.robot_orders.stop(by, timezone.now(), details, again=again)
         for session in self._others_at_location_of(live):
-            session.robot_orders.stop(by, timezone.now(), told)
+            session.robot_orders.stop(by, timezone.now(), details)
 
-    def stop_at(self, station_id: int, by: User | None, told: Message) -> None:
-        """Stop the robot of a station, as another server says."""
+    def stop_at(self, station_id: int, by: User | None, details: Message) -> None:
+        """Stop the robot of a station, as another server asks."""
         for session in list(self._sessions.values()):
             if session.station_id == station_id:
-                session.robot_orders.stop(by, timezone.now(), told)
+                session.robot_orders.stop(by, timezone.now(), details)
 
     async def stop_as_stored(
         self, find_stopped: Callable[[Collection[int]], Awaitable[Collection[int]]]
     ) -> None:
-        """Stop the robots whose stop was stored by another server, and not heard here.
+        """Stop the robots whose stop was stored by another server, and did not arrive here.
 
         What is armed, or was while the database was read, is left as it is.
         """
@@ -75,13 +75,13 @@ class StationRobots:
         """Pass on that a person holds a button to drive the robot to its mark."""
         live = self._sessions.get(session_id)
         if live is not None and live.robot is not None:
-            live.robot.tell({"type": "drive", **drive})
+            live.robot.queue({"type": "drive", **drive})
 
-    def inherit_stops(self, live: LiveSession) -> None:
-        """Keep robot stops that are not logged yet in force in a session that was just loaded."""
-        kept = self._unlogged_stops.pop(live.location, None)
-        if kept is not None:
-            live.robot_orders.stop(*kept)
+    def restore_stops(self, live: LiveSession) -> None:
+        """Apply robot stops that are not logged yet to a session that was just loaded."""
+        stop = self._unlogged_stops.pop(live.location, None)
+        if stop is not None:
+            live.robot_orders.stop(*stop)
         for other in self._others_at_location_of(live):
             orders = other.robot_orders
             if orders.is_stopped and orders.unlogged_stop is not None:
@@ -89,8 +89,8 @@ class StationRobots:
             elif orders.is_stopped:  # committed since the log was read
                 live.robot_orders.is_stopped = True
 
-    def bequeath_stop(self, live: LiveSession) -> None:
-        """Keep the stop of a session that is dropped before it was logged.
+    def pass_stop_on(self, live: LiveSession) -> None:
+        """Pass the stop of a session on that is dropped before the stop was logged.
 
         Another session of the location has it from now on, or the next one that is loaded.
         """

@@ -1,7 +1,7 @@
 """Supervises child processes that end with the server: simulated patients, recordings, robots.
 
-A child's standard input is a pipe that nobody writes to. When the server ends, however it ends, the
-pipe closes; children that GARRY brings along take that as their end.
+A child's standard input is a pipe that stays empty. When the server ends, however it ends, the pipe
+closes; children that GARRY brings along take that as their end.
 """
 
 from __future__ import annotations
@@ -11,11 +11,18 @@ import contextlib
 import json
 import logging
 import os
+import sys
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from asgiref.sync import sync_to_async
+
+from rehab.sessions.models import TrainingSession
+from rehab.stations.builtin import issue_builtin_token
+from rehab.stations.models import Device
 
 log = logging.getLogger(__name__)
 
@@ -24,8 +31,8 @@ MAX_BACKOFF_S = 30.0
 STABLE_S = 60.0  # after so long without a failure the backoff starts again
 STOP_S = 5.0
 CHUNK = 64 * 1024
-MAX_LINE_BYTES = 1200  # kept of a line
-MAX_LINE_CHARS = 300  # kept of a line in the report
+MAX_LINE_BYTES = 1200  # stored of a line
+MAX_LINE_CHARS = 300  # of a line in the report
 
 
 @dataclass
@@ -116,7 +123,7 @@ class Supervisor:
             try:
                 status = await self._run(child, environment)
             except Exception as problem:  # an error of ours: go on supervising
-                log.exception("%s could not be looked after", child.name)
+                log.exception("%s could not be supervised", child.name)
                 status = repr(problem)
             if status == 0:
                 child.state = "done"
@@ -179,7 +186,7 @@ class Supervisor:
 
 
 async def _read_output(output: asyncio.StreamReader, words: deque[str]) -> None:
-    """Read a child's output to its end and keep the beginnings of its last lines."""
+    """Read a child's output to its end and store the beginnings of its last lines."""
     line = b""
     while chunk := await output.read(CHUNK):
         *ended, line = (line + chunk).split(b"\n")
@@ -202,3 +209,29 @@ async def _end(process: asyncio.subprocess.Process) -> None:
         if not ended.done():
             process.kill()
         await ended
+
+
+def local_address(host: str, port: int) -> str:
+    """Return the address by which this machine reaches a server that listens at ``host``."""
+    if host in {"0.0.0.0", "::"}:  # noqa: S104 (only compared)
+        host = "127.0.0.1"
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def source_name(session_id: int) -> str:
+    """Return the name of a session's source among the child processes."""
+    return f"source of session {session_id}"
+
+
+async def run_source(supervisor: Supervisor, session: TrainingSession, server: str) -> None:
+    """Start the source of ``session.source_args``, unless there is none or it runs already.
+
+    ``server``: the address of this server.
+    """
+    name = source_name(session.pk)
+    if not session.source_args or session.station is None or name in supervisor.children:
+        return
+    token = await sync_to_async(issue_builtin_token)(session.station, Device.Kind.SOURCE)
+    command = [sys.executable, "-m", "rehab.sources", *session.source_args, "--child", "--resume"]
+    place = ["--server", server, "--session", str(session.pk)]
+    supervisor.start(name, [*command, *place], {"GARRY_TOKEN": token}, once=True)

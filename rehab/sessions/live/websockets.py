@@ -36,7 +36,7 @@ for module in (websocket_protocol, twisted_websocket):
 class InboundQueue(asyncio.Queue[dict[str, Any]]):
     """The messages of one client that wait for the application, limited in bytes.
 
-    Daphne reads on and keeps everything: a stranger who was still being looked up could fill the
+    Daphne reads on without a limit: a client that is still being authenticated could fill the
     memory. Here reading pauses, and TCP makes the client wait.
     """
 

@@ -1,19 +1,15 @@
-"""Text frames past the servers' layers: whole, in every length, and nothing else taken for one."""
+"""Text frames past the server's layers: whole, in every length, and nothing else taken for one."""
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 import pytest
 from autobahn.websocket.protocol import WebSocketProtocol as AutobahnProtocol
 from daphne.ws_protocol import WebSocketProtocol as DaphneProtocol
 from hypothesis import given
 from hypothesis import strategies as st
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame, Opcode
-from websockets.server import ServerProtocol
 
-from rehab.sessions.live.protocol.frames import FrameEdges, read_text_frame, text_frame
+from rehab.sessions.live.protocol.frames import read_text_frame, text_frame
 
 SIZES = [1, 125, 126, 127, 65_535]
 
@@ -57,32 +53,12 @@ def test_all_else_is_left_to_the_server(data):
     assert read_text_frame(data) is None
 
 
-@given(
-    st.lists(st.tuples(st.sampled_from([*SIZES, 0]), st.booleans()), min_size=1, max_size=4),
-    st.lists(st.integers(min_value=0), max_size=8),
-)
-def test_the_edges_of_frames_are_known_in_any_pieces(frames, cuts):
-    whole = [a_frame(Opcode.TEXT, b"x" * size, masked=masked) for size, masked in frames]
-    stream, edges_at = b"".join(whole), {0}
-    for index in range(len(whole)):
-        edges_at.add(len(b"".join(whole[: index + 1])))
-    edges = FrameEdges()
-    places = sorted({0, len(stream), *(cut % len(stream) for cut in cuts)})
-    for begin, end in pairwise(places):
-        edges.pass_by(stream[begin:end])
-        assert edges.is_between_frames == (end in edges_at)
-
-
-def test_the_libraries_still_have_what_is_overridden():
+def test_daphne_and_autobahn_still_have_what_is_overridden():
     """A name that is gone there would never be called here."""
     assert {"_dataReceived", "sendData", "_cancelAutoPingTimeoutCall"} <= vars(
         AutobahnProtocol
     ).keys()
     assert "onMessage" in vars(DaphneProtocol)
-    ours = {"send_receive_event_to_app", "receive", "run_asgi", "data_received"}
-    ours |= {"send_keepalive_ping", "schedule_ping"}
-    assert ours <= vars(WebSocketsSansIOProtocol).keys()
-    assert {"current_size"} <= vars(ServerProtocol()).keys()
 
 
 def test_a_text_of_any_letters_is_whole():

@@ -10,9 +10,8 @@ from rehab.sessions.live.database.owners import release
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
-from rehab.training.changes import ChangeKind
 from rehab.training.fold import SessionFold
-from tests.support.callers import a_step, numbers, restart
+from tests.support.callers import a_step, change, numbers, restart
 
 pytestmark = pytest.mark.postgres
 
@@ -92,9 +91,9 @@ async def test_a_logs_end_is_noted_with_changes_and_at_a_stop_and_never_lowered(
     source = await place.source().dial()
     await source.hello()
     await source.walk(4.0, 4.0)
-    await runtimes.current().change(session.pk, ChangeKind.PAUSE, None, None)
+    await change(session, "pause")
     assert await noted() == 2
-    await runtimes.current().change(session.pk, ChangeKind.RESUME, None, None)
+    await change(session, "resume")
     await source.walk(4.0)
     await restart()
     assert await noted() == 3

@@ -12,7 +12,7 @@ import pytest
 from channels.layers import InMemoryChannelLayer, channel_layers
 
 from rehab.sessions.live.servers import intercom as intercoms
-from rehab.sessions.live.servers.intercom import Intercom, Unheard
+from rehab.sessions.live.servers.intercom import Intercom, NoAnswer
 
 
 class RecordingLayer(InMemoryChannelLayer):
@@ -61,7 +61,7 @@ async def test_a_question_is_heard_and_answered(room):
     one, _other = room.open("one"), room.open("other")
     assert (await one.ask("other", "order", {"order": "arm"}))["done"] == "arm"
     assert room.heard == [("other", "arm")]
-    with pytest.raises(Unheard):
+    with pytest.raises(NoAnswer):
         await one.ask("nobody", "order", {"order": "arm"})
 
 
@@ -85,9 +85,9 @@ async def test_an_order_that_could_not_be_sent_in_time_is_dropped(room, monkeypa
     monkeypatch.setattr(intercoms, "PAUSE_S", 0.05)
     one, _other = room.open("one"), room.open("other")
     room.layer.fails = True
-    one.tell("other", "order", {"order": "lost with the layer"})
-    one.tell("other", "order", {"order": "drive"}, within_s=0.02)
-    one.tell("other", "order", {"order": "change"})
+    one.send("other", "order", {"order": "lost with the layer"})
+    one.send("other", "order", {"order": "drive"}, within_s=0.02)
+    one.send("other", "order", {"order": "change"})
     await asyncio.sleep(0.02)
     room.layer.fails = False
     await asyncio.sleep(0.1)
@@ -105,6 +105,6 @@ async def test_a_server_ends_where_its_layer_loses_a_cancellation(room, monkeypa
 
     monkeypatch.setattr(room.layer, "send", send)
     one = room.open("one")
-    one.tell("other", "order", {"order": "arm"})
+    one.send("other", "order", {"order": "arm"})
     await sending.wait()
     await asyncio.wait_for(one.close(), 5)

@@ -69,7 +69,7 @@ def test_a_step_is_read_at_once_as_it_is_in_its_turn(changed, extra):
     at_once = read_single_step(text)
     if at_once is None:
         return
-    assert repr(at_once) == outcome(lambda text: read_steps(read_frame(text))[0], text)
+    assert repr(at_once) == outcome(lambda text: read_steps(read_frame(text))[0][0], text)
 
 
 def test_a_usual_step_is_read_at_once():
@@ -78,6 +78,24 @@ def test_a_usual_step_is_read_at_once():
     assert step is not None
     assert step.extra == extra
     assert read_single_step(json.dumps({"type": "steps", "steps": [STEP]})) is None
+
+
+@pytest.mark.parametrize(
+    ("changed", "cure"),
+    [
+        ({"number": 0}, '"number" is a whole number of 1 or more.'),
+        ({"side": None}, '"side" is one of: left, right.'),
+        ({"value": "4"}, '"value" is a finite number, or null.'),
+        ({"late": 1}, '"late" is true or false.'),
+        ({"reasons": ["it slipped"]}, '"reasons" is a list of up to 8 codes'),
+        ({"extra": {"n": 2**64}}, "too many digits: send it as a decimal"),
+    ],
+    ids=str,
+)
+def test_what_a_step_has_wrong_is_named_with_its_cure(changed, cure):
+    with pytest.raises(BadFrame) as refused:
+        read_steps(STEP | changed)
+    assert cure in str(refused.value)
 
 
 @given(

@@ -90,7 +90,7 @@ async def test_a_stop_holds_over_robots_servers_and_sessions(place, begun, ready
     assert (await monitor.watch())["robot_stopped"] is True
     await monitor.say(ARM)
     await robot.hear("arm")
-    assert (await robot.overhear()) == []
+    assert {one["type"] for one in await robot.overhear()} <= {"heartbeat"}
     for caller in (robot, monitor):
         await caller.hang_up()
     await restart()

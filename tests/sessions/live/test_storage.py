@@ -106,7 +106,7 @@ async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_th
     monkeypatch.setattr(settings, "METRICS_TOKEN", "a token")
     assert "garry_ready 1.0" in await figures()
     with monkeypatch.context() as cut_off:
-        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True, deaf_s=0.0))
+        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True, silent_s=0.0))
         assert "cut off" in (await health("/readyz"))[1]
         assert "garry_ready 0.0" in await figures()
     with monkeypatch.context() as expired:

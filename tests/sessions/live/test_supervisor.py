@@ -118,7 +118,7 @@ async def test_a_fault_of_ours_leaves_a_child_supervised_and_no_stop_undone(
     child = children.start("robot", python("import time; time.sleep(60)"))
     await until(lambda: len(told) == 2)
     assert (child.state, child.restarts) == ("running", 1)
-    assert "robot could not be looked after" in caplog.text
+    assert "robot could not be supervised" in caplog.text
 
     async def stop(name):
         raise RuntimeError("another fault")

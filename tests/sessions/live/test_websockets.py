@@ -110,10 +110,9 @@ def test_frames_of_every_length_are_whole(said):
 
 
 @pytest.mark.server
-@pytest.mark.parametrize("name", ["daphne", "uvicorn"])
-def test_a_real_server_answers(tmp_path, name):
-    """The versions of the servers, and of what is below, still have what the overrides rest on."""
-    with serve(tmp_path, "--server", name) as server:
+def test_a_real_server_answers(tmp_path):
+    """The versions of daphne, and of what is below, still have what the overrides rest on."""
+    with serve(tmp_path) as server:
         with connect(f"ws://127.0.0.1:{server.port}/ws/source/") as socket:
             socket.send(json.dumps({"type": "hello", "token": "é" * 40}))
             assert "Bearer …" in json.loads(socket.recv(10))["message"]

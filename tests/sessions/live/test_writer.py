@@ -207,7 +207,7 @@ async def test_one_report_that_fails_keeps_no_other_from_its_source(bench, aggre
     bench.stall.end()
     await until_done(bench, 4)
     assert bench.done[-1] == (aggregates[1].session.pk, None)
-    assert f"Session {session.pk} could not be told" in caplog.text
+    assert f"Session {session.pk} could not be notified" in caplog.text
 
 
 async def test_an_owner_that_failed_is_not_kept_for_ever(bench, aggregates, monkeypatch):

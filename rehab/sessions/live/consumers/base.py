@@ -111,7 +111,9 @@ class Socket(AsyncWebsocketConsumer):
             return False
         try:
             taken = self.handle_now(text)
-        except Exception:  # whatever it was, the usual way meets it too, and tells the client
+        except (
+            Exception
+        ):  # whatever it was, the usual way meets it too, and reports it to the client
             return False
         if taken:
             self._spend_budget()
@@ -136,7 +138,7 @@ class Socket(AsyncWebsocketConsumer):
             )
 
     async def _guard(self, work: Awaitable[None]) -> None:
-        """Await the work; send its error to the client, so that nobody else is affected."""
+        """Await the work; send its error to the client, so that no other is affected."""
         try:
             await work
         except BadFrame as problem:

@@ -18,9 +18,9 @@ from rehab.sessions.live.auth import (
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.protocol.messages import read_frame
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
@@ -30,7 +30,7 @@ from robot.wire.frames import BadFrame
 
 
 class DeviceSocket(Socket):
-    """The ``Peer`` of one device in its station's session.
+    """The ``ConnectedDevice`` of one device in its station's session.
 
     Subclasses set the ``kind`` of device and the attribute (``slot``) of the session it takes.
     """
@@ -147,7 +147,7 @@ class DeviceSocket(Socket):
             raise CloseSocket(CloseCode.ELSEWHERE, "elsewhere", str(problem), **more) from None
         except DamagedLog as problem:
             raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
-        other: Peer | None = getattr(live, self.slot)
+        other: ConnectedDevice | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:
                 raise CloseSocket(
@@ -163,13 +163,13 @@ class DeviceSocket(Socket):
         live.announce_presence(timezone.now())
         await self.on_attach(live)
 
-    def tell(self, message: Message) -> None:
+    def queue(self, message: Message) -> None:
         """Queue a message for the device."""
-        self.outbox.tell(message)
+        self.outbox.queue(message)
 
-    def tell_text(self, text: str) -> None:
+    def queue_text(self, text: str) -> None:
         """Queue a message that is a frame's text already."""
-        self.outbox.tell_text(text)
+        self.outbox.queue_text(text)
 
     def acknowledge(self, number: int) -> None:
         """Queue the acknowledgment of the steps up to this one."""

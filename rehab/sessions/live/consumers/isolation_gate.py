@@ -6,13 +6,13 @@ from typing import Any
 
 from rehab.sessions.live import runtime as runtimes
 
-WATCHED = ("/healthz", "/readyz", "/metrics")  # what watchdogs ask, of this server and no other
+WATCHED = ("/healthz", "/readyz", "/metrics")  # for watchdogs, which ask this server and no other
 STATUS = 504  # deploy/nginx: the proxy asks another server
 WORDS = b"This server is cut off from its database. Try again: another one answers.\n"
 
 
 class IsolationGate:
-    """An ASGI application that answers nobody but watchdogs while this server is cut off."""
+    """An ASGI application that answers watchdogs alone while this server is cut off."""
 
     def __init__(self, inner: Any) -> None:
         self._inner = inner
@@ -28,13 +28,10 @@ class IsolationGate:
         ):
             await self._inner(scope, receive, send)
             return
-        kind = scope["type"]
-        if kind == "websocket":
+        if scope["type"] == "websocket":
             await receive()
-            if "websocket.http.response" not in scope.get("extensions", {}):
-                await send({"type": "websocket.close"})  # daphne: the proxy sees 403
-                return
-            kind = "websocket.http"
+            await send({"type": "websocket.close"})  # the proxy sees 403
+            return
         headers = [(b"content-type", b"text/plain"), (b"retry-after", b"1")]
-        await send({"type": f"{kind}.response.start", "status": STATUS, "headers": headers})
-        await send({"type": f"{kind}.response.body", "body": WORDS})
+        await send({"type": "http.response.start", "status": STATUS, "headers": headers})
+        await send({"type": "http.response.body", "body": WORDS})

@@ -44,7 +44,7 @@ class RobotConsumer(DeviceSocket):
             case "report":
                 self._handle_report(message, text)
             case "incident":
-                self._keep_incident(read_incident(message))
+                self._queue_incident(read_incident(message))
             case _:
                 raise BadFrame('A robot sends "hello", "report" and "incident".')
 
@@ -81,12 +81,12 @@ class RobotConsumer(DeviceSocket):
         if self.live is None:
             return
         if report.get("kind") == "stop":  # a sensor or its button: a person has to check it
-            told = {"device": self.device_id, "reason": report["reason"]}
-            self.runtime.stop_robots(self.live, None, told)
+            details = {"device": self.device_id, "reason": report["reason"]}
+            self.runtime.stop_robots(self.live, None, details)
         else:
             self.live.robot_orders.record_report(report, timezone.now())
 
-    def _keep_incident(self, incident: Incident) -> None:
+    def _queue_incident(self, incident: Incident) -> None:
         """Have an incident stored, if it is of the present session; nothing waits for it."""
         if self.live is None or self.live.id != incident.session:
             return
@@ -97,7 +97,7 @@ class RobotConsumer(DeviceSocket):
         self.start(self._store_incident(self.live, incident, timezone.now()))
 
     async def _store_incident(self, live: LiveSession, incident: Incident, now: datetime) -> None:
-        """Store what a robot recorded around a stop, and tell the pages where it is."""
+        """Store what a robot recorded around a stop, and announce it to the pages."""
         at = now - timedelta(seconds=incident.ago_s)
         try:
             stored = await database_sync_to_async(store_incident)(

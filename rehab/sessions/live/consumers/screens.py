@@ -22,15 +22,16 @@ from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.orders import ArmOrder, ChangeOrder, Order, RemarkOrder, StopOrder
 from rehab.sessions.live.protocol.backlog import read_backlog
 from rehab.sessions.live.protocol.messages import (
     read_after,
     read_change,
     read_frame,
-    read_order,
     read_remark,
     read_seen,
 )
+from rehab.sessions.live.robot_permissions import RobotOrder, read_robot_order
 from rehab.sessions.live.servers.following import FollowedSession
 from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
@@ -46,9 +47,9 @@ from robot.wire.frames import BadFrame, read_name, read_number, read_whole
 log = logging.getLogger(__name__)
 
 # For programs; pages have their own words.
-_UNHEARD = {
-    "stop": "The stop was not heard. If the robot moves, use its own switch.",
-    "arm": "The order was not heard. Try again.",
+_NOT_DELIVERED = {
+    "stop": "The stop did not arrive. If the robot moves, use its own switch.",
+    "arm": "The order did not arrive. Try again.",
 }
 
 
@@ -60,7 +61,6 @@ class ScreenConsumer(Socket):
     devices: ClassVar[frozenset[str]] = frozenset()
     requester: ClassVar[Requester]  # of changes, for people who are signed in
     pause_reason: ClassVar[PauseReason]
-    robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
     subscriber: Subscriber | None = None
     language = settings.LANGUAGE_CODE
 
@@ -88,7 +88,7 @@ class ScreenConsumer(Socket):
             raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
-            live.tablet_heard_at = timezone.now()
+            live.tablet_seen_at = timezone.now()
         self.language = live.aggregate.fold.plan.language  # what the patient reads
         if self.audience is Audience.MONITOR and isinstance(self.actor, User):
             theirs = await database_sync_to_async(language_of)(self.actor)
@@ -133,19 +133,19 @@ class ScreenConsumer(Socket):
         self, live: LiveSession, subscriber: Subscriber, after: int, until: int
     ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
+        plan, announced = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
         while after < until:
             steps = await read_backlog(live.id, after, until)
             if not steps:
                 return
-            entries = (history_entry(self.audience, plan, step, told) for step in steps)
+            entries = (history_entry(self.audience, plan, step, announced) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
                 await subscriber.send_backlog(texts)
             after = steps[-1].number
 
     def handle_now(self, text: str) -> bool:
-        """Note what the page has seen, as most frames say; all else takes its turn."""
+        """Note what the page confirms, as most frames do; all else takes its turn."""
         frame = read_seen(text)
         if frame is not None:
             self._confirm(frame)
@@ -155,7 +155,7 @@ class ScreenConsumer(Socket):
         if self.subscriber is not None:
             self.subscriber.confirm(frame)
         if isinstance(self.actor, Device) and self.live is not None:
-            self.live.tablet_heard_at = timezone.now()
+            self.live.tablet_seen_at = timezone.now()
 
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame of a page."""
@@ -168,10 +168,8 @@ class ScreenConsumer(Socket):
                 self._confirm(read_whole(message, "frame", low=0))
             case "change":
                 await self._change(message)
-            case "robot" if message.get("order") == "drive":
-                self._drive_robot(message)
             case "robot":
-                await self._order_robot(message)
+                self._order_robot(message)
             case "remark":
                 await self._remark(message)
             case _:
@@ -193,7 +191,7 @@ class ScreenConsumer(Socket):
         if (self.requester if by else Requester.TABLET) not in CONTROLS[kind].requesters:
             await self._refuse(request_id, "refused", "That is changed on the therapist's page.")
             return
-        self.run_to_end(self._answer(request_id, self.runtime.change(live.id, kind, value, by)))
+        self._order(request_id, live, ChangeOrder(kind, value, by))
 
     async def _remark(self, message: Message) -> None:
         request_id = read_name(message, "id")
@@ -202,13 +200,17 @@ class ScreenConsumer(Socket):
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
             await self._refuse(request_id, "refused", "That is noted on the therapist's page.")
             return
-        self.run_to_end(self._answer(request_id, self.runtime.remark(live.id, what, value, by)))
+        self._order(request_id, live, RemarkOrder(what, value, by))
+
+    def _order(self, request_id: str, live: LiveSession, order: Order) -> None:
+        """Have an order carried out beside the socket, whose next frame may be a stop.
+
+        It is carried out to its end even if the page closes.
+        """
+        self.run_to_end(self._answer(request_id, self.runtime.order(live.id, order)))
 
     async def _answer(self, request_id: str, work: Awaitable[None]) -> None:
-        """Answer a request once it is stored or refused.
-
-        Runs beside the socket, whose next frame may be a stop, and to its end if the page closes.
-        """
+        """Answer a request once it is stored or refused."""
         try:
             await work
         except InvalidSetting as problem:
@@ -223,42 +225,46 @@ class ScreenConsumer(Socket):
         with override(self.language):
             return format_refusal(problem)
 
-    async def _order_robot(self, message: Message) -> None:
-        """Stop the robot for anyone; let it move again for people only."""
-        order = read_order(message, *self.robot_orders)
-        live, by = self._open_session(), self.actor if isinstance(self.actor, User) else None
-        device_id = self.actor.pk if isinstance(self.actor, Device) else None
+    def _order_robot(self, message: Message) -> None:
+        """Stop the robot, let it move again, or drive it to its mark."""
+        wanted = read_robot_order(message, self.audience, self.actor)
+        if wanted is RobotOrder.DRIVE:
+            self._drive_robot(message)
+            return
+        live, actor = self._open_session(), self.actor
+        order: ArmOrder | StopOrder
+        if isinstance(actor, User):
+            order = ArmOrder(actor) if wanted is RobotOrder.ARM else StopOrder(actor)
+        else:
+            order = StopOrder(None, {"device": actor.pk} if actor is not None else {})
         if isinstance(live, FollowedSession):
-            self.run_to_end(self._ask_owner(live, order, by, device_id))
-        elif order == "stop":
-            told = {} if device_id is None else {"device": device_id}
-            self.runtime.stop_robots(live, by, told)
-        elif by is not None:  # in a task, so that a stop meanwhile does not wait
-            self.start(self.runtime.robots.arm(live, by))
-        if by is not None or order == "stop":  # queued: no robot waits for the audit log
-            act = Act(f"robot_{order}")
-            self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
+            self.run_to_end(self._order_at_owner(live, order, wanted))
+        elif isinstance(order, StopOrder):
+            self.runtime.stop_robots(live, order.by, order.details)
+        else:  # in a task, so that a stop meanwhile does not wait
+            self.start(self.runtime.robots.arm(live, order.by))
+        # Queued: no robot waits for the audit log.
+        act = Act(f"robot_{wanted}")
+        self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
 
-    async def _ask_owner(
-        self, live: FollowedSession, order: str, by: User | None, device_id: int | None
+    async def _order_at_owner(
+        self, live: FollowedSession, order: ArmOrder | StopOrder, wanted: RobotOrder
     ) -> None:
-        """Have the server of the session order its robot; say so where it does not answer."""
+        """Have the session's owner order its robot; report where it does not answer."""
         servers = self.runtime.servers
-        if servers is None or (order != "stop" and by is None):
+        if servers is None:
             return
         try:
-            await servers.order_robot(live.owner, live.id, order, by, device_id)
+            await servers.order(live.owner, live.id, order)
         except NotStored as problem:
-            log.error("Session %s: %s was not heard: %s", live.id, order, problem)
-            unheard = {"type": "error", "code": "robot_unheard", "order": order}
-            await self.send_message(unheard | {"message": _UNHEARD[order]})
+            log.error("Session %s: %s did not arrive: %s", live.id, wanted, problem)
+            undelivered = {"type": "error", "code": "robot_unheard", "order": wanted}
+            await self.send_message(undelivered | {"message": _NOT_DELIVERED[wanted]})
 
     def _drive_robot(self, message: Message) -> None:
         """Pass on that a person holds a button to drive the robot to its mark."""
         shares = {"ahead": (0, 1), "left": (-1, 1)}
         drive = {name: read_number(message, name, *ends) for name, ends in shares.items()}
-        if self.audience is not Audience.MONITOR or not isinstance(self.actor, User):
-            raise BadFrame("The robot is driven on the therapist's page.")
         live, servers = self.live, self.runtime.servers
         if isinstance(live, FollowedSession) and servers is not None:
             servers.drive_robot(live.owner, live.id, drive)
@@ -296,4 +302,3 @@ class MonitorConsumer(ScreenConsumer):
     audience = Audience.MONITOR
     requester = Requester.MONITOR
     pause_reason = PauseReason.THERAPIST
-    robot_orders = ("stop", "arm")

@@ -16,7 +16,7 @@ from rehab.sessions.live.protocol.messages import (
     read_hello,
     read_plain,
 )
-from rehab.sessions.live.protocol.step_frames import read_late_marks, read_single_step, read_steps
+from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_source_phase
@@ -63,7 +63,7 @@ class SourceConsumer(DeviceSocket):
         self, live: LiveSession, step: Measurement, received_at: datetime, *, is_marked: bool
     ) -> None:
         _check_open_steps(live)
-        # What a source calls late tells nothing of its clock, which may be another one by now.
+        # What a source calls late is no measure of its clock, which may be another one by now.
         late = is_marked or self.lateness.is_late(step.time_s, time.monotonic())
         live.record_step(step, received_at, late=late)
 
@@ -73,7 +73,7 @@ class SourceConsumer(DeviceSocket):
         if kind == "hello":
             await self._handle_hello(read_hello(message))
         elif kind in ("step", "steps"):
-            await self._handle_steps(read_steps(message), read_late_marks(message))
+            await self._handle_steps(read_steps(message))
         elif kind is not None or "token" not in message:
             raise BadFrame('A source sends "hello", "step" and "steps".')
 
@@ -110,7 +110,7 @@ class SourceConsumer(DeviceSocket):
         if live.committed:
             self.acknowledge(live.committed)
 
-    async def _handle_steps(self, measurements: list[Measurement], marks: list[bool]) -> None:
+    async def _handle_steps(self, steps: list[tuple[Measurement, bool]]) -> None:
         if not self.hello_received:
             raise BadFrame("Say hello first.", "no_hello")
         live = self.live
@@ -121,7 +121,7 @@ class SourceConsumer(DeviceSocket):
             return
         await live.gate.wait()
         received_at = timezone.now()
-        for measurement, is_marked in zip(measurements, marks, strict=True):
+        for measurement, is_marked in steps:
             if measurement.number < live.next_number:
                 await self._check_same(live, measurement)
             elif measurement.number > live.next_number:

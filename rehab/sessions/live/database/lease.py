@@ -3,7 +3,7 @@
 A row each, renewed every second by a thread with a connection of its own, and judged by the
 database's clock alone: names of hosts and numbers of processes mean nothing. A server without
 Redis shares its database with no other: live sessions are in the memory of one process, and two
-that cannot hear each other would tell pages and robots half of what happens.
+that cannot exchange messages would send pages and robots half of what happens.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-LEASE_S = 5.0  # after so long without a word a server's sessions are taken over
+LEASE_S = 5.0  # after so long without a renewal a server's sessions are taken over
 RENEW_S = 1.0
 WAIT_S = 45.0  # longer than a server takes to stop (process.STOP_S)
 RETRY_S = 0.25
@@ -58,7 +58,7 @@ SELECT address FROM rehab_server WHERE id <> %(id)s AND {VALID} AND NOT (shares 
 
 
 class AnotherServer(RuntimeError):
-    """A server runs on the database that cannot share it; the message says what to do."""
+    """A server runs on the database that cannot share it; the message has the cure."""
 
 
 class Server(NamedTuple):
@@ -91,7 +91,7 @@ class Lease:
     address
         How a proxy reaches the server: host and port.
     shares
-        Whether the server hears others on its database (by Redis).
+        Whether the server exchanges messages with others on its database (by Redis).
     on_excluded
         Called, on that thread, where another server has the database and one of them cannot share
         it: this one must end. Steps are safe meanwhile: each session's epoch keeps an earlier owner
@@ -108,7 +108,7 @@ class Lease:
         self._renewed_s = 0.0  # by the monotonic clock
         self._unbroken_since_s = 0.0
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._keep, name="garry-lease", daemon=True)
+        self._thread = threading.Thread(target=self._renew, name="garry-lease", daemon=True)
 
     @property
     def is_current(self) -> bool:
@@ -119,10 +119,10 @@ class Lease:
     def may_judge(self) -> bool:
         """Whether others that did not renew theirs are gone, and not the database of all of us.
 
-        After an outage each server renews its lease within a second; until then nobody is dead.
+        After an outage each server renews its lease within a second; until then none is gone.
         """
         if not self.shares:
-            return True  # there was nobody when it entered
+            return True  # there was no other when it entered
         now_s = time.monotonic()
         return self.is_current and now_s - self._unbroken_since_s > 2 * RENEW_S
 
@@ -148,7 +148,7 @@ class Lease:
                 self._disconnect()
                 raise AnotherServer(
                     "Another server runs on this database, and not both have Redis, by which "
-                    "several hear each other. Stop the other one, set the same GARRY_REDIS_URL "
+                    "several exchange messages. Stop the other one, set the same GARRY_REDIS_URL "
                     "for all, or give this one a database of its own (GARRY_DATABASE_URL)."
                 )
             if not waited:
@@ -159,7 +159,7 @@ class Lease:
         self._thread.start()
 
     def release(self) -> None:
-        """End the lease: nobody has to wait until it expires."""
+        """End the lease, so that no server has to wait until it expires."""
         global _held  # noqa: PLW0603
         self._closing.set()
         if self._thread.is_alive():
@@ -172,7 +172,7 @@ class Lease:
         if _held is self:
             _held = None
 
-    def _keep(self) -> None:
+    def _renew(self) -> None:
         while not self._closing.wait(RENEW_S):
             try:
                 if self._execute(RENEW):

@@ -38,7 +38,7 @@ def own_connection(lock_timeout_ms: int, statement_timeout_ms: int) -> BaseDatab
 
 
 class DatabaseThread:
-    """A thread that asks the database again and again, and keeps its connection meanwhile."""
+    """A thread that queries the database again and again by one connection."""
 
     def __init__(self, name: str, timeout_ms: int) -> None:
         self._timeout_ms = timeout_ms

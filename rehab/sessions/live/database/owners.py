@@ -27,7 +27,7 @@ WRITTEN_BY_OWNER = ("checkpoint", "last_number", "state", "started_at", "ended_a
 
 
 class OwnedElsewhere(RuntimeError):
-    """Another process is running the session; the message says which. ``owner``: its name."""
+    """Another process is running the session; the message names it. ``owner``: its name."""
 
     def __init__(self, session_id: int, owner: str) -> None:
         super().__init__(
@@ -40,15 +40,15 @@ class OwnedElsewhere(RuntimeError):
 
 
 def _start_time(pid: int) -> str:
-    """Return a process's start time, which tells it from a later one with the same id."""
+    """Return a process's start time, which distinguishes it from a later one with the same id."""
     try:
         if PROC_DIR.is_dir():
             return (PROC_DIR / str(pid) / "stat").read_text().rpartition(")")[2].split()[19]
         # macOS has no /proc. The output must not depend on who asks, or where.
         variables = os.environ | {"LC_ALL": "C", "TZ": "UTC"}
         command = ["ps", "-o", "lstart=", "-p", str(pid)]
-        said = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
-        return " ".join(said.stdout.split())
+        listed = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
+        return " ".join(listed.stdout.split())
     except (OSError, IndexError):
         return ""
 
@@ -66,7 +66,7 @@ def own_name() -> str:
 
 
 def is_alive(owner: str) -> bool:
-    """Return whether an owner's process runs, or nobody can tell."""
+    """Return whether an owner's process runs, or that cannot be known."""
     own = lease.held()
     if owner and settings.HOSTED and owner != HANDED_ON and "|" not in owner:
         valid_ids = {server.id for server in lease.valid_servers()}

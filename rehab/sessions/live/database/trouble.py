@@ -33,7 +33,7 @@ NOT_STORED = "A step could not be stored. Connect again."
 
 
 def classify_failure(problem: BaseException) -> Trouble:
-    """Return what a failed write says of the database."""
+    """Return what a failed write means for the database."""
     for one in _causes(problem):
         if getattr(one, "sqlstate", None) == DISK_FULL_STATE or "disk is full" in str(one):
             return Trouble.DISK_FULL

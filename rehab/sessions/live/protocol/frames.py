@@ -1,8 +1,8 @@
-"""Whole text messages as websocket frames (RFC 6455, 5.2), past the layers of servers and ASGI.
+"""Whole text messages as websocket frames (RFC 6455, 5.2), past the layers of daphne and ASGI.
 
-Through daphne, autobahn and Twisted, or through uvicorn and websockets, a message passes layers
-that look for what we never do: bytes, fragments, compression. Both servers take this way for what
-is plain, and their own for all else (websockets.py, uvicorn_server.py).
+Through daphne, autobahn and Twisted a message passes layers that look for what our clients never
+send: bytes, fragments, compression. A plain text takes this way, all else the usual one
+(websockets.py).
 """
 
 from __future__ import annotations
@@ -45,43 +45,3 @@ def read_text_frame(data: bytes) -> bytes | None:
     if not 0 < size == len(data) - begin:
         return None
     return apply_mask(data[begin:], data[begin - 4 : begin])
-
-
-class FrameEdges:
-    """Follows a stream of frames, to know whether its next byte begins one."""
-
-    def __init__(self) -> None:
-        self._head = bytearray()  # of a frame whose head is not whole yet
-        self._left = 0  # bytes of the current frame's payload
-
-    @property
-    def is_between_frames(self) -> bool:
-        """Whether all frames so far were whole."""
-        return not (self._head or self._left)
-
-    def pass_by(self, data: bytes) -> None:
-        """Follow bytes of the stream."""
-        position = 0
-        while position < len(data):
-            if self._left:
-                passed = min(self._left, len(data) - position)
-                self._left -= passed
-                position += passed
-                continue
-            self._head.append(data[position])
-            position += 1
-            size = _payload_size(self._head)
-            if size is not None:
-                self._left = size
-                self._head.clear()
-
-
-def _payload_size(head: bytes | bytearray) -> int | None:
-    """Return the size of a frame's payload, or None until its head is whole."""
-    if len(head) < 2:
-        return None
-    size, begin = head[1] & 0x7F, 2
-    if size > 125:
-        begin += 2 if size == 126 else 8
-        size = int.from_bytes(head[2:begin])
-    return size if len(head) == begin + (4 if head[1] & MASKED else 0) else None

@@ -1,21 +1,29 @@
 """Reads the frames of clients: each is checked whole before anything is done with it.
 
-The checks are written by hand: an error says what to send instead, and the checks are those of
-robots and sources (`robot.wire.frames`), which have the standard library only. Its JSON is read by
-msgspec (1.1 instead of 7.3 µs a step), which keeps whole numbers with all their digits.
+JSON is read by msgspec (1.1 instead of 7.3 µs a step), which keeps whole numbers with all their
+digits; fields are checked by it, too (fields.py).
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 from urllib.parse import parse_qs
 
 import msgspec
+from msgspec import Meta, Struct
 
+from rehab.sessions.live.protocol.fields import (
+    Code,
+    Count,
+    Message,
+    Name,
+    Number,
+    Positive,
+    Whole,
+    read_fields,
+)
 from rehab.sessions.log import REMARK_RANGES, Remark
 from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
 from robot.wire.frames import (
@@ -24,43 +32,104 @@ from robot.wire.frames import (
     read_name,
     read_number,
     read_object,
-    read_whole,
 )
 from robot.wire.incident import MAX_TEXT_CHARS, read_packed
 from robot.wire.limits import MAX_FRAME_BYTES, PROTOCOL_VERSION
 
-T = TypeVar("T")
-Message = Mapping[str, Any]
-Check = Callable[[Message, str], T]  # returns a field of a message, or raises BadFrame
+_Light = Literal["off", "green", "orange", "red"]
 INCIDENT_AGO_S = 86_400.0  # what a robot may still send of a session
 PLAIN = re.compile(r"\s*([^,\s]{1,40})\s*,\s*([^,\s]{1,40})\s*")
 
 
-@dataclass(frozen=True, slots=True)
-class Incident:
+class Incident(Struct, frozen=True):
     """What a robot recorded around a stop: of which session, why, how long ago [s]."""
 
-    session: int
-    reason: str
-    ago_s: float
-    recording: str
+    session: Count
+    reason: Name
+    ago_s: Annotated[float, Meta(ge=0, le=INCIDENT_AGO_S, description="a number from 0 to 86400")]
+    recording: Annotated[
+        str,
+        Meta(
+            min_length=1,
+            max_length=MAX_TEXT_CHARS,
+            description=f"a text of at most {MAX_TEXT_CHARS} characters",
+        ),
+    ]
 
 
-@dataclass(frozen=True, slots=True)
-class Hello:
+class Hello(Struct, frozen=True):
     """A source's first frame."""
 
-    run: str
-    last: int
-    session: int | None
-    clock_s: float | None
-    speed: float | None
+    run: Name
+    last: Whole
+    session: Count | None = None
+    clock_s: Number | None = None
+    speed: Positive | None = 1.0  # None: as fast as it can
     clock_pauses: bool = False  # its clock stands while the session is paused
 
 
-class _Seen(msgspec.Struct):
+class _Pose(Struct):
+    x_m: Number
+    y_m: Number
+    heading_rad: Number
+
+
+class _Status(Struct):
+    base: Name
+    state: Literal["idle", "performing", "stopped", "disarmed", "away"]
+    reason: Code
+    pose: _Pose
+    gesture: Name | None = None
+    battery_v: Number | None = None
+    battery_share: Number | None = None
+    battery_low: bool = False
+    simulated: bool = False
+    open_loop: bool = False
+    bumpers: bool = False
+    lights: tuple[_Light, _Light] = ("off", "off")
+    mood: Literal["calm", "glad", "sad"] | None = None
+
+
+class _Stop(Struct):
+    reason: Name
+
+
+class _Decision(Struct):
+    from_s: Number
+    until_s: Number
+    mean: Number
+    threshold: Number
+    activated_share: Number
+    steps: Count
+    above: bool
+    reason: Code
+    gesture: Name | None = None
+    intensity: Number | None = None
+
+
+class _Gesture(Struct):
+    name: Name
+    phase: Literal["started", "ended"]
+    outcome: Code
+    open_loop: bool = False
+
+
+class _Remark(Struct):
+    what: Remark
+
+
+# The fields of each kind of report that pages draw.
+REPORTS: dict[str, type[Struct]] = {
+    "status": _Status,
+    "stop": _Stop,
+    "decision": _Decision,
+    "gesture": _Gesture,
+}
+
+
+class _Seen(Struct):
     type: Literal["seen"]
-    frame: Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
+    frame: Whole
 
 
 _decode_seen = msgspec.json.Decoder(_Seen).decode
@@ -68,13 +137,13 @@ _decode = msgspec.json.Decoder().decode
 
 
 def read_frame(text: str | None) -> dict[str, Any]:
-    """Return a frame as a JSON object with a type. Raises BadFrame, as ``read_object`` says."""
+    """Return a frame as a JSON object with a type. Raises what ``read_object`` raises."""
     if text is None or len(text) > MAX_FRAME_BYTES:
         return read_object(text)
     try:
         message = _decode(text)
     except (msgspec.MsgspecError, RecursionError, UnicodeError):
-        return read_object(text)  # says why, or reads what is rare (half a pair of surrogates)
+        return read_object(text)  # has the cure, or reads what is rare (half a surrogate pair)
     is_one = isinstance(message, dict) and isinstance(message.get("type", ""), str)
     return message if is_one else read_object(text)
 
@@ -88,7 +157,7 @@ def read_seen(text: str) -> int | None:
 
 
 def read_after(query: bytes) -> int | None:
-    """Return which step a page has already, as its address says; None for a new page."""
+    """Return which step a page has already, by its address; None for a new page."""
     words = parse_qs(query.decode("latin-1")).get("after", [])
     return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None
 
@@ -100,14 +169,7 @@ def read_hello(message: Message) -> Hello:
             f'This server speaks version {PROTOCOL_VERSION}: send "version": {PROTOCOL_VERSION}.',
             "version",
         )
-    return Hello(
-        run=read_name(message, "run"),
-        last=read_whole(message, "last", low=0),
-        session=read_whole(message, "session", low=1) if message.get("session") else None,
-        clock_s=_optional_number(message, "clock_s"),
-        speed=_read_speed(message),
-        clock_pauses=read_flag_if_there(message, "clock_pauses"),
-    )
+    return read_fields({**message, "session": message.get("session") or None}, Hello)
 
 
 def read_plain(text: str) -> tuple[float | None, float | None] | None:
@@ -132,23 +194,15 @@ def read_change(message: Message) -> tuple[str, float | str | None]:
         raise BadFrame(f'"kind" is one of: {", ".join(known)}.')
     if CONTROLS[kind].value is ValueKind.NAME:
         return kind, read_name(message, "value")
-    return kind, _optional_number(message, "value")
+    return kind, None if message.get("value") is None else read_number(message, "value")
 
 
 def read_remark(message: Message) -> tuple[Remark, float | None]:
     """Return what a PT notes, with its value where it has one. Raises BadFrame."""
-    what = Remark(_one_of(*Remark)(message, "what"))
+    what = read_fields(message, _Remark).what
     if what not in REMARK_RANGES:
         return what, None
     return what, read_number(message, "value", *REMARK_RANGES[what])
-
-
-def read_order(message: Message, *orders: str) -> str:
-    """Return the order for the robot. Raises BadFrame."""
-    try:
-        return _one_of(*orders)(message, "order")
-    except BadFrame as problem:
-        raise BadFrame(f"{problem} The robot is armed by a person.") from None
 
 
 def read_report(message: Message) -> dict[str, Any]:
@@ -160,116 +214,13 @@ def read_report(message: Message) -> dict[str, Any]:
     kind = report.get("kind", "")
     if not isinstance(kind, str):
         raise BadFrame('"kind" of a report is a name.')
-    for name, check in REPORTS.get(kind, {}).items():
-        check(report, name)
+    if kind in REPORTS:
+        read_fields(report, REPORTS[kind])
     return report
 
 
 def read_incident(message: Message) -> Incident:
     """Return a robot's incident, its recording still packed. Raises BadFrame."""
-    recording = message.get("recording")
-    if not isinstance(recording, str) or not 0 < len(recording) <= MAX_TEXT_CHARS:
-        raise BadFrame(f'"recording" is a text of at most {MAX_TEXT_CHARS} characters.')
-    read_packed(recording)
-    return Incident(
-        session=read_whole(message, "session", low=1),
-        reason=read_name(message, "reason"),
-        ago_s=read_number(message, "ago_s", 0, INCIDENT_AGO_S),
-        recording=recording,
-    )
-
-
-def _one_of(*known: str) -> Check[str]:
-    def check(message: Message, name: str) -> str:
-        value = message.get(name)
-        if value not in known:
-            raise BadFrame(f'"{name}" is one of: {", ".join(known)}.')
-        return str(value)
-
-    return check
-
-
-def _optional(check: Check[T]) -> Check[T | None]:
-    return lambda message, name: None if message.get(name) is None else check(message, name)
-
-
-def _code(message: Message, name: str) -> str:
-    return "" if message.get(name) == "" else read_name(message, name)
-
-
-def _flag(message: Message, name: str) -> bool:
-    value = message.get(name)
-    if not isinstance(value, bool):
-        raise BadFrame(f'"{name}" is true or false.')
-    return value
-
-
-def read_flag_if_there(message: Message, name: str) -> bool:
-    """Return a flag; False where the message has none. Raises BadFrame."""
-    return name in message and _flag(message, name)
-
-
-def _count(message: Message, name: str) -> int:
-    return read_whole(message, name, low=1)
-
-
-def _pose(message: Message, name: str) -> None:
-    pose = message.get(name)
-    for part in ("x_m", "y_m", "heading_rad"):
-        read_number(pose if isinstance(pose, dict) else {}, part)
-
-
-def _lights_if_there(message: Message, name: str) -> None:
-    lights = message.get(name, ["off", "off"])
-    colors = {"off", "green", "orange", "red"}
-    is_pair = isinstance(lights, list) and len(lights) == 2
-    if not is_pair or not all(isinstance(one, str) and one in colors for one in lights):
-        raise BadFrame(f'"{name}" are two of: {", ".join(sorted(colors))}.')
-
-
-_optional_name, _optional_number = _optional(read_name), _optional(read_number)
-
-# The fields of each kind of report that pages draw.
-REPORTS: dict[str, dict[str, Check[Any]]] = {
-    "status": {
-        "base": read_name,
-        "state": _one_of("idle", "performing", "stopped", "disarmed", "away"),
-        "reason": _code,
-        "gesture": _optional_name,
-        "pose": _pose,
-        "battery_v": _optional_number,
-        "battery_share": _optional_number,
-        "battery_low": read_flag_if_there,
-        "simulated": read_flag_if_there,
-        "open_loop": read_flag_if_there,
-        "bumpers": read_flag_if_there,
-        "lights": _lights_if_there,
-        "mood": _optional(_one_of("calm", "glad", "sad")),
-    },
-    "stop": {"reason": read_name},
-    "decision": {
-        "from_s": read_number,
-        "until_s": read_number,
-        "mean": read_number,
-        "threshold": read_number,
-        "activated_share": read_number,
-        "steps": _count,
-        "above": _flag,
-        "reason": _code,
-        "gesture": _optional_name,
-        "intensity": _optional_number,
-    },
-    "gesture": {
-        "name": read_name,
-        "phase": _one_of("started", "ended"),
-        "outcome": _code,
-        "open_loop": read_flag_if_there,
-    },
-}
-
-
-def _read_speed(message: Message) -> float | None:
-    speed = _optional_number(message, "speed") if "speed" in message else 1.0
-    if speed is not None and speed <= 0:
-        raise BadFrame('"speed" is above 0, or null for as fast as possible.')
-    return speed
+    incident = read_fields(message, Incident)
+    read_packed(incident.recording)
+    return incident

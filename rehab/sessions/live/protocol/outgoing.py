@@ -1,7 +1,7 @@
 """What one socket is to be sent: written at the end of the event loop's turn, or by a task.
 
-To wake a task for each frame would cost as much as the frame does. A commit tells many sockets
-something, and one call of the event loop writes to all of them.
+To wake a task for each frame would cost as much as the frame does. A commit has messages for
+many sockets, and one call of the event loop writes to all of them.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Outgoing(ABC):
         self._is_due = False
         try:
             written = self._is_waiting and self._write_pending()
-        except Exception:  # whatever it was, the pump meets it too, and its socket says so
+        except Exception:  # whatever it was, the pump meets it too, and its socket reports it
             written = False
         if not written:
             self._awake.set()
@@ -97,11 +97,11 @@ class Outbox(Outgoing):
         self._texts: list[str] = []
         self._ends_with_ack = False
 
-    def tell(self, message: Message) -> None:
+    def queue(self, message: Message) -> None:
         """Queue a message."""
-        self.tell_text(to_text(message))
+        self.queue_text(to_text(message))
 
-    def tell_text(self, text: str) -> None:
+    def queue_text(self, text: str) -> None:
         """Queue a message that is a frame's text already."""
         self._texts.append(text)
         self._ends_with_ack = False

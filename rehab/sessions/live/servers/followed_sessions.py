@@ -26,8 +26,8 @@ class FollowedSessions:
     ----------
     database
         The connection that the logs are read by.
-    tell_owner
-        Tells a session's owner which pages are here.
+    notify_owner
+        Reports to a session's owner which pages are here.
     close_pages
         Closes a session's pages, which then connect again.
     """
@@ -35,11 +35,11 @@ class FollowedSessions:
     def __init__(
         self,
         database: DatabaseThread,
-        tell_owner: Callable[[FollowedSession], None],
+        notify_owner: Callable[[FollowedSession], None],
         close_pages: Callable[[LiveSession], None],
     ) -> None:
         self.sessions: dict[int, FollowedSession] = {}
-        self._tell_owner = tell_owner
+        self._notify_owner = notify_owner
         self._close_pages = close_pages
         self._opening: dict[int, asyncio.Task[None]] = {}
         self._unused: dict[int, int] = {}  # beats
@@ -48,7 +48,7 @@ class FollowedSessions:
         self._database = database
 
     async def follow(self, session_id: int) -> FollowedSession:
-        """Return a session of another server, as it is told here.
+        """Return a session of another server, as far as it is known here.
 
         Raises TrainingSession.DoesNotExist.
         """
@@ -70,7 +70,7 @@ class FollowedSessions:
         live = await self._database.run(load_followed, session_id)
         self.sessions[session_id] = live
         self._unused[session_id] = 0
-        self._tell_owner(live)
+        self._notify_owner(live)
         self.read_soon(session_id)
 
     def leave(self, session_id: int) -> None:
@@ -86,7 +86,7 @@ class FollowedSessions:
         self._read_due.set()
 
     async def read(self) -> None:
-        """Read what the logs of followed sessions have got, of all that have news at once."""
+        """Read what is new in the logs of followed sessions, of all at once."""
         await self._read_due.wait()
         self._read_due.clear()
         hinted, self._hinted = self._hinted, set()
@@ -110,7 +110,7 @@ class FollowedSessions:
         await asyncio.sleep(READ_PAUSE_S)
 
     def beat(self, is_gone: Callable[[str], bool]) -> None:
-        """Each second: tell owners which pages are here, read logs where no hint came.
+        """Each second: report to owners which pages are here, read logs where no hint came.
 
         Left are those whose owner is gone, and those that no page looks at any more.
         """
@@ -119,5 +119,5 @@ class FollowedSessions:
             if is_gone(live.owner) or self._unused[live.id] > UNUSED_BEATS:
                 self.leave(live.id)
             else:
-                self._tell_owner(live)
+                self._notify_owner(live)
                 self.read_soon(live.id)

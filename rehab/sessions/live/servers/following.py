@@ -2,7 +2,7 @@
 
 A follower reads the new rows of the log, once for all its pages, and folds them by the code that
 the owner folded them with: its pages get the same events. What no log has comes with the owner's
-hints: who is connected, what the robot says.
+hints: who is connected, what the robot reports.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from rehab.training.steps import InvalidMeasurement
 READ_TOGETHER = 100  # sessions of one query
 LATE = timedelta(seconds=2)  # a step that was read so long after it came is not shown as live
 WHO = ("source", "robot", "tablets", "storage")  # of the presence
-NOBODY: Message = {
+NO_ONE: Message = {
     "source": False,
     "robot": False,
     "tablets": 0,
@@ -58,7 +58,7 @@ class _Reader:
 
 
 class NewRows(NamedTuple):
-    """What the log of a session has got since it was read."""
+    """What is new in the log of a session since it was read."""
 
     owner: str
     epoch: int
@@ -75,7 +75,7 @@ class FollowedSession(LiveSession):
         super().__init__(aggregate, _Reader(), recent, lambda *_: None, robot_stopped=robot_stopped)
         self.owner = aggregate.session.owner
         self.last_event = last_event
-        self._presence = NOBODY
+        self._presence = NO_ONE
 
     @property
     def viewers(self) -> Data:
@@ -90,14 +90,14 @@ class FollowedSession(LiveSession):
         }
 
     def presence(self, now: datetime) -> Message:
-        """Return who is connected to the owner, as it said last."""
+        """Return who is connected to the owner, as it reported last."""
         return self._presence
 
     def announce_presence(self, now: datetime) -> None:
-        """Do nothing: the owner is told of the pages here, and tells all."""
+        """Do nothing: the owner gets the pages here reported, and announces them to all."""
 
     def take_hint(self, hint: Data) -> None:
-        """Publish what the owner tells and no log has."""
+        """Publish what the owner sends and no log has."""
         before, self._presence = self._presence, hint["presence"]
         if any(before[name] != self._presence[name] for name in WHO):  # ages go with heartbeats
             self.feed.publish(presence_event(self.aggregate.fold, self._presence))
@@ -146,21 +146,21 @@ class FollowedSession(LiveSession):
 class Follower(Subscriber):
     """At the owner: a server that follows a session. It counts as the pages that it has."""
 
-    EXPIRES_S = 3.5  # a follower speaks each second
+    EXPIRES_S = 3.5  # a follower reports each second
 
-    def __init__(self, live: LiveSession, server: str, tell: Callable[[Data], object]) -> None:
+    def __init__(self, live: LiveSession, server: str, send_hint: Callable[[Data], object]) -> None:
         async def send(_: str) -> None:
             """Send nothing: a follower reads the log."""
 
         super().__init__(live.feed, Audience.PATIENT, send)
         self.live, self.server = live, server
-        self._tell = tell
+        self._send_hint = send_hint
         self._is_watched = False
-        self._heard_s = 0.0
+        self._updated_s = 0.0
 
     @property
     def position(self) -> int:
-        """Where it is in the feed: a follower needs nothing kept."""
+        """Where it is in the feed: a follower needs no event retained."""
         return self.feed.head
 
     @position.setter
@@ -172,16 +172,16 @@ class Follower(Subscriber):
         """Whether a page of the follower's processes what it is sent."""
         return self._is_watched and not self.is_gone(asyncio.get_running_loop().time())
 
-    def hear(self, viewers: Data, now_s: float) -> None:
+    def update(self, viewers: Data, now_s: float) -> None:
         """Note which pages the follower has."""
         self.tablets = viewers["tablets"]
         self.audience = Audience.MONITOR if viewers["monitors"] else Audience.PATIENT
         self._is_watched = viewers["watched"]
-        self._heard_s = now_s
+        self._updated_s = now_s
 
     def is_gone(self, now_s: float) -> bool:
-        """Whether it has not spoken for long."""
-        return now_s - self._heard_s > self.EXPIRES_S
+        """Whether it has not reported for long."""
+        return now_s - self._updated_s > self.EXPIRES_S
 
     def queue_heartbeat(self, text: str) -> None:
         """Send a hint, which has who is there."""
@@ -192,7 +192,7 @@ class Follower(Subscriber):
         self._is_due = False
         live = self.live
         presence, robot = live.presence(timezone.now()), live.robot_orders.reports
-        self._tell({"session": live.id, "presence": presence, "robot": robot})
+        self._send_hint({"session": live.id, "presence": presence, "robot": robot})
 
 
 def load_followed(session_id: int) -> FollowedSession:
@@ -214,7 +214,7 @@ def load_followed(session_id: int) -> FollowedSession:
 
 
 def read_new_rows(followed: Sequence[tuple[int, int, int]]) -> dict[int, NewRows]:
-    """Return what logs have got: of sessions, each with its last number and event."""
+    """Return what is new in logs: of sessions, each with its last number and event."""
     found: dict[int, NewRows] = {}
     for first in range(0, len(followed), READ_TOGETHER):
         found |= _read(followed[first : first + READ_TOGETHER])

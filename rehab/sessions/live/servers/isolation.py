@@ -1,7 +1,7 @@
 """A server that is cut off from the database while another one has it sends its clients there.
 
-What they sent to it would wait unstored, and the other server takes its sessions over. Where nobody
-has the database, clients stay, and are told that it does not answer.
+What they sent would wait unstored here, while the other server takes the sessions over. Where no
+server reaches the database, clients stay and are notified that it does not answer.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection
 
 from rehab.sessions.live.database.lease import Lease
 
-HEARD_S = 3.0  # each server says each second whether it has the database
+REPORTED_S = 3.0  # each server reports each second whether it has the database
 
 
 class Isolation:
@@ -30,24 +30,24 @@ class Isolation:
         self._clock = clock
         self._current_at_s: dict[str, float] = {}  # of others: when they last had the database
 
-    def hear(self, server: str, *, is_current: bool) -> None:
-        """Take what another server says of its own lease."""
+    def record(self, server: str, *, is_current: bool) -> None:
+        """Record what another server reports of its own lease."""
         if is_current:
             self._current_at_s[server] = self._clock()
         else:
             self._current_at_s.pop(server, None)
 
-    def applies(self, others: Collection[str], *, is_deaf: bool) -> bool:
+    def applies(self, others: Collection[str], *, is_silent: bool) -> bool:
         """Return whether clients are better off with another server.
 
         Parameters
         ----------
         others
             The servers that were there when the database was last read.
-        is_deaf
-            Whether nothing is heard of any: then it is this server that is cut off.
+        is_silent
+            Whether no message comes from any: then it is this server that is cut off.
         """
         if self._own.is_current or not others:
             return False
-        since_s = self._clock() - HEARD_S
-        return is_deaf or any(self._current_at_s.get(one, -1.0) > since_s for one in others)
+        since_s = self._clock() - REPORTED_S
+        return is_silent or any(self._current_at_s.get(one, -1.0) > since_s for one in others)

@@ -73,7 +73,7 @@ class SessionAggregate:
         aggregate = cls.from_checkpoint(session)
         aggregate.fold = fold_log(aggregate.fold, session)
         marked = SessionEvent.everywhere.filter(session=session, kind__in=kinds_with_marks())
-        aggregate.keep_marks(reversed(marked.order_by("-pk")[:MARKS]))
+        aggregate.add_marks(reversed(marked.order_by("-pk")[:MARKS]))
         return aggregate
 
     @classmethod
@@ -95,13 +95,13 @@ class SessionAggregate:
         """Whether a checkpoint is worth its place after the last step."""
         return self.fold.last_number % CHECKPOINT_STEPS == 0
 
-    def keep_marks(self, events: Iterable[SessionEvent]) -> None:
-        """Keep the marks among a log's events, in their order."""
+    def add_marks(self, events: Iterable[SessionEvent]) -> None:
+        """Add the marks among a log's events, in their order."""
         for event in events:
-            self._keep_mark(event)
+            self._add_mark(event)
 
-    def _keep_mark(self, event: SessionEvent) -> None:
-        """Keep an event for the snapshots of later subscribers, if charts point it out."""
+    def _add_mark(self, event: SessionEvent) -> None:
+        """Add an event to the snapshots of later subscribers, if charts point it out."""
         kind, value = event.kind, event.data.get("value", event.value)
         if kind in marked_kinds():
             self.marks.append(change_mark(event.after_number, kind, value))
@@ -131,7 +131,7 @@ class SessionAggregate:
             at=at,
             **_to_columns(old, change.value),
         )
-        self._keep_mark(event)
+        self._add_mark(event)
         rows: list[Row] = [event]
         if change.kind == ChangeKind.START:
             self.session.started_at = at
@@ -164,13 +164,13 @@ class SessionAggregate:
             at=at,
             data=data,
         )
-        self._keep_mark(event)
+        self._add_mark(event)
         return event
 
     def summary(self, *, with_checkpoint: bool = False) -> Summary:
         """Return the session's columns as they follow from the log, to be written with its rows.
 
-        ``with_checkpoint``: only right after a step, so that its number says what is folded.
+        ``with_checkpoint``: only right after a step, so that its number marks what is folded.
         """
         checkpoint: Summary = {"checkpoint": fold_to_json(self.fold)} if with_checkpoint else {}
         if self.fold.state in ENDED_STATES:
@@ -187,7 +187,7 @@ class SessionAggregate:
 
 
 def _to_columns(old: ChangeValue, value: ChangeValue) -> dict[str, Any]:
-    """Return a change's values as the log keeps them: numbers in columns, all else in ``data``."""
+    """Return a change's values as the log has them: numbers in columns, all else in ``data``."""
     if value is None or isinstance(value, int | float):
         return {"old": old, "value": value}
     return {"data": {"value": value} if old is None else {"value": value, "old": old}}

@@ -1,7 +1,7 @@
 """Publishes committed events: a ring buffer for each session, a pump for each subscriber.
 
 Nothing that a subscriber does or fails to do holds up the session or other subscribers. A slow one
-gets fewer and larger frames; one that confirms nothing is let go. An event is kept until the
+gets fewer and larger frames; one that confirms nothing is let go. An event is retained until the
 slowest has it; the ring bounds the memory.
 """
 
@@ -10,7 +10,8 @@ from __future__ import annotations
 import asyncio
 import math
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from operator import attrgetter
 
 from rehab.sessions.events.event import LiveEvent
@@ -43,7 +44,7 @@ class EventFeed:
 
     @property
     def audiences(self) -> set[Audience]:
-        """Who is told of events."""
+        """Who gets events."""
         return {one.audience for one in self.subscribers}
 
     def publish(self, event: LiveEvent) -> None:
@@ -198,6 +199,48 @@ class Subscriber(Outgoing):
                 await self._confirmed.wait()
         except TimeoutError:
             raise Stalled from None
+
+
+class SubscriptionGate:
+    """Holds steps and changes back while a page or robot subscribes.
+
+    Those that wait pass in the order in which they came.
+    """
+
+    def __init__(self) -> None:
+        self._subscribing = 0
+        self._is_idle = asyncio.Event()
+        self._turn = asyncio.Lock()  # first come, first served
+        self._waiting = 0  # for their turn
+
+    @property
+    def is_open(self) -> bool:
+        """Whether no subscription is under way, and nothing waits for one."""
+        return not (self._subscribing or self._waiting)
+
+    @contextmanager
+    def closed(self) -> Iterator[None]:
+        """Keep the gate closed in this block."""
+        self._subscribing += 1
+        self._is_idle.clear()
+        try:
+            yield
+        finally:
+            self._subscribing -= 1
+            if not self._subscribing:
+                self._is_idle.set()
+
+    async def wait(self) -> None:
+        """Wait while it is closed; to be called before recording steps or changes."""
+        if self.is_open:
+            return
+        self._waiting += 1
+        try:
+            async with self._turn:
+                while self._subscribing:
+                    await self._is_idle.wait()
+        finally:
+            self._waiting -= 1
 
 
 def _to_frame(kind: str, number: int, texts: list[str]) -> str:

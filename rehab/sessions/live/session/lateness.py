@@ -6,7 +6,7 @@ from robot.wire.clocks import RemoteClock
 
 
 class Lateness:
-    """Relates the clock of one run of a source to ours; the session keeps it over reconnections.
+    """Relates the clock of one run of a source to ours; the session retains it over reconnections.
 
     A source's hello gives its clock and speed; what it then sends is as late as our clock has run
     on past the step's own time. Without a clock in hello the quickest step of the run so far stands

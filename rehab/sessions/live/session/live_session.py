@@ -20,13 +20,12 @@ from rehab.sessions.events.event import (
 )
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live.database.trouble import WORDS, NotStored, Trouble, classify_failure
+from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
-from rehab.sessions.live.session.hub import EventFeed, Subscriber
+from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.lateness import Lateness
-from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.live.session.robot_orders import RobotOrders
-from rehab.sessions.live.session.subscription_gate import SubscriptionGate
 from rehab.sessions.log import Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
@@ -71,12 +70,12 @@ class LiveSession:
         self.aggregate = aggregate
         self.feed = EventFeed()
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
-        self.source: Peer | None = None
+        self.source: ConnectedDevice | None = None
         self.source_clock: Lateness | None = None  # of its latest run
-        self.robot: Peer | None = None
+        self.robot: ConnectedDevice | None = None
         self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
         self.tablets = 0
-        self.tablet_heard_at: datetime | None = None
+        self.tablet_seen_at: datetime | None = None
         self.stride_at: datetime | None = recent[-1].received_at if recent else None
         self.committed = aggregate.fold.last_number
         self.recently_used = True  # since the last sweep of idle sessions
@@ -190,7 +189,7 @@ class LiveSession:
                 on_stored()
             if self.source is not None:
                 for message in for_source:  # before the ack, which a simulated patient waits for
-                    self.source.tell(message)
+                    self.source.queue(message)
                 if row is not None:
                     self.source.acknowledge(row.step.number)
             if row is not None:
@@ -216,14 +215,14 @@ class LiveSession:
         )
 
     def presence(self, now: datetime) -> Message:
-        """Return who is connected, and how long ago source and tablet were last heard."""
+        """Return who is connected, and how long ago source and tablet last sent something."""
         tablets = self.tablets + sum(one.tablets for one in self.feed.subscribers)
         return {
             "source": self.source is not None,
             "robot": self.robot is not None,
             "tablets": tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),
-            "tablet_ago_s": _ago_s(self.tablet_heard_at, now) if tablets else None,
+            "tablet_ago_s": _ago_s(self.tablet_seen_at, now) if tablets else None,
             "storage": self._writer.trouble.value,
         }
 

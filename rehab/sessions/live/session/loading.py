@@ -43,7 +43,7 @@ class LoadedSession(NamedTuple):
     aggregate: SessionAggregate
     recent: list[Step]
     robot_stopped: bool
-    owned_before: str  # by whom, before it was claimed here; empty if nobody
+    owned_before: str  # by whom, before it was claimed here; or empty
 
 
 LoadResult = LoadedSession | Exception
@@ -145,7 +145,7 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
         after = min(aggregate.fold.last_number, last - RECENT_STEPS)
         steps = list(_read_steps(key, after))  # once, for the fold and for pages
         _fold_rest(aggregate, steps, events)
-        aggregate.keep_marks([event for event in events if event.kind in marked][-MARKS:])
+        aggregate.add_marks([event for event in events if event.kind in marked][-MARKS:])
         found[key] = LoadedSession(
             aggregate=aggregate,
             recent=steps[-RECENT_STEPS:],

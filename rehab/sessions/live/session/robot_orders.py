@@ -1,4 +1,4 @@
-"""What a session's robot is ordered and what it reports: obeyed at once, logged, published."""
+"""Stops and arms a session's robot at once; logs and publishes that, and what it reports."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events.event import robot_report_event, robot_stopped_event
+from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.session.aggregate import RepeatedStop, SessionAggregate
 from rehab.sessions.live.session.hub import EventFeed
-from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.log import RobotEntry
 from rehab.sessions.payloads import Message
 
@@ -34,7 +34,7 @@ class WithRobot(Protocol):
 
     aggregate: SessionAggregate
     feed: EventFeed
-    robot: Peer | None
+    robot: ConnectedDevice | None
 
 
 class RobotOrders:
@@ -66,10 +66,10 @@ class RobotOrders:
         """Stop the robot at once, until a person arms it.
 
         ``data``: which device stopped it, if it was no person. ``again``: where the robot is
-        stopped already, it is stored still, if another server has armed it meanwhile.
+        stopped already, the stop is stored all the same if another server has armed it meanwhile.
         """
         if self._live.robot is not None:
-            self._live.robot.tell({"type": "stop"})
+            self._live.robot.queue({"type": "stop"})
         is_repeated = self.is_stopped
         if is_repeated and (self.unlogged_stop is not None or not again):
             return
@@ -94,12 +94,12 @@ class RobotOrders:
         def note() -> None:
             self._logged_armings += 1
 
-        def tell(result: asyncio.Future[None]) -> None:
+        def notify_robot(result: asyncio.Future[None]) -> None:
             failed = result.cancelled() or result.exception() is not None
             if not failed and not self.is_stopped and self._live.robot is not None:
-                self._live.robot.tell({"type": "arm"})
+                self._live.robot.queue({"type": "arm"})
 
-        stored.add_done_callback(tell)
+        stored.add_done_callback(notify_robot)
         row = self._live.aggregate.log_event(RobotEntry.ARM, by, at, {})
         event = robot_stopped_event(self._live.aggregate.fold, False)
         self._submit([row], [event], [], stored=stored, on_stored=note)

@@ -28,9 +28,9 @@ log = logging.getLogger(__name__)
 
 MAX_ROWS = 5000  # rows a transaction
 SPACING_S = 0.012  # between the beginnings of commits while several sessions walk
-LATE_S = 1.0  # a commit that takes longer is told to people and robots
+LATE_S = 1.0  # a commit that takes longer is reported to people and robots
 CLOSE_S = 20.0  # how long a stop waits for a database that does not answer
-# Of the writer's own connection to PostgreSQL: what waits longer has failed, and is said.
+# Of the writer's own connection to PostgreSQL: what waits longer has failed, and is reported.
 LOCK_TIMEOUT_MS = 3_000
 STATEMENT_TIMEOUT_MS = 10_000
 ALONE_LOCK_TIMEOUT_MS = 200  # of one session's rows, after a batch has failed
@@ -191,8 +191,10 @@ class Writer:
             job, problem = self._finished.popleft()
             try:
                 job.done(problem)
-            except Exception:  # the others' steps are stored, and their sources wait to hear it
-                log.exception("Session %s could not be told what was stored", job.session_id)
+            except (
+                Exception
+            ):  # the others' steps are stored, and their sources wait for the acknowledgment
+                log.exception("Session %s could not be notified of what was stored", job.session_id)
             if job.came_s and problem is None:
                 DELIVERY_S.observe(time.monotonic() - job.came_s)
 

@@ -52,11 +52,11 @@ class LiveSessions(Collector):
         now = live.writer.trouble
         troubles = Counter({kind.value: int(kind is now) for kind in Trouble if kind.value})
         yield _labeled("garry_storage_trouble", "1 while steps cannot be stored.", "kind", troubles)
-        deaf_s = 0.0 if live.servers is None else live.servers.deaf_s
+        silent_s = 0.0 if live.servers is None else live.servers.silent_s
         yield GaugeMetricFamily(
-            "garry_servers_deaf_seconds",
+            "garry_servers_silent_seconds",
             "Since when nothing passes between servers; 0 where there is one.",
-            deaf_s,
+            silent_s,
         )
         yield GaugeMetricFamily(
             "garry_ready", "1 while it may get visitors, as /readyz says.", int(not find_unready())

@@ -1,10 +1,14 @@
-"""A refusal on its way from the owner of a session to the server that asked."""
+"""Orders on their way to the server that owns a session, and its refusals on their way back."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
+from rehab.people.models import User
 from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.orders import Order
 from rehab.sessions.live.servers.intercom import Data
 from rehab.training.changes import NotAllowed
 from rehab.training.measures import InvalidSetting
@@ -13,7 +17,32 @@ from robot.marking import AnyOf, Marked
 REFUSALS = {"refused": InvalidSetting, "not_allowed": NotAllowed}
 
 
-def pack(problem: InvalidSetting | NotStored) -> Data:
+def pack_order(order: Order) -> Data:
+    """Return an order as a message; people in it as the keys of their accounts."""
+    packed: Data = msgspec.to_builtins(order, enc_hook=_pack_account)
+    return packed
+
+
+def unpack_order(data: Data) -> Order:
+    """Return the order of a message. Raises msgspec.ValidationError for anything else."""
+    order: Order = msgspec.convert(data, Order, dec_hook=_unpack_account)
+    return order
+
+
+def _pack_account(account: Any) -> int:
+    if not isinstance(account, User):
+        raise NotImplementedError(f"An order cannot carry {account!r}.")
+    return int(account.pk)
+
+
+def _unpack_account(kind: type, key: Any) -> User:
+    """Return an account as a row refers to it: a stop waits for no query."""
+    if not isinstance(key, int):
+        raise NotImplementedError(f"{key!r} is no account's key.")
+    return User(pk=key)
+
+
+def pack_refusal(problem: InvalidSetting | NotStored) -> Data:
     """Return a refusal as an answer; its words stay translatable."""
     if isinstance(problem, NotStored):
         return {"problem": "not_stored", "message": str(problem)}
