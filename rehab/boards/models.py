@@ -23,6 +23,7 @@ from rehab.boards.choices import (
 )
 from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import BoardsConsent, Clinic, Patient
+from rehab.people.policy import personal_fields, retained
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 
@@ -160,6 +161,11 @@ class Leaderboard(ClinicModel):
         null=True,
         editable=False,
         help_text="Key of the last patient whose rows are built; empty when all are.",
+    )
+
+    # Of the group's rows. By then the patient has no name.
+    personal = personal_fields(
+        {"group": retained("who could be on a board", shown=True, research=False)}
     )
 
     class Meta(ClinicModel.Meta):

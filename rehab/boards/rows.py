@@ -9,6 +9,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Patient
+from rehab.people.policy import deleted, personal_fields
 from rehab.people.scope import Scope, ScopedModel
 from rehab.training.valences import VALENCES
 
@@ -36,6 +37,14 @@ class BoardEntry(ScopedModel):
     )
     key = models.CharField(max_length=48)
     stale_on = models.DateField(null=True, help_text="The day from which it is out of date.")
+
+    # The consent to boards is withdrawn first, which takes the rows out of the counts, too.
+    personal = personal_fields(
+        {
+            "board patient valence figure points_at_stake": deleted(shown=True, research=False),
+            "key stale_on": deleted(shown=False, research=False),
+        }
+    )
 
     class Meta(ScopedModel.Meta):
         constraints: ClassVar = [

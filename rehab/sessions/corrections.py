@@ -17,6 +17,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import Patient, User
+from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.roles import may_see_names
 from rehab.people.scope import ScopedModel
 from rehab.sessions.formatting import clinic_time
@@ -33,6 +34,16 @@ class CorrectedField(models.TextChoices):
 
 
 Values = dict[CorrectedField, str]  # as corrections store them: see `SessionCorrection`
+
+
+def anonymize_corrections(patient: Patient, pseudonym: str) -> None:
+    """Remove free text from a patient's corrections and replace the old ``pseudonym``."""
+    rows = SessionCorrection.everywhere
+    rows.filter(session__patient=patient).update(reason="")
+    rows.filter(session__patient=patient, field=CorrectedField.NOTE).update(old="", new="")
+    for column in ("old", "new"):
+        named = rows.filter(field=CorrectedField.PATIENT, **{column: pseudonym})
+        named.update(**{column: patient.pseudonym})
 
 
 class SessionCorrection(ScopedModel):
@@ -57,6 +68,14 @@ class SessionCorrection(ScopedModel):
         User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
     )
     at = models.DateTimeField(_("at"))
+
+    personal = personal_fields(
+        {
+            "old new reason": erased_by(anonymize_corrections, shown=True, research=True),
+            "session field at": retained("what was corrected, and when", shown=True, research=True),
+            "by": retained("staff", shown=True, research=False),
+        }
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("correction")
@@ -90,16 +109,6 @@ class DescribedCorrection:
     def at(self) -> datetime:
         """When it was made, in the clinic's time zone."""
         return clinic_time(self.row.at, self.row.session.clinic)
-
-
-def anonymize_corrections(patient: Patient, pseudonym: str) -> None:
-    """Remove free text from a patient's corrections and replace the old ``pseudonym``."""
-    rows = SessionCorrection.everywhere
-    rows.filter(session__patient=patient).update(reason="")
-    rows.filter(session__patient=patient, field=CorrectedField.NOTE).update(old="", new="")
-    for column in ("old", "new"):
-        named = rows.filter(field=CorrectedField.PATIENT, **{column: pseudonym})
-        named.update(**{column: patient.pseudonym})
 
 
 def current_note(session: TrainingSession, reader: Any) -> str:

@@ -23,6 +23,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.scope import Scope, ScopedManager
 
 log = logging.getLogger(__name__)
@@ -109,6 +110,17 @@ SIGN_IN_ACTS = (
 )
 
 
+def anonymize_patient(patient: Patient, _pseudonym: str) -> None:
+    """Remove an erased patient from the entries; their digests stay."""
+    emptied = {"patient": None, "about": "", "salt": "", "erased": True}
+    _mutable_rows().filter(patient=patient).update(**emptied)
+
+
+def _mutable_rows() -> QuerySet[AuditEntry]:
+    """Return rows that can be changed: for repeats and erasure, and only in this module."""
+    return QuerySet(AuditEntry)
+
+
 class AuditEntry(SealableModel):
     """Who did what, with whose data, when and from where. ``count``: how often in some minutes."""
 
@@ -140,6 +152,15 @@ class AuditEntry(SealableModel):
 
     everywhere: ClassVar[Any] = models.Manager.from_queryset(AppendOnlyQuerySet)()
     objects: ClassVar[ScopedEntryManager] = ScopedEntryManager()
+
+    personal = personal_fields(
+        {
+            "patient about salt erased": erased_by(anonymize_patient, shown=False, research=False),
+            "clinic digest at by through act address count": retained(
+                "says that staff saw something, no longer of whom", shown=False, research=False
+            ),
+        }
+    )
 
     class Meta(SealableModel.Meta):
         verbose_name = _("audit entry")
@@ -296,14 +317,3 @@ def truncate_address(address: str) -> str:
         return ""
     bits = 24 if isinstance(parsed, IPv4Address) else 48
     return str(ip_network((parsed, bits), strict=False))
-
-
-def anonymize_patient(patient_id: int) -> None:
-    """Remove an erased patient from the entries; their digests stay."""
-    emptied = {"patient": None, "about": "", "salt": "", "erased": True}
-    _mutable_rows().filter(patient=patient_id).update(**emptied)
-
-
-def _mutable_rows() -> QuerySet[AuditEntry]:
-    """Return rows that can be changed: for repeats and erasure, and only in this module."""
-    return QuerySet(AuditEntry)

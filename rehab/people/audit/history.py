@@ -24,6 +24,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, User
+from rehab.people.policy import policies_of
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
 from rehab.people.scope import Scope, ScopedModel
 
@@ -166,18 +167,24 @@ def _values_of(row: Model) -> dict[str, Any]:
     return {
         field.name: getattr(row, field.attname)
         for field in row._meta.concrete_fields
-        if field.name not in UNTRACKED_FIELDS
+        if _is_recorded(type(row), field.name)
     }
+
+
+def _is_recorded(model: type[Model], name: str) -> bool:
+    """Return whether a field's changes are recorded: by its policy, where it is a patient's."""
+    policy = policies_of(model).get(name)
+    return name not in UNTRACKED_FIELDS if policy is None else policy.history
 
 
 def _read_before_save(
     instance: ScopedModel, raw: bool = False, update_fields: Any = None, **_: Any
 ) -> None:
     """Read the stored row before a save."""
-    only_untracked = update_fields is not None and UNTRACKED_FIELDS.issuperset(update_fields)
-    before = None
-    if not (raw or only_untracked or instance.pk is None):
-        before = type(instance).everywhere.filter(pk=instance.pk).first()
+    model, before = type(instance), None
+    is_recorded = update_fields is None or any(_is_recorded(model, name) for name in update_fields)
+    if is_recorded and not raw and instance.pk is not None:
+        before = model.everywhere.filter(pk=instance.pk).first()
     vars(instance)[ROW_BEFORE] = before
 
 

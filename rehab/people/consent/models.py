@@ -12,6 +12,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.models.blinding import hidden_patients
+from rehab.people.policy import personal_fields, retained
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 
@@ -85,6 +86,15 @@ class Consent(ScopedModel):
     withdrawn_at = models.DateTimeField(_("withdrawn at"), null=True)
     withdrawn_by = models.ForeignKey(
         User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("withdrawn by")
+    )
+
+    personal = personal_fields(
+        {
+            "patient purpose level text given_at withdrawn_at": retained(
+                "proves what was agreed to, in the clinic's own words", shown=True, research=False
+            ),
+            "recorded_by withdrawn_by": retained("staff", shown=False, research=False),
+        }
     )
 
     class Meta(ScopedModel.Meta):
