@@ -117,9 +117,7 @@ SESSIONS = Table(
         Column("simulated", "", "true: no person walked.", Type.BOOLEAN),
         Column("imported", "", "true: from the original GARRY, which kept no steps.", Type.BOOLEAN),
         Column("source", "", "Where its steps came from; empty for researchers."),
-        *(
-            Column(c.name, c.unit, c.meaning, Type(c.type)) for c in covariates(Patient).values()
-        ),
+        *(Column(c.name, c.unit, c.meaning, Type(c.type)) for c in covariates(Patient).values()),
         Column("device", "", "What the patient walked on or with."),
         Column("belt_speed", "m/s", "Speed of the treadmill's belt.", Type.NUMBER),
         Column("weight_support", "%", "Body weight that a harness carried.", Type.NUMBER),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from calendar import monthrange
+from contextlib import suppress
 from datetime import datetime
 
 from django.contrib.admin.models import LogEntry
 from django.contrib.contenttypes.models import ContentType
-from django.db import transaction
+from django.db import DatabaseError, connection, transaction
 from django.db.models import Exists, Max, Model, OuterRef, QuerySet
 from django.db.models.functions import Coalesce, Greatest
 
@@ -36,6 +37,7 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
     What becomes of each field stands beside it (`rehab.people.policy`).
     """
     with transaction.atomic():
+        transaction.on_commit(_empty_journal)
         lock_without_open_session(patient)
         if patient.erased_at is not None:
             return  # by another request, meanwhile
@@ -64,6 +66,23 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
             about=str(ErasureReason(reason).label),
             now=now,
         )
+
+
+def _empty_journal() -> None:
+    """Empty SQLite's write-ahead log: it holds old pages until they are overwritten.
+
+    It never waits: while others read or write, the pages are left to be overwritten.
+    """
+    if connection.vendor != "sqlite":
+        return
+    with connection.cursor() as cursor:
+        (timeout_ms,) = cursor.execute("PRAGMA busy_timeout").fetchone()
+        try:
+            cursor.execute("PRAGMA busy_timeout=0")
+            with suppress(DatabaseError):
+                cursor.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        finally:
+            cursor.execute(f"PRAGMA busy_timeout={timeout_ms:d}")
 
 
 def _erase_rows(model: type[Model], path: str, patient: Patient, pseudonym: str) -> None:

@@ -191,7 +191,7 @@ class TrainingSession(ClinicModel):
             "legacy_row": erased(shown=False, research=False),
             # It is still marked as imported, but its original cannot be found.
             "legacy_id": erased(
-                Case(When(legacy_id__isnull=False, then=-1 * F("pk"))), shown=True, research=True
+                Case(When(legacy_id__isnull=False, then=-1 * F("pk"))), shown=False, research=False
             ),
             "patient created_at valence changed_to trained_side simulated plan protocol measure": (
                 WALKED
