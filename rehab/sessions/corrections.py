@@ -15,11 +15,11 @@ from django.db import models, transaction
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import Patient, User
 from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.roles import may_see_names
-from rehab.people.scope import ScopedModel
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, State
@@ -36,6 +36,14 @@ class CorrectedField(models.TextChoices):
 Values = dict[CorrectedField, str]  # as corrections store them: see `SessionCorrection`
 
 
+# By an erasure: words are emptied, and a patient's pseudonym is replaced.
+ANONYMIZED = Allowed(
+    ("old", "new", "reason"),
+    "NEW.reason IN ('', OLD.reason) AND (OLD.field = 'patient' "
+    "OR (NEW.old IN ('', OLD.old) AND NEW.new IN ('', OLD.new)))",
+)
+
+
 def anonymize_corrections(patient: Patient, pseudonym: str) -> None:
     """Remove free text from a patient's corrections and replace the old ``pseudonym``."""
     rows = SessionCorrection.everywhere
@@ -46,13 +54,14 @@ def anonymize_corrections(patient: Patient, pseudonym: str) -> None:
         named.update(**{column: patient.pseudonym})
 
 
-class SessionCorrection(ScopedModel):
+class SessionCorrection(AppendOnlyModel):
     """One correction of a session. Rows are only ever added.
 
     ``old`` and ``new``: a patient's pseudonym, `yes` or `no`, or the text of the note.
     """
 
     scope = PatientScope(clinic="session__clinic", patient="session__patient")
+    allowed_changes = (ANONYMIZED, ACCOUNT_DELETED)
 
     session = models.ForeignKey(
         TrainingSession,
@@ -77,23 +86,13 @@ class SessionCorrection(ScopedModel):
         }
     )
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         verbose_name = _("correction")
         verbose_name_plural = _("corrections")
         ordering: ClassVar = ["session", "pk"]
 
     def __str__(self) -> str:
         return self.get_field_display()
-
-    def save(self, *args: Any, **kwargs: Any) -> None:
-        """Add the row. Raises TypeError for one that is already stored."""
-        if self.pk and not kwargs.get("force_insert"):
-            raise TypeError("A correction is never altered. Make another one.")
-        super().save(*args, **kwargs)
-
-    def delete(self, *args: Any, **kwargs: Any) -> Any:
-        """Raise TypeError: the history of corrections is kept."""
-        raise TypeError("A correction is never deleted. Make another one.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,13 @@ from django.db import models
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.random_codes import random_code
 from rehab.people.scope import ClinicModel, ScopedModel
 from rehab.sessions.models import TrainingSession
-from rehab.studies.append_only import AppendOnlyModel
 from rehab.studies.models import Arm, Study, StudyVersion
 
 ERASED_CODE = "E-"  # begins the code of an erased participant
@@ -162,6 +162,10 @@ class StudyEvent(AppendOnlyModel):
 
     # Reasons may name the condition.
     scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")
+    allowed_changes = (
+        Allowed(("reason", "about"), "NEW.reason = '' AND NEW.about = ''"),  # by an erasure
+        ACCOUNT_DELETED,
+    )
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="events")
     enrollment = models.ForeignKey(

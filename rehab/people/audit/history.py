@@ -22,7 +22,8 @@ from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.audit.sealing import SealableModel
+from rehab.people.append_only import Allowed
+from rehab.people.audit.sealing import ERASED, SealableModel, is_cut
 from rehab.people.models import Clinic, User
 from rehab.people.policy import policies_of
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
@@ -48,6 +49,16 @@ SECRET_FIELDS = {"password", "pin_hash"}  # that they changed is recorded, never
 MASK = "•••"
 ROW_BEFORE = "_row_before_save"
 M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # index of the keys in [old, new]
+
+# By an erasure: the values of a change are all null.
+_VALUES = {
+    "sqlite": "json_each(NEW.changes) WHERE type <> 'null'",
+    "postgresql": "jsonb_each(NEW.changes) WHERE value <> 'null'::jsonb",
+}
+EMPTIED = {
+    vendor: f"{ERASED} AND NOT EXISTS (SELECT 1 FROM {values})"  # noqa: S608  # no stranger's text
+    for vendor, values in _VALUES.items()
+}
 
 _tracked: list[type[Any]] = []
 _request: ContextVar[HttpRequest | None] = ContextVar("request", default=None)
@@ -82,6 +93,8 @@ class HistoryEntry(SealableModel):
         clinic="clinic", host=Q(clinic__isnull=True) | Q(model_name__in=["Clinic", "User"])
     )
 
+    allowed_changes = (Allowed(("changes", "salt", "erased"), EMPTIED),)
+    allowed_deletion = is_cut("HistoryEntry")
     sealed_fields = ("clinic", "model_name", "object_id", "kind", "changes", "by", "through", "at")
 
     clinic = models.ForeignKey(
