@@ -12,6 +12,8 @@ SQLITE_OPTIONS = {
         # FULL keeps acknowledged steps through a power cut, not only through a crash
         # (docs/reference/stack.md#durability).
         "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; "
+        # What is deleted or overwritten, as by an erasure, is not left in the file's free space.
+        "PRAGMA secure_delete=ON; "
         # No memory map: an error of the disk in it would end the process.
         "PRAGMA mmap_size=0; PRAGMA cache_size=-16000; "
         # The live runtime checkpoints between commits (rehab/sessions/live/process.py); left to

@@ -11,6 +11,8 @@ from django.conf import settings
 from django.core import checks
 from django.core.checks import CheckMessage, Error, Tags, register
 
+from rehab.people.policy import find_undeclared
+
 # Variables of tests, of robots and of sources, which may run on the same machine.
 OF_OTHERS = ("GARRY_TEST_", "GARRY_ROBOT_", "GARRY_ROS_URL", "GARRY_SERVER", "GARRY_TOKEN")
 
@@ -179,4 +181,19 @@ def check_application_order(**_: Any) -> list[CheckMessage]:
             hint="List rehab first in INSTALLED_APPS.",
             id="garry.E010",
         )
+    ]
+
+
+@register(Tags.models)
+def check_personal_fields(**_: Any) -> list[CheckMessage]:
+    """Check that each field about a patient says what becomes of it."""
+    return [
+        Error(
+            f"{name} leads to a patient, and its model does not say what becomes of it.",
+            hint="Add it to `personal`, beside the model's fields: whether it is erased, shown in "
+            "the patient's data, exported for research and recorded in the history "
+            "(rehab/people/policy.py). An entry of no field goes.",
+            id="garry.E013",
+        )
+        for name in find_undeclared()
     ]

@@ -24,6 +24,7 @@ from rehab.boards.choices import (
 )
 from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import BoardsConsent, Clinic, Patient
+from rehab.people.policy import personal_fields, retained
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 
@@ -156,6 +157,11 @@ class Leaderboard(ClinicModel):
     )
     occasion = models.CharField(
         _("shown"), max_length=16, choices=Occasion.choices, default=Occasion.AFTER_SESSION
+    )
+
+    # Of the group's rows. By then the patient has no name.
+    personal = personal_fields(
+        {"group": retained("who could be on a board", shown=True, research=False)}
     )
 
     class Meta(ClinicModel.Meta):

@@ -21,6 +21,7 @@ from rehab.patients.visits import Visit
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
 from rehab.people.models import Patient, User
+from rehab.people.policy import describe
 from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import Enrollment
 from rehab.training.scoring import RULES_VERSION
@@ -71,7 +72,7 @@ def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple
 
 def _patient_tables(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
-    yield "patient.json", write_json(describe_patient(patient))
+    yield "patient.json", write_json(describe(patient))
     yield "consent.json", write_json(list_consents(user, patient))
     yield "visits.json", write_json(list_visits(user, patient))
     yield "family.json", write_json(list_family_links(user, patient))
@@ -97,36 +98,6 @@ def _session_tables(selection: Selection) -> Iterator[tuple[str, Any]]:
         header = [column.name for column in table.columns]
         yield table.file, write_csv(header, selection.read(table))
     yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
-
-
-def describe_patient(patient: Patient) -> dict[str, Any]:
-    """Return what is stored of the person."""
-    return {
-        "nickname": patient.nickname,
-        "code": patient.code,
-        "pseudonym": patient.pseudonym,
-        "clinic": patient.clinic.name,
-        "paretic_side": patient.paretic_side or None,
-        "body_mass_kg": patient.body_mass_kg,
-        "birth_year": patient.birth_year,
-        "stroke_month": patient.stroke_month,
-        "severity": patient.severity or None,
-        "language": patient.language,
-        "screen_side": patient.screen_side,
-        "screen_text": patient.screen_text,
-        "screen_still": patient.screen_still,
-        "screen_sounds": patient.screen_sounds,
-        "leaderboards": patient.boards,
-        "animal_name": patient.alias,
-        "in_a_blinded_study": patient.blinded,
-        "simulated": patient.simulated,
-        "participant_of_the_original": patient.legacy_id,
-        "created_at": patient.created_at,
-        "program_ended_at": patient.ended_at,
-        "program_end_reason": patient.end_reason or None,
-        "erased_at": patient.erased_at,
-        "erasure_reason": patient.erasure_reason or None,
-    }
 
 
 def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:

@@ -26,8 +26,8 @@ from rehab.exports.tables import (
     Table,
 )
 from rehab.exports.told import told_steps
-from rehab.people.covariates import age_band, months_since
-from rehab.people.models import User
+from rehab.people.models import Patient, User
+from rehab.people.policy import covariates
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
@@ -253,8 +253,6 @@ def _read_covariates(session: TrainingSession) -> tuple[Any, ...]:
     """Return what analyses adjust by, in bands: no date of birth or of the stroke."""
     patient, day = session.patient, session.began_at.date()
     return (
-        age_band(patient.birth_year, day),
-        months_since(patient.stroke_month, day),
-        *(patient.severity, patient.paretic_side),
+        *(each.value(getattr(patient, name), day) for name, each in covariates(Patient).items()),
         *(session.device, session.belt_speed_m_s, session.weight_support_percent),
     )

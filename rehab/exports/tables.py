@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from rehab.people.models import Patient
+from rehab.people.policy import covariates
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.summary.metrics import METRICS
 
@@ -115,10 +117,7 @@ SESSIONS = Table(
         Column("simulated", "", "true: no person walked.", Type.BOOLEAN),
         Column("imported", "", "true: from the original GARRY, which kept no steps.", Type.BOOLEAN),
         Column("source", "", "Where its steps came from; empty for researchers."),
-        Column("age_band", "years", "Age when it began, by calendar years, in bands of ten."),
-        Column("months_since_stroke", "months", "From the stroke to its beginning.", Type.INTEGER),
-        Column("severity", "", "mild, moderate or severe, as the clinic judges it now."),
-        Column("paretic_side", "", "The leg that the stroke weakened."),
+        *(Column(c.name, c.unit, c.meaning, Type(c.type)) for c in covariates(Patient).values()),
         Column("device", "", "What the patient walked on or with."),
         Column("belt_speed", "m/s", "Speed of the treadmill's belt.", Type.NUMBER),
         Column("weight_support", "%", "Body weight that a harness carried.", Type.NUMBER),

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from calendar import monthrange
+from contextlib import suppress
 from datetime import datetime
 
 from django.contrib.admin.models import LogEntry
 from django.contrib.contenttypes.models import ContentType
-from django.db import transaction
-from django.db.models import Exists, F, Max, OuterRef, QuerySet
+from django.db import DatabaseError, connection, transaction
+from django.db.models import Exists, Max, Model, OuterRef, QuerySet
 from django.db.models.functions import Coalesce, Greatest
-from django.utils.translation import gettext as _
 
 from rehab.patients.closure import lock_without_open_session
-from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
@@ -21,49 +20,45 @@ from rehab.people.audit.history import erase_values
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.consent.tombstones import block_reimport
-from rehab.people.models import Clinic, ErasureReason, Patient, User, generate_pseudonym
-from rehab.sessions.corrections import anonymize_corrections
+from rehab.people.models import Clinic, ErasureReason, Patient, User
+from rehab.people.policy import (
+    Erasure,
+    erased_values,
+    erasers_of,
+    paths_to_patient,
+    policies_of,
+)
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.log import Remark, SessionEvent
-from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ChangeKind
 
 
 def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetime) -> None:
-    """Erase everything that identifies a person, permanently. Raises SessionStillOpen."""
+    """Erase everything that identifies a person, permanently. Raises SessionStillOpen.
+
+    What becomes of each field stands beside it (`rehab.people.policy`).
+    """
     with transaction.atomic():
+        transaction.on_commit(_empty_journal)
         lock_without_open_session(patient)
         if patient.erased_at is not None:
-            return  # somebody else has erased it meanwhile
+            return  # by another request, meanwhile
         withdraw_consent(patient, Purpose.BOARDS, by, now)
-        old_pseudonym = patient.pseudonym
+        pseudonym = patient.pseudonym
         if patient.legacy_id is not None:
             block_reimport(patient.clinic_id, patient.legacy_id)
-        patient.pseudonym = patient.code = generate_pseudonym()
-        patient.nickname = _("Erased")
-        patient.body_mass_kg = patient.legacy_id = patient.alias = None
-        patient.birth_year = patient.stroke_month = None
-        patient.severity = ""
+        for eraser in erasers_of(Patient):
+            eraser(patient, pseudonym)
+        for name, value in erased_values(Patient).items():
+            setattr(patient, name, value)
         patient.ended_at = patient.ended_at or now
         patient.erased_at, patient.erasure_reason = now, reason
         patient.save()
-        sessions = TrainingSession.everywhere.filter(patient=patient)
-        # Sources may be files that are named after a person.
-        sessions.update(source="", source_args=[], legacy_row=None)
-        # The session is still marked as imported, but its original cannot be found.
-        sessions.filter(legacy_id__isnull=False).update(legacy_id=-1 * F("pk"))
-        SessionEvent.everywhere.filter(
-            session__patient=patient, kind__in=[remark.value for remark in Remark]
-        ).update(data={})
-        _erase_typed_words(patient)
-        anonymize_corrections(patient, old_pseudonym)
-        Visit.everywhere.filter(patient=patient).delete()
-        FamilyLink.everywhere.filter(patient=patient).delete()
+        for model, path in paths_to_patient().items():
+            if model is not Patient:
+                _erase_rows(model, path, patient, pseudonym)
         erase_values("Patient", patient.pk)
         LogEntry.objects.filter(
             content_type=ContentType.objects.get_for_model(Patient), object_id=str(patient.pk)
         ).update(object_repr=patient.pseudonym)
-        audit_log.anonymize_patient(patient.pk)
         audit_log.record(
             Act.ERASE,
             by,
@@ -73,16 +68,33 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
         )
 
 
-def _erase_typed_words(patient: Patient) -> None:
-    """Empty the words that were typed for a patient's sessions: they may name anybody."""
-    edits = SessionEvent.everywhere.filter(
-        session__patient=patient, kind=ChangeKind.FEEDBACK_TEXT.value
-    )
-    emptied = list(edits)
-    for edit in emptied:
-        for band in edit.data.get("value", {}).get("bands", ()):
-            band["words"] = ""
-    edits.bulk_update(emptied, ["data"])
+def _empty_journal() -> None:
+    """Empty SQLite's write-ahead log: it holds old pages until they are overwritten.
+
+    It never waits: while others read or write, the pages are left to be overwritten.
+    """
+    if connection.vendor != "sqlite":
+        return
+    with connection.cursor() as cursor:
+        (timeout_ms,) = cursor.execute("PRAGMA busy_timeout").fetchone()
+        try:
+            cursor.execute("PRAGMA busy_timeout=0")
+            with suppress(DatabaseError):
+                cursor.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        finally:
+            cursor.execute(f"PRAGMA busy_timeout={timeout_ms:d}")
+
+
+def _erase_rows(model: type[Model], path: str, patient: Patient, pseudonym: str) -> None:
+    """Erase what the policies of a model's fields say, in all rows that lead to a patient."""
+    rows = model._base_manager.filter(**{path: patient})
+    if any(policy.erasure is Erasure.DELETE for policy in policies_of(model).values()):
+        rows.delete()
+        return
+    if values := erased_values(model):
+        rows.update(**values)
+    for eraser in erasers_of(model):
+        eraser(patient, pseudonym)
 
 
 def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:

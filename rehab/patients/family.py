@@ -20,6 +20,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents, consent_withdrawn
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.models.blinding import hidden_patients, is_in_running_study
+from rehab.people.policy import deleted, personal_fields
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.sign_in.tokens import TOKEN_BYTES, hash_token
 
@@ -56,6 +57,15 @@ class FamilyLink(ClinicModel):
     ended_at = models.DateTimeField(_("ended"), null=True)
     opened_at = models.DateTimeField(_("last opened"), null=True)
     opened = models.PositiveIntegerField(_("times opened"), default=0)
+
+    personal = personal_fields(
+        {
+            "patient shows_name created_at expires_at ended_at opened_at opened": deleted(
+                shown=True, research=False
+            ),
+            "clinic token_hash created_by": deleted(shown=False, research=False),
+        }
+    )
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("family link")

@@ -15,10 +15,11 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import offered_purposes, record_boards_consent, record_consent
 from rehab.people.forms import PatientFieldsForm
 from rehab.people.models import BoardsConsent, EndReason, ErasureReason, Patient, User
+from rehab.people.policy import details
 
 
 class MonthField(forms.DateField):
-    """A month, kept as its first day."""
+    """A month, stored as its first day."""
 
     widget = forms.DateInput(format="%Y-%m", attrs={"type": "month", "placeholder": "2026-03"})
     input_formats = ("%Y-%m", "%Y-%m-%d")
@@ -27,12 +28,11 @@ class MonthField(forms.DateField):
 class PatientForm(PatientFieldsForm):
     """A patient of the PT's clinic, new or to be edited."""
 
+    field_order = ("nickname", "code", "paretic_side")  # then as in the model
+
     class Meta:
         model = Patient
-        fields: ClassVar = [
-            *("nickname", "code", "paretic_side", "body_mass_kg"),
-            *("birth_year", "stroke_month", "severity"),
-        ]
+        fields: ClassVar = details(Patient)
         field_classes: ClassVar = {"stroke_month": MonthField}
 
     def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:

@@ -12,6 +12,7 @@ from django.db.models import Count
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.policy import deleted, personal_fields
 from rehab.people.scope import ClinicModel, Scope
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
@@ -35,6 +36,8 @@ class Visit(ClinicModel):
     )
     day = models.DateField(_("day"))
     at = models.TimeField(_("time"), null=True, blank=True)
+
+    personal = personal_fields({"clinic patient day at": deleted(shown=True, research=False)})
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("visit")

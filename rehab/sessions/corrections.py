@@ -15,10 +15,11 @@ from django.db import models, transaction
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import Patient, User
+from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.roles import may_see_names
-from rehab.people.scope import ScopedModel
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import figures_stored
 from rehab.sessions.models import TrainingSession
@@ -36,13 +37,32 @@ class CorrectedField(models.TextChoices):
 Values = dict[CorrectedField, str]  # as corrections store them: see `SessionCorrection`
 
 
-class SessionCorrection(ScopedModel):
+# By an erasure: words are emptied, and a patient's pseudonym is replaced.
+ANONYMIZED = Allowed(
+    ("old", "new", "reason"),
+    "NEW.reason IN ('', OLD.reason) AND (OLD.field = 'patient' "
+    "OR (NEW.old IN ('', OLD.old) AND NEW.new IN ('', OLD.new)))",
+)
+
+
+def anonymize_corrections(patient: Patient, pseudonym: str) -> None:
+    """Remove free text from a patient's corrections and replace the old ``pseudonym``."""
+    rows = SessionCorrection.everywhere
+    rows.filter(session__patient=patient).update(reason="")
+    rows.filter(session__patient=patient, field=CorrectedField.NOTE).update(old="", new="")
+    for column in ("old", "new"):
+        named = rows.filter(field=CorrectedField.PATIENT, **{column: pseudonym})
+        named.update(**{column: patient.pseudonym})
+
+
+class SessionCorrection(AppendOnlyModel):
     """One correction of a session. Rows are only ever added.
 
     ``old`` and ``new``: a patient's pseudonym, `yes` or `no`, or the text of the note.
     """
 
     scope = PatientScope(clinic="session__clinic", patient="session__patient")
+    allowed_changes = (ANONYMIZED, ACCOUNT_DELETED)
 
     session = models.ForeignKey(
         TrainingSession,
@@ -59,23 +79,21 @@ class SessionCorrection(ScopedModel):
     )
     at = models.DateTimeField(_("at"))
 
-    class Meta(ScopedModel.Meta):
+    personal = personal_fields(
+        {
+            "old new reason": erased_by(anonymize_corrections, shown=True, research=True),
+            "session field at": retained("what was corrected, and when", shown=True, research=True),
+            "by": retained("staff", shown=True, research=False),
+        }
+    )
+
+    class Meta(AppendOnlyModel.Meta):
         verbose_name = _("correction")
         verbose_name_plural = _("corrections")
         ordering: ClassVar = ["session", "pk"]
 
     def __str__(self) -> str:
         return self.get_field_display()
-
-    def save(self, *args: Any, **kwargs: Any) -> None:
-        """Add the row. Raises TypeError for one that is already stored."""
-        if self.pk and not kwargs.get("force_insert"):
-            raise TypeError("A correction is never altered. Make another one.")
-        super().save(*args, **kwargs)
-
-    def delete(self, *args: Any, **kwargs: Any) -> Any:
-        """Raise TypeError: the history of corrections is kept."""
-        raise TypeError("A correction is never deleted. Make another one.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,16 +109,6 @@ class DescribedCorrection:
     def at(self) -> datetime:
         """When it was made, in the clinic's time zone."""
         return clinic_time(self.row.at, self.row.session.clinic)
-
-
-def anonymize_corrections(patient: Patient, pseudonym: str) -> None:
-    """Remove free text from a patient's corrections and replace the old ``pseudonym``."""
-    rows = SessionCorrection.everywhere
-    rows.filter(session__patient=patient).update(reason="")
-    rows.filter(session__patient=patient, field=CorrectedField.NOTE).update(old="", new="")
-    for column in ("old", "new"):
-        named = rows.filter(field=CorrectedField.PATIENT, **{column: pseudonym})
-        named.update(**{column: patient.pseudonym})
 
 
 def current_note(session: TrainingSession, reader: Any) -> str:

@@ -10,6 +10,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
+from rehab.people.policy import personal_fields, retained
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession
 from robot.wire.incident import unpack
@@ -34,6 +35,14 @@ class RobotIncident(ScopedModel):
     at = models.DateTimeField(_("at"))
     reason = models.CharField(_("why the robot stopped"), max_length=64)
     recording = models.TextField(_("recording"))
+
+    personal = personal_fields(
+        {
+            "session at reason recording": retained(
+                "what the robot did, for its safety; no words", shown=True, research=True
+            )
+        }
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("incident of a robot")

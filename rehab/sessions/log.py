@@ -12,11 +12,15 @@ from django.dispatch import Signal
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.models import SIDES, User
+from rehab.people.models import SIDES, Patient, User
+from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import SessionScope, TrainingSession
+from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS
 from rehab.training.summary.metrics import METRICS
+
+MEASURED = retained("a measurement under a pseudonym", shown=True, research=True)
 
 
 class Step(ScopedModel):
@@ -57,6 +61,15 @@ class Step(ScopedModel):
     )
     rules_version = models.PositiveSmallIntegerField(_("rules version"))
     extra = models.JSONField(_("extra"), default=dict)
+
+    personal = personal_fields(
+        {
+            "session number time_s received_at side value gain shown goal performance hit close": (
+                MEASURED
+            ),
+            "late points valid reasons phase rules_version extra": MEASURED,
+        }
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("step")
@@ -152,6 +165,17 @@ EVENTS = {
 }
 
 
+def erase_typed_words(patient: Patient, _pseudonym: str) -> None:
+    """Empty the words that were typed for a patient's sessions: they may name anybody."""
+    events = SessionEvent.everywhere.filter(session__patient=patient)
+    events.filter(kind__in=[remark.value for remark in Remark]).update(data={})
+    edits = list(events.filter(kind=ChangeKind.FEEDBACK_TEXT.value))
+    for edit in edits:
+        for band in edit.data.get("value", {}).get("bands", ()):
+            band["words"] = ""
+    events.bulk_update(edits, ["data"])
+
+
 class SessionEvent(ScopedModel):
     """A change of a session, a remark, or an act of its robot, ordered against its steps.
     Rows are only added.
@@ -180,6 +204,14 @@ class SessionEvent(ScopedModel):
     )
     at = models.DateTimeField(_("at"))
     data = models.JSONField(_("data"), default=dict)
+
+    personal = personal_fields(
+        {
+            "data": erased_by(erase_typed_words, shown=True, research=True),
+            "session after_number kind old value at": MEASURED,
+            "by": retained("staff", shown=True, research=False),
+        }
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("session event")
@@ -211,6 +243,8 @@ class SessionMetric(ScopedModel):
         choices=[(metric.slug, _(metric.label)) for metric in METRICS.values()],
     )
     value = models.FloatField(_("value"))
+
+    personal = personal_fields({"session slug value": MEASURED})
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("session metric")

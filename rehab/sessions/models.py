@@ -8,13 +8,14 @@ from datetime import datetime, timedelta
 from typing import Any, ClassVar
 
 from django.db import models
-from django.db.models import Exists, OuterRef, Q, QuerySet
+from django.db.models import Case, Exists, F, OuterRef, Q, QuerySet, When
 from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
+from rehab.people.policy import erased, personal_fields, retained
 from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
@@ -32,6 +33,7 @@ STATES = {
 }
 
 
+WALKED = retained("what was walked and how, under a pseudonym", shown=True, research=True)
 SCORES_SHOWN_FOR = timedelta(minutes=15)
 
 
@@ -178,6 +180,29 @@ class TrainingSession(ClinicModel):
     # The process that writes the log; a new owner raises the epoch, which locks the old one out.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False, db_index=True)
+
+    personal = personal_fields(
+        {
+            # Sources may be files that are named after a person.
+            "source": erased("", shown=True, research=False),
+            "source_args": erased([], shown=False, research=False),
+            "legacy_row": erased(shown=False, research=False),
+            # It is still marked as imported, but its original cannot be found.
+            "legacy_id": erased(
+                Case(When(legacy_id__isnull=False, then=-1 * F("pk"))), shown=False, research=False
+            ),
+            "patient created_at valence changed_to trained_side simulated plan protocol measure": (
+                WALKED
+            ),
+            "device belt_speed_m_s weight_support_percent state goal started_at ended_at": WALKED,
+            "active_s excluded": WALKED,
+            "clinic station created_by": retained("places and staff", shown=False, research=False),
+            "checkpoint": retained("None once it has ended", shown=False, research=False),
+            "last_number epoch owner": retained(
+                "the server's own", shown=False, research=False
+            ),
+        }
+    )
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("session")

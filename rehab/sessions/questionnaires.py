@@ -14,6 +14,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.models.clinics import language_choices
+from rehab.people.policy import personal_fields, retained
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.questionnaires.instrument import Instrument, read_items
@@ -125,6 +126,14 @@ class QuestionnaireResponse(ScopedModel):
     answers = models.JSONField(_("answers"), default=list)
     asked_at = models.DateTimeField(_("planned at"), default=timezone.now)
     finished_at = models.DateTimeField(_("finished at"), null=True)
+
+    personal = personal_fields(
+        {
+            "session slug instrument answers asked_at finished_at": retained(
+                "points on the clinic's own scales, under a pseudonym", shown=True, research=True
+            )
+        }
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("answered questionnaire")

@@ -12,7 +12,6 @@ from rehab.patients.visits import plan_visit
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents
 from rehab.people.models import Patient, User
-from rehab.people.random_codes import random_code
 from rehab.sessions.formatting import clinic_time
 from rehab.studies.allocation.groups import Allocated
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
@@ -26,8 +25,6 @@ from rehab.studies.registration.lifecycle import (
     set_blinded,
 )
 from rehab.training.measures import InvalidSetting
-
-ERASED_CODE = "E-"  # begins the code of a participant who was erased
 
 
 def enroll(
@@ -143,12 +140,3 @@ def withdraw_everywhere(patient: Patient, by: User | None, now: datetime) -> Non
     running = patient.enrollments.filter(withdrawn_at=None, study__state=StudyState.RUNNING)
     for enrollment in running.select_related("study", "patient"):
         withdraw(enrollment, by, now)
-
-
-def anonymize(patient: Patient, by: User | None, now: datetime) -> None:
-    """Remove what leads from studies to an erased patient; the numbers of the study stay right."""
-    withdraw_everywhere(patient, by, now)
-    for enrollment in patient.enrollments.exclude(code__startswith=ERASED_CODE):
-        enrollment.code = f"{ERASED_CODE}{random_code(8)}"
-        enrollment.save(update_fields=["code"])
-    StudyEvent.everywhere.filter(enrollment__patient=patient).update(reason="", about="")

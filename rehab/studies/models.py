@@ -11,6 +11,7 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
@@ -22,7 +23,6 @@ from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
 from rehab.studies.analysis import outcomes
-from rehab.studies.append_only import AppendOnlyModel
 from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
@@ -165,6 +165,7 @@ class StudyVersion(AppendOnlyModel):
     """A study as it was registered, and as it was changed later; each session names its version."""
 
     scope = Scope(clinic="study__clinic")
+    allowed_changes = (ACCOUNT_DELETED,)
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="versions")
     number = models.PositiveSmallIntegerField()
@@ -263,7 +264,7 @@ class Arm(ScopedModel):
         return ArmRule(self.code, self.name, self.weight, condition)
 
 
-class StudyMark(ScopedModel):
+class StudyMark(AppendOnlyModel):
     """What an account is in a study besides its role, until ``ended_at``."""
 
     class Task(models.TextChoices):
@@ -273,6 +274,10 @@ class StudyMark(ScopedModel):
         INTERIM = "interim", _("May look before the study is closed")
 
     scope = Scope(clinic="study__clinic")
+    allowed_changes = (
+        Allowed(("ended_at",), "OLD.ended_at IS NULL AND NEW.ended_at IS NOT NULL"),
+        ACCOUNT_DELETED,
+    )
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="marks")
     user = models.ForeignKey(User, on_delete=models.PROTECT, related_name="study_marks")
@@ -281,7 +286,7 @@ class StudyMark(ScopedModel):
     at = models.DateTimeField(default=timezone.now)
     ended_at = models.DateTimeField(null=True)
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         verbose_name = _("mark")
         ordering: ClassVar = ["pk"]
         constraints: ClassVar = [

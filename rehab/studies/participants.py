@@ -8,12 +8,29 @@ from django.db import models
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.policy import erased_by, personal_fields, retained
+from rehab.people.random_codes import random_code
 from rehab.people.scope import ClinicModel, ScopedModel
 from rehab.sessions.models import TrainingSession
-from rehab.studies.append_only import AppendOnlyModel
 from rehab.studies.models import Arm, Study, StudyVersion
+
+ERASED_CODE = "E-"  # begins the code of an erased participant
+OF_STUDY = retained("the study's result, under a code", shown=True, research=True)
+
+
+def replace_codes(patient: Patient, _pseudonym: str) -> None:
+    """Give an erased participant other codes; the numbers of the studies stay right."""
+    for enrollment in patient.enrollments.exclude(code__startswith=ERASED_CODE):
+        enrollment.code = f"{ERASED_CODE}{random_code(8)}"
+        enrollment.save(update_fields=["code"])
+
+
+def empty_reasons(patient: Patient, _pseudonym: str) -> None:
+    """Empty the words that were typed about an erased participant."""
+    StudyEvent.everywhere.filter(enrollment__patient=patient).update(reason="", about="")
 
 
 class Enrollment(ClinicModel):
@@ -34,6 +51,15 @@ class Enrollment(ClinicModel):
     enrolled_at = models.DateTimeField(_("enrolled"), default=timezone.now)
     enrolled_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
     withdrawn_at = models.DateTimeField(_("withdrawn"), null=True)
+
+    personal = personal_fields(
+        {
+            "code": erased_by(replace_codes, shown=True, research=True),
+            "study patient version levels enrolled_at withdrawn_at": OF_STUDY,
+            "keep_data": retained("what was agreed to", shown=True, research=False),
+            "clinic enrolled_by": retained("place and staff", shown=False, research=False),
+        }
+    )
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("participant")
@@ -62,6 +88,13 @@ class Allocation(AppendOnlyModel):
     )
     group = models.CharField(max_length=64)
     at = models.DateTimeField(default=timezone.now)
+
+    personal = personal_fields(
+        {
+            "enrollment group": OF_STUDY,
+            "at": retained("when it was allocated", shown=False, research=False),
+        }
+    )
 
     class Meta(AppendOnlyModel.Meta):
         verbose_name = _("allocation")
@@ -92,6 +125,8 @@ class StudyVisit(ScopedModel):
     )
     # Which version of the study its session was created from.
     version = models.ForeignKey(StudyVersion, on_delete=models.PROTECT, related_name="+", null=True)
+
+    personal = personal_fields({"enrollment number attempt period day session version": OF_STUDY})
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("study visit")
@@ -127,6 +162,10 @@ class StudyEvent(AppendOnlyModel):
 
     # Reasons may name the condition.
     scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")
+    allowed_changes = (
+        Allowed(("reason", "about"), "NEW.reason = '' AND NEW.about = ''"),  # by an erasure
+        ACCOUNT_DELETED,
+    )
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="events")
     enrollment = models.ForeignKey(
@@ -139,6 +178,16 @@ class StudyEvent(AppendOnlyModel):
         User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
     )
     at = models.DateTimeField(_("at"), default=timezone.now)
+
+    personal = personal_fields(
+        {
+            "reason about": erased_by(empty_reasons, shown=False, research=False),
+            "study enrollment kind at": retained(
+                "what happened, under a code", shown=True, research=False
+            ),
+            "by": retained("staff", shown=False, research=False),
+        }
+    )
 
     class Meta(AppendOnlyModel.Meta):
         verbose_name = _("event")

@@ -11,7 +11,7 @@ from django.utils import timezone
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import consent_withdrawn
 from rehab.people.models import Patient, User
-from rehab.studies.enrolling import anonymize, withdraw_everywhere
+from rehab.studies.enrolling import withdraw_everywhere
 
 
 def connect_receivers() -> None:
@@ -31,6 +31,6 @@ def on_withdrawal(
 def on_patient(
     instance: Patient, raw: bool = False, update_fields: Any = None, **_signal: Any
 ) -> None:
-    """Remove what leads to an erased patient."""
+    """Let a patient who is erased leave the study."""
     if instance.erased_at is not None and not raw and update_fields is None:
-        anonymize(instance, None, timezone.now())
+        withdraw_everywhere(instance, None, timezone.now())

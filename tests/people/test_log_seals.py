@@ -17,7 +17,7 @@ from django.utils import timezone
 from rehab.management.commands.doctor import examine_seals
 from rehab.patients.erasure import delete_old_logs
 from rehab.people.audit import audit_log, guards, history, seals
-from rehab.people.audit.audit_log import Act, AuditEntry, RecentEntries
+from rehab.people.audit.audit_log import Act, AuditEntry, Recent
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.audit.seals import LogSeal, find_broken, seal_logs
 from rehab.people.models import Patient
@@ -94,7 +94,7 @@ def test_the_database_itself_refuses_to_change_seals(logged, sql):
 
 
 def test_an_entry_is_counted_until_it_is_sealed(logged, monkeypatch, tmp_path):
-    monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
+    monkeypatch.setattr(audit_log, "recent_entries", Recent())
     now = timezone.now()
 
     def stop() -> list[int]:
@@ -124,7 +124,7 @@ def break_into(sql: str) -> None:
 
 
 def test_a_clock_that_was_ahead_keeps_nothing_from_being_sealed_or_counted(logged, monkeypatch):
-    monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
+    monkeypatch.setattr(audit_log, "recent_entries", Recent())
     who = logged.people[Role.PT]
     audit_log.record(Act.VIEW, who, about="ahead", now=NOW + timedelta(days=400))
     audit_log.record(Act.VIEW, who, about="right again", now=NOW)
@@ -187,7 +187,7 @@ def test_doctor_misses_a_trigger(logged):
     guards.remove("default")
     missing = [one.state for one in examine_seals() if "trigger" in one.state]
     guards.install("default")
-    assert "the trigger garry_audit_delete is missing" in missing
+    assert "the trigger garry_rehab_auditentry_delete is missing" in missing
 
 
 # --- the two ways left open -----------------------------------------------------------------------
@@ -195,7 +195,7 @@ def test_doctor_misses_a_trigger(logged):
 
 def test_erasing_empties_values_and_the_chain_holds(logged):
     seal_logs(LATER)
-    audit_log.anonymize_patient(logged.patient.pk)
+    audit_log.anonymize_patient(logged.patient, "")
     history.erase_values("Patient", logged.patient.pk)
     assert list(find_broken()) == []
     entries = AuditEntry.everywhere.filter(act=Act.VIEW, clinic=logged.clinic, erased=True)

@@ -15,8 +15,7 @@ from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import (
     Act,
     AuditEntry,
-    RecentEntries,
-    RecentViews,
+    Recent,
     build_entry,
     record_counted,
 )
@@ -35,8 +34,8 @@ FIREFOX = "Mozilla/5.0 (Windows NT 10.0; Win64; x64; rv:131.0) Gecko/20100101 Fi
 
 @pytest.fixture(autouse=True)
 def fresh(monkeypatch):
-    monkeypatch.setattr(audit_log, "recent_views", RecentViews())
-    monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
+    monkeypatch.setattr(audit_log, "recent_views", Recent())
+    monkeypatch.setattr(audit_log, "recent_entries", Recent())
 
 
 @pytest.fixture
@@ -170,7 +169,7 @@ def test_a_token_is_traced_at_its_first_use_in_each_network(world):
     token = bearer_token(world.people[Role.LEAD], Role.PT)
     program = Client(headers={"Authorization": f"Bearer {token}"})
     for address in ("192.0.2.7", "192.0.2.9", "198.51.100.4", "192.0.2.7"):
-        audit_log.recent_views = RecentViews()  # long after
+        audit_log.recent_views = Recent()  # long after
         assert program.get("/api/v1/me", REMOTE_ADDR=address).status_code == 200
     assert [row[3] for row in traced(Act.TOKEN_USE)] == ["192.0.2.0/24", "198.51.100.0/24"]
 

@@ -8,7 +8,7 @@ import pytest
 from django.urls import reverse
 
 from rehab.people.audit import audit_log
-from rehab.people.audit.audit_log import Act, AuditEntry, RecentViews
+from rehab.people.audit.audit_log import Act, AuditEntry, Recent
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.reports.incident import review_incident
@@ -34,7 +34,7 @@ def test_the_page_tells_what_happened_and_can_be_replayed(world):
 
 
 def test_who_looked_is_noted_with_the_patient(world, monkeypatch):
-    monkeypatch.setattr(audit_log, "recent_views", RecentViews())
+    monkeypatch.setattr(audit_log, "recent_views", Recent())
     client_of(world).get(address(world))
     entry = AuditEntry.everywhere.get(act=Act.VIEW, about=address(world))
     assert entry.patient_id == world.patient.pk

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from django.db import IntegrityError, transaction
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
-from rehab.studies.append_only import AppendOnlyRow
-from rehab.studies.models import StudyState
-from rehab.studies.participants import StudyEvent
+from rehab.studies.models import StudyMark, StudyState
+from rehab.studies.participants import Allocation
 from rehab.studies.registration.document import describe, digest_of
 from rehab.studies.registration.lifecycle import close, current_version, register, revise, start
 from rehab.studies.registration.sealing import seal, unseal
@@ -42,8 +42,6 @@ def test_registering_fixes_the_plan_and_publishes_a_commitment_alone(world):
     assert SEED not in str(version.document) + study.sealed
     with pytest.raises(InvalidSetting, match="is registered"):
         register(study, None, NOW)
-    with pytest.raises(AppendOnlyRow):
-        version.save()
 
 
 @pytest.mark.parametrize(
@@ -228,15 +226,33 @@ def test_closing_waits_for_open_sessions_and_ends_what_was_hidden(world):
         enrolled(study, new_patient(world, 2))
 
 
-def test_events_are_only_added(world):
+@pytest.mark.parametrize(
+    ("rows", "changes"),
+    [
+        ("versions", {"document": {}}),
+        ("events", {"reason": "otherwise"}),
+        ("events", {"kind": "closed"}),
+        ("marks", {"task": "assessor"}),
+        ("allocations", {"group": "B"}),
+    ],
+)
+def test_what_happened_in_a_study_is_only_added(rows, changes, world):
     study = running_study(world)
-    event = study.events.first()
-    event.reason = "otherwise"
-    with pytest.raises(AppendOnlyRow):
-        event.save()
-    assert StudyEvent.everywhere.get(pk=event.pk).reason == ""
-    with pytest.raises(AppendOnlyRow):
-        event.delete()
+    enrollment = enrolled(study, new_patient(world))
+    StudyMark.everywhere.create(study=study, user=world.people[Role.PT], task="interim")
+    stored = Allocation.everywhere.filter(enrollment=enrollment)
+    stored = stored if rows == "allocations" else getattr(study, rows).all()
+    for attempt in (lambda: stored.update(**changes), lambda: stored._raw_delete("default")):
+        with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
+            attempt()
+
+
+def test_a_mark_ends_once(world):
+    study = running_study(world)
+    StudyMark.everywhere.create(study=study, user=world.people[Role.PT], task="interim")
+    study.marks.update(ended_at=NOW)
+    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
+        study.marks.update(ended_at=None)
 
 
 def test_a_study_warns_of_negative_feedback_early_after_a_stroke(world):

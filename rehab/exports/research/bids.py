@@ -15,6 +15,8 @@ from typing import Any
 
 from rehab.exports.research.recordings import PLACES
 from rehab.exports.research.sinks import Rows
+from rehab.people.models import Patient
+from rehab.people.policy import covariates
 from rehab.people.web.csv_tables import format_cell
 
 BIDS_VERSION = "1.10.0"
@@ -152,12 +154,7 @@ def dataset_files(
         "A sample is a stride; the channel latency has its time. The codebook of the export, one "
         "folder above, says what each channel means.\n",
     )
-    columns = {
-        "age_band": "Age at the first session in bands of ten years.",
-        "months_since_stroke": "Months from the stroke to the first session.",
-        "severity": "mild, moderate or severe, as the clinic judges it.",
-        "paretic_side": "The leg that the stroke weakened.",
-    }
+    columns = {each.name: each.meaning for each in covariates(Patient).values()}
     yield "participants.json", _json({k: {"Description": v} for k, v in columns.items()})
     lines = ["\t".join(["participant_id", *columns])]
     for row in participants:

@@ -15,13 +15,13 @@ from rehab.exports.research.recordings import PLACES, RecordingSink
 from rehab.exports.research.sinks import CsvSink, ParquetSink, Sink, has_parquet, pump
 from rehab.exports.selection import Selection
 from rehab.exports.tables import EVENTS, FEEDBACK, INCIDENTS, SESSIONS, STEPS, TABLES
-from rehab.people.models import User
+from rehab.people.models import Patient, User
+from rehab.people.policy import covariates
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 
 STRIDE_TABLES = (STEPS, FEEDBACK)  # also as Parquet
 ABOUT = "about.json"  # what the whole export needs to know of a part
-COVARIATES = ("age_band", "months_since_stroke", "severity", "paretic_side")
 
 
 def write_part(user: User, session: TrainingSession, folder: Path, *, shift_dates: bool) -> None:
@@ -67,7 +67,7 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
     about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
     row = next(iter(selection.session_rows()))
     names = [column.name for column in SESSIONS.columns]
-    about |= {name: row[names.index(name)] for name in COVARIATES}
+    about |= {c.name: row[names.index(c.name)] for c in covariates(Patient).values()}
     (aside / ABOUT).write_text(json.dumps(about), "utf-8")
 
 

@@ -17,6 +17,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.aliases import format_alias
 from rehab.people.models import Patient
 from rehab.people.models.blinding import is_in_running_study
+from rehab.people.policy import details
 from rehab.people.web.admin_base import ScopedAdmin
 
 
@@ -38,11 +39,7 @@ class PatientAdmin(ScopedAdmin):
     ordering = ("nickname", "code")  # rows with aggregates lose the model's ordering
     search_fields = ("nickname", "code")
     fields = (
-        "code",
-        "nickname",
-        "body_mass_kg",
-        ("birth_year", "stroke_month", "severity"),
-        "paretic_side",
+        *details(Patient),
         "language",
         "boards_agreed",
         "animal_name",

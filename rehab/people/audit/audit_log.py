@@ -12,62 +12,27 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from datetime import datetime, timedelta
 from ipaddress import IPv4Address, ip_address, ip_network
-from threading import Lock
-from typing import Any, ClassVar, NoReturn
+from threading import RLock
+from typing import Any, ClassVar
 
 from django.db import Error, IntegrityError, models, transaction
 from django.db.models import F, Q, QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import Allowed
 from rehab.people.audit.history import clinic_id_of
-from rehab.people.audit.sealing import SealableModel
+from rehab.people.audit.sealing import ERASED, SealableModel, has_seal, is_cut
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.scope import Scope, ScopedManager
+from rehab.people.policy import erased_by, personal_fields, retained
+from rehab.people.scope import Scope
 
 log = logging.getLogger(__name__)
 
 REPEAT_AFTER = timedelta(minutes=5)
 MAX_RECENT = 10_000  # views; beyond that some are recorded twice
 SERVER = "server console"
-
-
-class AppendOnlyViolation(TypeError):
-    """An attempt to change or delete a row of the log."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "The audit log is append-only. `manage.py retention` deletes what is too old."
-        )
-
-
-class AppendOnlyQuerySet(QuerySet["AuditEntry"]):
-    """A queryset that can read and add rows."""
-
-    def update(self, **values: Any) -> NoReturn:
-        """Raise AppendOnlyViolation."""
-        raise AppendOnlyViolation
-
-    def delete(self) -> NoReturn:
-        """Raise AppendOnlyViolation."""
-        raise AppendOnlyViolation
-
-    def bulk_update(self, *rows: Any, **options: Any) -> NoReturn:
-        """Raise AppendOnlyViolation."""
-        raise AppendOnlyViolation
-
-    def bulk_create(self, objs: Any, *args: Any, **options: Any) -> Any:
-        """Add rows with their digests."""
-        entries = list(objs)
-        for entry in entries:
-            entry.set_digest()
-        return super().bulk_create(entries, *args, **options)
-
-
-class ScopedEntryManager(ScopedManager["AuditEntry"]):
-    """Entries by scope, append-only."""
-
-    queryset_class = AppendOnlyQuerySet
+IS_SEALED = "s.last_id >= OLD.id"
 
 
 class Act(models.TextChoices):
@@ -109,10 +74,24 @@ SIGN_IN_ACTS = (
 )
 
 
+def anonymize_patient(patient: Patient, _pseudonym: str) -> None:
+    """Remove an erased patient from the entries; their digests stay."""
+    emptied = {"patient": None, "about": "", "salt": "", "erased": True}
+    AuditEntry.everywhere.filter(patient=patient).update(**emptied)
+
+
 class AuditEntry(SealableModel):
     """Who did what, with whose data, when and from where. ``count``: how often in some minutes."""
 
     scope = Scope(clinic="clinic", host=Q(clinic__isnull=True))
+    allowed_changes = (
+        Allowed(("count",), f"NEW.count > OLD.count AND NOT {has_seal('AuditEntry', IS_SEALED)}"),
+        Allowed(
+            ("patient", "about", "salt", "erased"),
+            f"{ERASED} AND NEW.patient_id IS NULL AND NEW.about = ''",
+        ),
+    )
+    allowed_deletion = is_cut("AuditEntry")
     sealed_fields = ("clinic", "at", "by", "through", "act", "patient", "about", "address")
 
     # None: what hosts do, who have no clinic.
@@ -138,8 +117,14 @@ class AuditEntry(SealableModel):
     address = models.CharField(_("from"), max_length=45, blank=True)
     count = models.PositiveIntegerField(_("times"), default=1)
 
-    everywhere: ClassVar[Any] = models.Manager.from_queryset(AppendOnlyQuerySet)()
-    objects: ClassVar[ScopedEntryManager] = ScopedEntryManager()
+    personal = personal_fields(
+        {
+            "patient about salt erased": erased_by(anonymize_patient, shown=False, research=False),
+            "clinic digest at by through act address count": retained(
+                "says that staff saw something, no longer of whom", shown=False, research=False
+            ),
+        }
+    )
 
     class Meta(SealableModel.Meta):
         verbose_name = _("audit entry")
@@ -153,60 +138,38 @@ class AuditEntry(SealableModel):
     def __str__(self) -> str:
         return f"{self.get_act_display()}: {self.about}"
 
-    def save(self, *args: Any, **kwargs: Any) -> None:
-        """Add the row. Raises AppendOnlyViolation for a stored one."""
-        if not self._state.adding:
-            raise AppendOnlyViolation
-        super().save(*args, **kwargs)
 
-    def delete(self, *args: Any, **kwargs: Any) -> NoReturn:
-        """Raise AppendOnlyViolation."""
-        raise AppendOnlyViolation
-
-
-class RecentViews:
-    """The views that were recorded in the last minutes. Shared by the threads of a process."""
+class Recent:
+    """The entries of the last minutes, by what they are about. Shared by a process's threads."""
 
     def __init__(self) -> None:
-        self._recorded: OrderedDict[Hashable, datetime] = OrderedDict()
-        self._lock = Lock()
-
-    def is_new(self, key: Hashable, now: datetime) -> bool:
-        """Return whether a view was not recorded in the last minutes, and remember it."""
-        with self._lock:
-            last = self._recorded.pop(key, None)
-            is_new = last is None or now - last >= REPEAT_AFTER
-            self._recorded[key] = now if last is None or is_new else last
-            while len(self._recorded) > MAX_RECENT:
-                self._recorded.popitem(last=False)
-        return is_new
-
-
-recent_views = RecentViews()
-
-
-class RecentEntries:
-    """The counted entries of the last minutes. Shared by the threads of a process."""
-
-    def __init__(self) -> None:
-        self._keys: OrderedDict[Hashable, tuple[datetime, int]] = OrderedDict()
-        self._lock = Lock()
+        self._entries: OrderedDict[Hashable, tuple[datetime, int]] = OrderedDict()
+        self._lock = RLock()
 
     def find(self, key: Hashable, now: datetime) -> int | None:
         """Return the entry that was added for the same in the last minutes; None without one."""
         with self._lock:
-            at, entry_id = self._keys.get(key, (None, None))
+            at, entry_id = self._entries.get(key, (None, None))
         return entry_id if at is not None and abs(now - at) < REPEAT_AFTER else None
 
-    def add(self, key: Hashable, now: datetime, entry_id: int) -> None:
-        """Remember an entry, whose repeats are counted for some minutes."""
+    def add(self, key: Hashable, now: datetime, entry_id: int = 0) -> None:
+        """Remember an entry for some minutes."""
         with self._lock:
-            self._keys[key] = now, entry_id
-            while len(self._keys) > MAX_RECENT:
-                self._keys.popitem(last=False)
+            self._entries[key] = now, entry_id
+            self._entries.move_to_end(key)
+            while len(self._entries) > MAX_RECENT:
+                self._entries.popitem(last=False)
+
+    def is_new(self, key: Hashable, now: datetime) -> bool:
+        """Return whether there was no entry in the last minutes, and remember that there is."""
+        with self._lock:
+            if self.find(key, now) is not None:
+                return False
+            self.add(key, now)
+            return True
 
 
-recent_entries = RecentEntries()
+recent_views, recent_entries = Recent(), Recent()
 
 
 def build_entry(
@@ -251,6 +214,8 @@ def record_security_change(act: Act, actor: User, row: Any, address: str, now: d
 
 def record_after_the_fact(entries: list[AuditEntry]) -> None:
     """Add entries about what has happened already. A failure is logged: care must go on."""
+    for entry in entries:
+        entry.set_digest()
     try:
         with transaction.atomic():
             AuditEntry.everywhere.bulk_create(entries)
@@ -274,7 +239,9 @@ def add_or_count(entry: AuditEntry) -> None:
     key = tuple(same.values())
     added_id = recent_entries.find(key, entry.at)
     # Another row has its key where the one that is remembered was rolled back.
-    if added_id is None or not _count(_mutable_rows().filter(pk=added_id, **same), entry.count):
+    if added_id is None or not _count(
+        AuditEntry.everywhere.filter(pk=added_id, **same), entry.count
+    ):
         entry.save()
         recent_entries.add(key, entry.at, entry.pk)
 
@@ -296,14 +263,3 @@ def truncate_address(address: str) -> str:
         return ""
     bits = 24 if isinstance(parsed, IPv4Address) else 48
     return str(ip_network((parsed, bits), strict=False))
-
-
-def anonymize_patient(patient_id: int) -> None:
-    """Remove an erased patient from the entries; their digests stay."""
-    emptied = {"patient": None, "about": "", "salt": "", "erased": True}
-    _mutable_rows().filter(patient=patient_id).update(**emptied)
-
-
-def _mutable_rows() -> QuerySet[AuditEntry]:
-    """Return rows that can be changed: for repeats and erasure, and only in this module."""
-    return QuerySet(AuditEntry)

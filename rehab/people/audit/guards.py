@@ -1,9 +1,8 @@
-"""Triggers that keep the logs append-only in the database itself, whoever asks it.
+"""Triggers that keep rows append-only in the database itself, whoever asks it.
 
-Two ways are left open. Erasing a patient empties a row's values and removes its salt: the digest
-stays. Retention deletes the rows of a batch whose seal says that it is cut. Until its seal an
-entry's count may grow. They are installed after each migration, since SQLite drops a table's
-triggers where a migration makes the table anew.
+Which models, and which few changes are let through, stands in the models
+(`rehab.people.append_only`). The triggers are installed after each migration, since SQLite drops a
+table's triggers where a migration makes the table anew.
 """
 
 from __future__ import annotations
@@ -12,24 +11,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from django.db import connections, models
+from django.apps import apps
+from django.db import connections
 
-from rehab.people.audit.audit_log import AuditEntry
-from rehab.people.audit.history import HistoryEntry
-from rehab.people.audit.seals import LogSeal
+from rehab.people.append_only import AppendOnlyModel
 
-ERASED = "NEW.erased AND NEW.salt = ''"
-WORDS = "The logs are append-only. manage.py retention deletes what is too old."
-EMPTIED = {  # the values of a change are all null
-    "sqlite": "NOT EXISTS (SELECT 1 FROM json_each(NEW.changes) WHERE type <> 'null')",
-    "postgresql": "NOT EXISTS (SELECT 1 FROM jsonb_each(NEW.changes) WHERE value <> 'null'::jsonb)",
-}
+VENDORS = ("sqlite", "postgresql")
+WORDS = (
+    "These rows are append-only: add another one. Of logs manage.py retention deletes what is too "
+    "old."
+)
 
 
 def install(using: str, **_: Any) -> None:
     """Install the triggers. A receiver of `post_migrate`."""
     connection = connections[using]
-    if connection.vendor not in EMPTIED or not _has_tables(connection):
+    if connection.vendor not in VENDORS or not _has_tables(connection):
         return
     remove(using)
     with connection.cursor() as cursor:
@@ -67,43 +64,31 @@ def find_missing(using: str) -> list[str]:
     return [name for name, *_ in _rules(connection.vendor) if name not in there]
 
 
+def guarded_models() -> list[type[AppendOnlyModel]]:
+    """Return the models whose rows are only added."""
+    return [model for model in apps.get_models() if issubclass(model, AppendOnlyModel)]
+
+
 def _has_tables(connection: Any) -> bool:
-    wanted = {model._meta.db_table for model in (AuditEntry, HistoryEntry, LogSeal)}
+    wanted = {model._meta.db_table for model in guarded_models()}
     return wanted <= set(connection.introspection.table_names())
 
 
 def _rules(vendor: str) -> Iterator[tuple[str, str, str, str]]:
     """Yield the name, event, table and condition of what is allowed, of each trigger."""
-    audit, history, seal = (m._meta.db_table for m in (AuditEntry, HistoryEntry, LogSeal))
-    unsealed = f"NOT EXISTS ({_seal_of(AuditEntry, 's.last_id >= OLD.id')})"
-    counted = f"{_same(AuditEntry, 'count')} AND NEW.count > OLD.count AND {unsealed}"
-    anonymized = (
-        f"{_same(AuditEntry, 'patient', 'about', 'salt', 'erased')} AND {ERASED} "
-        "AND NEW.patient_id IS NULL AND NEW.about = ''"
-    )
-    emptied = f"{_same(HistoryEntry, 'changes', 'salt', 'erased')} AND {ERASED} AND "
-    cut = f"{_same(LogSeal, 'cut_at')} AND OLD.cut_at IS NULL AND NEW.cut_at IS NOT NULL"
-    yield "garry_audit_update", "UPDATE", audit, f"({counted}) OR ({anonymized})"
-    yield "garry_history_update", "UPDATE", history, emptied + EMPTIED[vendor]
-    yield "garry_seal_update", "UPDATE", seal, cut
-    covered = "OLD.id BETWEEN s.first_id AND s.last_id AND s.cut_at IS NOT NULL"
-    yield "garry_audit_delete", "DELETE", audit, f"EXISTS ({_seal_of(AuditEntry, covered)})"
-    yield "garry_history_delete", "DELETE", history, f"EXISTS ({_seal_of(HistoryEntry, covered)})"
-    yield "garry_seal_delete", "DELETE", seal, "1 = 0"
-    if vendor == "postgresql":
-        for table in (audit, history, seal):
+    for model in guarded_models():
+        table = model._meta.db_table
+        changes = [
+            f"({_same(model, fields)} AND {sql if isinstance(sql, str) else sql[vendor]})"
+            for fields, sql in model.allowed_changes
+        ]
+        yield f"garry_{table}_update", "UPDATE", table, " OR ".join(changes) or "1 = 0"
+        yield f"garry_{table}_delete", "DELETE", table, model.allowed_deletion
+        if vendor == "postgresql":
             yield f"garry_{table}_truncate", "TRUNCATE", table, ""
 
 
-def _seal_of(model: type[models.Model], condition: str) -> str:
-    """Return a query for the seals of a row's chain."""
-    return (
-        f"SELECT 1 FROM {LogSeal._meta.db_table} s WHERE s.log = '{model.__name__}' "  # noqa: S608
-        f"AND s.clinic_id IS NOT DISTINCT FROM OLD.clinic_id AND {condition}"
-    )
-
-
-def _same(model: type[models.Model], *but: str) -> str:
+def _same(model: type[AppendOnlyModel], but: tuple[str, ...]) -> str:
     """Return the condition that all columns but these stay as they are."""
     columns = [field.column for field in model._meta.concrete_fields if field.name not in but]
     return " AND ".join(f'NEW."{name}" IS NOT DISTINCT FROM OLD."{name}"' for name in columns)

@@ -22,8 +22,10 @@ from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.audit.sealing import SealableModel
+from rehab.people.append_only import Allowed
+from rehab.people.audit.sealing import ERASED, SealableModel, is_cut
 from rehab.people.models import Clinic, User
+from rehab.people.policy import policies_of
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
 from rehab.people.scope import Scope, ScopedModel
 
@@ -47,6 +49,16 @@ SECRET_FIELDS = {"password", "pin_hash"}  # that they changed is recorded, never
 MASK = "•••"
 ROW_BEFORE = "_row_before_save"
 M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # index of the keys in [old, new]
+
+# By an erasure: the values of a change are all null.
+_VALUES = {
+    "sqlite": "json_each(NEW.changes) WHERE type <> 'null'",
+    "postgresql": "jsonb_each(NEW.changes) WHERE value <> 'null'::jsonb",
+}
+EMPTIED = {
+    vendor: f"{ERASED} AND NOT EXISTS (SELECT 1 FROM {values})"  # noqa: S608  # no stranger's text
+    for vendor, values in _VALUES.items()
+}
 
 _tracked: list[type[Any]] = []
 _request: ContextVar[HttpRequest | None] = ContextVar("request", default=None)
@@ -81,6 +93,8 @@ class HistoryEntry(SealableModel):
         clinic="clinic", host=Q(clinic__isnull=True) | Q(model_name__in=["Clinic", "User"])
     )
 
+    allowed_changes = (Allowed(("changes", "salt", "erased"), EMPTIED),)
+    allowed_deletion = is_cut("HistoryEntry")
     sealed_fields = ("clinic", "model_name", "object_id", "kind", "changes", "by", "through", "at")
 
     clinic = models.ForeignKey(
@@ -166,18 +180,24 @@ def _values_of(row: Model) -> dict[str, Any]:
     return {
         field.name: getattr(row, field.attname)
         for field in row._meta.concrete_fields
-        if field.name not in UNTRACKED_FIELDS
+        if _is_recorded(type(row), field.name)
     }
+
+
+def _is_recorded(model: type[Model], name: str) -> bool:
+    """Return whether a field's changes are recorded: by its policy, where it is a patient's."""
+    policy = policies_of(model).get(name)
+    return name not in UNTRACKED_FIELDS if policy is None else policy.history
 
 
 def _read_before_save(
     instance: ScopedModel, raw: bool = False, update_fields: Any = None, **_: Any
 ) -> None:
     """Read the stored row before a save."""
-    only_untracked = update_fields is not None and UNTRACKED_FIELDS.issuperset(update_fields)
-    before = None
-    if not (raw or only_untracked or instance.pk is None):
-        before = type(instance).everywhere.filter(pk=instance.pk).first()
+    model, before = type(instance), None
+    is_recorded = update_fields is None or any(_is_recorded(model, name) for name in update_fields)
+    if is_recorded and not raw and instance.pk is not None:
+        before = model.everywhere.filter(pk=instance.pk).first()
     vars(instance)[ROW_BEFORE] = before
 
 

@@ -12,10 +12,25 @@ from typing import Any, ClassVar
 from django.core.serializers.json import DjangoJSONEncoder
 from django.db import models
 
-from rehab.people.scope import ScopedModel
+from rehab.people.append_only import AppendOnlyModel
+
+ERASED = "NEW.erased AND NEW.salt = ''"
 
 
-class SealableModel(ScopedModel):
+def has_seal(log: str, condition: str) -> str:
+    """Return the SQL condition that the chain of a row has a seal (``s``) with a condition."""
+    return (
+        f"EXISTS (SELECT 1 FROM rehab_logseal s WHERE s.log = '{log}' "  # noqa: S608  # no stranger's text
+        f"AND s.clinic_id IS NOT DISTINCT FROM OLD.clinic_id AND {condition})"
+    )
+
+
+def is_cut(log: str) -> str:
+    """Return the SQL condition that retention deletes the batch of a row."""
+    return has_seal(log, "OLD.id BETWEEN s.first_id AND s.last_id AND s.cut_at IS NOT NULL")
+
+
+class SealableModel(AppendOnlyModel):
     """A row of a log, with a digest of its values.
 
     The digest outlives the values: an erasure empties these and removes the salt, without which
@@ -28,7 +43,7 @@ class SealableModel(ScopedModel):
     digest = models.CharField(max_length=64, default="", editable=False)
     erased = models.BooleanField(default=False, editable=False)
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         abstract = True
 
     def save(self, *args: Any, **kwargs: Any) -> None:

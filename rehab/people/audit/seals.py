@@ -18,10 +18,11 @@ from django.db.models import F, Q
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import Allowed, AppendOnlyModel
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Clinic
-from rehab.people.scope import Scope, ScopedModel
+from rehab.people.scope import Scope
 
 # Until then repeats of an entry are counted in it, and rows with a lower key may be committed.
 SEALED_AFTER = timedelta(minutes=10)
@@ -29,13 +30,14 @@ BATCH_ROWS = 1_000
 LOGS: dict[str, type[Any]] = {"AuditEntry": AuditEntry, "HistoryEntry": HistoryEntry}
 
 
-class LogSeal(ScopedModel):
+class LogSeal(AppendOnlyModel):
     """A batch of a log's rows with their common digest, which includes that of the batch before.
 
     ``cut_at``: when its rows were deleted because they were too old. It stays, as an anchor.
     """
 
     scope = Scope(clinic="clinic")
+    allowed_changes = (Allowed(("cut_at",), "OLD.cut_at IS NULL AND NEW.cut_at IS NOT NULL"),)
 
     log = models.CharField(max_length=16, choices=[(name, name) for name in LOGS])
     clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="+", null=True)
@@ -48,7 +50,7 @@ class LogSeal(ScopedModel):
     sealed_at = models.DateTimeField(default=timezone.now)
     cut_at = models.DateTimeField(null=True)
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         verbose_name = _("seal of a log")
         ordering: ClassVar = ["log", "clinic", "number"]
         constraints: ClassVar = [
@@ -140,8 +142,7 @@ def cut_before(log: str, clinic_id: int, moment: datetime, now: datetime) -> int
     deleted = 0
     for seal in old:
         LogSeal.everywhere.filter(pk=seal.pk).update(cut_at=now)
-        # Not the append-only queryset's: the database admits it for a batch that is cut.
-        deleted += models.QuerySet(LOGS[log]).filter(pk__in=seal.rows().values("pk")).delete()[0]
+        deleted += LOGS[log].everywhere.filter(pk__in=seal.rows().values("pk")).delete()[0]
     return deleted
 
 

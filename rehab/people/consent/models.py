@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from django.db import models
 from django.db.models import Exists, OuterRef, Q
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import Allowed, AppendOnlyModel
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.models.blinding import hidden_patients
+from rehab.people.policy import personal_fields, retained
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 
@@ -26,14 +28,11 @@ class Purpose(models.TextChoices):
     FAMILY = "family", _("Family view")
 
 
-class ImmutableConsentText(TypeError):
-    """An attempt to change a version of the text."""
-
-
-class ConsentText(ScopedModel):
+class ConsentText(AppendOnlyModel):
     """A version of the text that patients of a clinic agree to. It never changes."""
 
     scope = Scope(clinic="clinic")
+    allowed_changes = (Allowed(("written_by",), "NEW.written_by_id IS NULL"),)
 
     clinic = models.ForeignKey(
         Clinic, on_delete=models.PROTECT, related_name="consent_texts", verbose_name=_("clinic")
@@ -45,7 +44,7 @@ class ConsentText(ScopedModel):
     )
     written_at = models.DateTimeField(_("written at"), default=timezone.now)
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         ordering: ClassVar = ["-version"]
         constraints: ClassVar = [
             models.UniqueConstraint(
@@ -55,12 +54,6 @@ class ConsentText(ScopedModel):
 
     def __str__(self) -> str:
         return f"{self.version}"
-
-    def save(self, *args: Any, **kwargs: Any) -> None:
-        """Store a new version. Raises ImmutableConsentText for a stored one."""
-        if not self._state.adding:
-            raise ImmutableConsentText("Patients have agreed to this text. Publish a new version.")
-        super().save(*args, **kwargs)
 
 
 class Consent(ScopedModel):
@@ -85,6 +78,15 @@ class Consent(ScopedModel):
     withdrawn_at = models.DateTimeField(_("withdrawn at"), null=True)
     withdrawn_by = models.ForeignKey(
         User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("withdrawn by")
+    )
+
+    personal = personal_fields(
+        {
+            "patient purpose level text given_at withdrawn_at": retained(
+                "proves what was agreed to, in the clinic's own words", shown=True, research=False
+            ),
+            "recorded_by withdrawn_by": retained("staff", shown=False, research=False),
+        }
     )
 
     class Meta(ScopedModel.Meta):

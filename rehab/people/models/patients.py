@@ -9,7 +9,9 @@ from django.db import models, transaction
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
+from rehab.people.covariates import age_band, months_since
 from rehab.people.models.clinics import Clinic, language_choices
+from rehab.people.policy import Covariate, erased, erased_by, personal_fields, retained
 from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
@@ -72,6 +74,11 @@ class ErasureReason(models.TextChoices):
     ASKED = "asked", _("The patient asks for it")
     MISTAKE = "mistake", _("Was entered by mistake")
     RETENTION = "retention", _("Kept long enough")
+
+
+def rename_erased(patient: Patient, _pseudonym: str) -> None:
+    """Give an erased patient a new pseudonym, which is the code as well."""
+    patient.pseudonym = patient.code = generate_pseudonym()
 
 
 class PatientErased(ValidationError):
@@ -173,6 +180,95 @@ class Patient(ClinicModel):
         choices=ErasureReason.choices,
         blank=True,
         editable=False,
+    )
+
+    personal = personal_fields(
+        {
+            "nickname": erased(
+                _("Erased"), shown=True, research=False, history=True, is_detail=True
+            ),
+            "code": erased_by(
+                rename_erased, shown=True, research=False, history=True, is_detail=True
+            ),
+            "pseudonym": erased_by(rename_erased, shown=True, research=True, history=True),
+            "clinic": retained(
+                "tells where, and nothing of whom", shown=True, research=False, history=True
+            ),
+            "body_mass_kg": erased(shown=True, research=False, history=True, is_detail=True),
+            "birth_year": erased(
+                shown=True,
+                research=Covariate(
+                    "age_band",
+                    "years",
+                    "Age when it began, by calendar years, in bands of ten.",
+                    value=age_band,
+                ),
+                history=True,
+                is_detail=True,
+            ),
+            "stroke_month": erased(
+                shown=True,
+                research=Covariate(
+                    "months_since_stroke",
+                    "months",
+                    "From the stroke to its beginning.",
+                    "integer",
+                    value=months_since,
+                ),
+                history=True,
+                is_detail=True,
+            ),
+            "severity": erased(
+                "",
+                shown=True,
+                research=Covariate(
+                    "severity", "", "mild, moderate or severe, as the clinic judges it now."
+                ),
+                history=True,
+                is_detail=True,
+            ),
+            "paretic_side": retained(
+                "half of all people have the same; studies adjust by it",
+                shown=True,
+                research=Covariate("paretic_side", "", "The leg that the stroke weakened."),
+                history=True,
+                is_detail=True,
+            ),
+            "language screen_side screen_text screen_still screen_sounds": retained(
+                "a setting that many people share", shown=True, research=False, history=True
+            ),
+            "boards": retained(
+                "erasure withdraws the consent first",
+                shown="leaderboards",
+                research=False,
+                history=True,
+            ),
+            "alias": erased(shown="animal_name", research=False, history=True),
+            "blinded": retained(
+                "the study's, and many people's",
+                shown="in_a_blinded_study",
+                research=False,
+                history=True,
+            ),
+            "simulated": retained("no person", shown=True, research=True, history=True),
+            "legacy_id": erased(shown="participant_of_the_original", research=False, history=True),
+            "created_at": retained("the sessions' days tell as much", shown=True, research=False),
+            "ended_at": retained(
+                "what was done, and when",
+                shown="program_ended_at",
+                research=False,
+                history=True,
+            ),
+            "end_reason": retained(
+                "one of five words",
+                shown="program_end_reason",
+                research=False,
+                history=True,
+            ),
+            "erased_at erasure_reason": retained(
+                "what was done, and when", shown=True, research=False, history=True
+            ),
+        }
     )
 
     class Meta(ClinicModel.Meta):

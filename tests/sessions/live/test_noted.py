@@ -11,7 +11,7 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError, InterfaceError, OperationalError
 
 from rehab.people.audit import audit_log
-from rehab.people.audit.audit_log import SIGN_IN_ACTS, Act, AuditEntry, RecentEntries, RecentViews
+from rehab.people.audit.audit_log import SIGN_IN_ACTS, Act, AuditEntry, Recent
 from rehab.sessions.live import audit_queue as notes_module
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import turns
@@ -24,8 +24,8 @@ ARM = {"type": "robot", "order": "arm"}
 
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
-    monkeypatch.setattr(audit_log, "recent_views", RecentViews())
-    monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
+    monkeypatch.setattr(audit_log, "recent_views", Recent())
+    monkeypatch.setattr(audit_log, "recent_entries", Recent())
 
 
 async def noted(count: int) -> list[tuple[Any, ...]]:
