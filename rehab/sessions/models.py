@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from django.db import models
 from django.db.models import Exists, OuterRef, Q, QuerySet
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -19,18 +20,9 @@ from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
-from rehab.training.changes import ENDED_STATES, OPEN_STATES, State
+from rehab.training.changes import ENDED_STATES, OPEN_STATES, STATE_LABELS, State
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
-
-STATES = {
-    State.READY: _("Ready"),
-    State.RUNNING: _("Running"),
-    State.PAUSED: _("Paused"),
-    State.FINISHED: _("Finished"),
-    State.ABORTED: _("Aborted"),
-}
-
 
 SCORES_SHOWN_FOR = timedelta(minutes=15)
 
@@ -153,7 +145,7 @@ class TrainingSession(ClinicModel):
     state = models.CharField(
         _("state"),
         max_length=16,
-        choices=[(state.value, label) for state, label in STATES.items()],
+        choices=[(state.value, capfirst(_(label))) for state, label in STATE_LABELS.items()],
         default=State.READY.value,
     )
     goal = models.FloatField(

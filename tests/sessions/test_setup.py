@@ -142,7 +142,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
     [
         ("goal_value", "0", "above 0 and up to 15 W/kg"),
         ("goal_value", "16", "above 0 and up to 15 W/kg"),
-        ("goal_value", "nan", "Goal value: Enter a number"),
+        ("goal_value", "nan", "Goal, in the measure’s unit: Enter a number"),
         ("goal_value", "", "either as a value or as percent"),
         ("wanted_hits", "101", "Give 1 to 100 %"),
         ("minutes", "-1", "Give 1 to 240 minutes"),
@@ -151,7 +151,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
         ("station", "999999", "Select a valid choice"),
         ("robot", "wild", "Select a valid choice"),
         ("robot_above", "somersault", "Select a valid choice"),
-        ("robot_below", "", "Robot below: This field is required"),
+        ("robot_below", "", "After weak steps: This field is required"),
     ],
 )
 def test_what_cannot_be_walked_is_refused_in_words(pt, patient, station, field, value, words):
