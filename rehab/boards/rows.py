@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 from django.db import models
-from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.models import Leaderboard
+from rehab.feedback.translation import valence_choices
 from rehab.people.models import Patient
 from rehab.people.scope import Scope, ScopedModel
-from rehab.training.valences import VALENCES
 
 
 class BoardEntry(ScopedModel):
@@ -27,9 +26,7 @@ class BoardEntry(ScopedModel):
         Leaderboard, on_delete=models.CASCADE, related_name="entries", db_index=False
     )
     patient = models.ForeignKey(Patient, on_delete=models.CASCADE, related_name="+", db_index=False)
-    valence = models.CharField(
-        max_length=16, blank=True, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
-    )
+    valence = models.CharField(max_length=16, blank=True, choices=valence_choices)
     figure = models.IntegerField(help_text="As it is shown: a whole number.")
     points_at_stake = models.IntegerField(
         null=True, help_text="The points that could be kept, where points can only be lost."

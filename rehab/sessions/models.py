@@ -14,6 +14,7 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.feedback.translation import valence_choices
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicModel
@@ -119,7 +120,7 @@ class TrainingSession(ClinicModel):
     valence = models.CharField(
         _("feedback type"),
         max_length=16,
-        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+        choices=valence_choices,
         db_index=True,
     )
     # Follows from the log, as the columns below `state` do.

@@ -11,6 +11,7 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.feedback.translation import valence_choices
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
@@ -27,7 +28,6 @@ from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import ROBOT_LEVELS
-from rehab.training.valences import VALENCES
 
 OUTCOMES = [(slug, _(label)) for slug, (label, _unit) in outcomes.OUTCOMES.items()]
 SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
@@ -197,7 +197,7 @@ class Arm(ScopedModel):
     valence = models.CharField(
         _("feedback type"),
         max_length=16,
-        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+        choices=valence_choices,
     )
     gain = models.FloatField(_("gain"), default=1.0)
     robot_intensity = models.FloatField(

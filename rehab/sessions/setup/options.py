@@ -15,6 +15,7 @@ from typing import Any
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
+from rehab.feedback.translation import valence_choices
 from rehab.people.models import User
 from rehab.sessions.formatting import format_source
 from rehab.sessions.setup.gestures import DEFAULT_GESTURE, robot_gesture_choices
@@ -48,7 +49,7 @@ from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2
 from rehab.training.plans import ROBOT_LEVELS, name_robot_level
 from rehab.training.schedules import INTERVAL_MAX, Schedule, ScheduleKind
-from rehab.training.valences import POSITIVE, VALENCES
+from rehab.training.valences import POSITIVE
 
 GOAL_KINDS = ("value", "percent")
 # The paper's example of a goal for a whole session (docs/reference/original.md#goal-of-a-session):
@@ -86,7 +87,7 @@ OPTIONS: dict[str, Option] = {
             label=_("Feedback type"),
             help="The rule set of feedback.",
             kind=str,
-            choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+            choices=lambda _by: valence_choices(),
             is_radio=True,
             default=POSITIVE.slug,
             is_required=True,
