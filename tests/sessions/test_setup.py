@@ -15,13 +15,14 @@ from rehab.sessions.services import SessionRequest, change_session, create_sessi
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
-from rehab.training.cueing import CueRule, CueTiming
+from rehab.training.cueing import CueTiming
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
 from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
+from robot.wire.cue_limits import CueRule
 from tests.support.page_text import plain
 from tests.support.world import World, build_world, client_of
 

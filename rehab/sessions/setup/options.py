@@ -36,20 +36,19 @@ from rehab.sessions.setup.walking import (
 )
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.changes import ChangeKind
-from rehab.training.cueing import (
-    COUNT_MAX,
-    DEFAULT_ACTIVATION_THRESHOLD,
-    REST_MAX_S,
-    WINDOW_MAX_S,
-    WINDOW_MIN_S,
-    CueRule,
-    CueTiming,
-)
+from rehab.training.cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2
 from rehab.training.plans import ROBOT_LEVELS, name_robot_level
 from rehab.training.schedules import INTERVAL_MAX, Schedule, ScheduleKind
 from rehab.training.valences import POSITIVE
+from robot.wire.cue_limits import (
+    COUNT_MAX,
+    REST_MAX_S,
+    WINDOW_MAX_S,
+    WINDOW_MIN_S,
+    CueRule,
+)
 
 GOAL_KINDS = ("value", "percent")
 # The paper's example of a goal for a whole session (docs/reference/original.md#goal-of-a-session):
