@@ -111,6 +111,18 @@ def test_mean_and_sd_are_those_of_the_textbook(values, cut):
     assert first.sd_value == pytest.approx(stdev(values), abs=1e-9)
 
 
+@pytest.mark.parametrize(("first", "second"), [("hhhm", "hhm"), ("hhm", "hhhm"), ("hh", "hhm")])
+def test_the_longest_row_of_hits_lies_in_one_of_the_parts(first, second):
+    parts = []
+    for hits in (first, second):
+        fold = start(make_plan())
+        walk(fold, [5.0 if one == "h" else 3.0 for one in hits])
+        parts.append(fold.feedback)
+    whole, other = parts
+    whole.merge(other)
+    assert (whole.best_streak, whole.streak) == (max(first.count("h"), second.count("h")), 0)
+
+
 def test_one_value_has_no_sd():
     fold = start(make_plan(make_phase("baseline")))
     walk(fold, [4.0])
