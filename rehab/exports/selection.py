@@ -34,10 +34,10 @@ from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.sessions.replay import fold_log
+from rehab.sessions.setup.options import exported_options
 from rehab.studies.models import StudyState
 from rehab.studies.participants import StudyVisit
 from rehab.training.fold import SessionFold
-from rehab.training.plans import SessionPlan
 from rehab.training.summary.metrics import METRICS
 
 PAGE_ROWS = 2_000  # rows held in memory
@@ -84,7 +84,7 @@ class Selection:
     def session_rows(self) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of ``SESSIONS``."""
         for session, metrics in self._with_metrics():
-            target = session.plan["target"]
+            plan, walking = session.to_plan(), session.walking
             yield (
                 session.pk,
                 session.patient.pseudonym,
@@ -99,12 +99,10 @@ class Selection:
                 session.measure.unit,
                 session.trained_side,
                 session.goal,
-                target["hit_rate"],
-                target["duration_s"],
                 session.active_s,
                 session.protocol and session.protocol.name,
-                session.plan["activation_threshold"],
-                *_read_answers(session.to_plan()),
+                *(option.get(plan, walking) for option, _column in exported_options()),
+                plan.close_steps.part,
                 session.simulated,
                 session.legacy_id is not None,
                 session.source if self.named else "",
@@ -238,21 +236,9 @@ def _read_pages(rows: QuerySet[Any], names: Sequence[str], key: str) -> Iterator
         after = page[-1][place]
 
 
-def _read_answers(plan: SessionPlan) -> tuple[Any, ...]:
-    """Return when robot and page answered, and whether the goal followed."""
-    timing, schedule = plan.cue_timing, plan.schedule
-    return (
-        *(timing.rule.value, timing.window_s, timing.count, timing.rest_s),
-        *(schedule.kind.value, schedule.interval, schedule.band),
-        plan.adaptation.mode.value,
-        plan.close_steps.part,
-    )
-
-
 def _read_covariates(session: TrainingSession) -> tuple[Any, ...]:
     """Return what analyses adjust by, in bands: no date of birth or of the stroke."""
     patient, day = session.patient, session.began_at.date()
     return (
         *(each.value(getattr(patient, name), day) for name, each in covariates(Patient).items()),
-        *(session.device, session.belt_speed_m_s, session.weight_support_percent),
     )

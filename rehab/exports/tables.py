@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from rehab.people.models import Patient
 from rehab.people.policy import covariates
+from rehab.sessions.setup.option import AS_IS
+from rehab.sessions.setup.options import exported_options
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.summary.metrics import METRICS
 
@@ -42,6 +44,15 @@ class Table:
     columns: tuple[Column, ...]
 
 
+def _option_columns() -> Iterator[Column]:
+    """Yield the columns of the set-up options."""
+    types = {bool: Type.BOOLEAN, int: Type.INTEGER, float: Type.NUMBER}
+    for option, column in exported_options():
+        # Units of the plan are ratios and seconds, also where people give whole numbers.
+        kind = types.get(option.kind, Type.TEXT) if option.conversion is AS_IS else Type.NUMBER
+        yield Column(*column, kind)
+
+
 # Which session a row is of, and whose.
 WHOSE = (
     Column("session", "", "Number of the session.", Type.INTEGER),
@@ -70,44 +81,9 @@ SESSIONS = Table(
         Column("unit", "", "Unit of values and goals of this session."),
         Column("trained_side", "", "The leg whose steps count."),
         Column("goal", "the measure's unit", "Goal in force at the end.", Type.NUMBER),
-        Column(
-            "wanted_hit_rate",
-            "ratio",
-            "Share of steps at the goal that the therapist wanted.",
-            Type.NUMBER,
-        ),
-        Column("planned", "s", "Planned time of walking.", Type.NUMBER),
         Column("walked", "s", "Time of walking, without pauses.", Type.NUMBER),
         Column("protocol", "", "Name of the list of phases it was built from."),
-        Column(
-            "activation_threshold",
-            "ratio",
-            "Mean performance from which the robot answers.",
-            Type.NUMBER,
-        ),
-        Column("robot_rule", "", "What its gestures answer: windows, streaks or steps."),
-        Column("robot_window", "s", "Length of a window.", Type.NUMBER),
-        Column(
-            "robot_count",
-            "",
-            "Steps of a streak, or of which each last one is answered.",
-            Type.INTEGER,
-        ),
-        Column("robot_rest", "s", "Least time between the starts of two gestures.", Type.NUMBER),
-        Column("schedule", "", "When the patient was told: every, bandwidth, faded or summary."),
-        Column(
-            "schedule_steps",
-            "",
-            "Steps from one time to the next (of faded: at most).",
-            Type.INTEGER,
-        ),
-        Column(
-            "schedule_band",
-            "ratio",
-            "Half of the band about the goal without feedback.",
-            Type.NUMBER,
-        ),
-        Column("goal_follows", "", "off, suggest or automatic, as it began."),
+        *_option_columns(),
         Column(
             "close_part",
             "ratio",
@@ -118,9 +94,6 @@ SESSIONS = Table(
         Column("imported", "", "true: from the original GARRY, which kept no steps.", Type.BOOLEAN),
         Column("source", "", "Where its steps came from; empty for researchers."),
         *(Column(c.name, c.unit, c.meaning, Type(c.type)) for c in covariates(Patient).values()),
-        Column("device", "", "What the patient walked on or with."),
-        Column("belt_speed", "m/s", "Speed of the treadmill's belt.", Type.NUMBER),
-        Column("weight_support", "%", "Body weight that a harness carried.", Type.NUMBER),
         *(
             Column(m.slug, m.unit or "ratio", f"{m.label} of the session.", Type.NUMBER)
             for m in METRICS.values()

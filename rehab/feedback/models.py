@@ -11,7 +11,7 @@ from django.dispatch import Signal
 from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
-from rehab.feedback.translation import SOURCE_LANGUAGE, pick_words
+from rehab.feedback.translation import SOURCE_LANGUAGE, pick_words, valence_choices
 from rehab.people.models import Clinic
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
@@ -36,7 +36,7 @@ class FeedbackType(ClinicModel):
     slug = models.CharField(
         _("feedback type"),
         max_length=16,
-        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+        choices=valence_choices,
     )
     hit_points = models.SmallIntegerField(
         _("points at the goal"),

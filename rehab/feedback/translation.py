@@ -1,12 +1,23 @@
-"""Which words a patient reads: the clinic's, or else the default ones, in a language."""
+"""Words of feedback types: their names on pages, and what a patient reads in a language."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
-from django.utils.translation import gettext, override
+from django.utils.translation import gettext, gettext_lazy, override
+
+from rehab.training.valences import VALENCES
 
 SOURCE_LANGUAGE = "en"  # of the words in `rehab.training.valences`
+
+
+def valence_choices() -> list[tuple[str, Any]]:
+    """Return the feedback types with their names.
+
+    Models take the function itself as their choices: another type needs no migration.
+    """
+    return [(valence.slug, gettext_lazy(valence.label)) for valence in VALENCES.values()]
 
 
 def pick_words(language: str, own: Mapping[str, str], default: str) -> str:

@@ -42,6 +42,7 @@ from rehab.sessions.schemas import (
     StepPage,
 )
 from rehab.sessions.services import change_session
+from rehab.sessions.setup.options import OPTIONS
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
@@ -55,8 +56,8 @@ ORDERS = {
     "oldest": ("created_at", "pk"),
     "best": (F("metric_score").desc(nulls_last=True), "created_at", "pk"),
 }
-# Fields that have another name in the set-up form.
-FORM_NAMES = {"feedback_type": "valence", "goal": "goal_value"}
+# Options that have another name in the set-up form.
+FORM_NAMES = {option.api_name: option.name for option in OPTIONS.values() if option.api_name}
 
 
 def visible_sessions(user: User) -> QuerySet[TrainingSession]:

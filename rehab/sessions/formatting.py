@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from datetime import date, datetime
-from typing import Any
 from zoneinfo import ZoneInfo
 
 from django.utils.dateformat import format as format_date
 from django.utils.formats import number_format
 from django.utils.translation import gettext, gettext_noop
-from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
-from rehab.training.changes import State
+from rehab.training.changes import STATE_LABELS, State
 from rehab.training.schedules import Schedule, ScheduleKind
 
 MISSING = "–"
@@ -60,13 +58,6 @@ def format_day(day: date, today: date) -> str:
     return format_date(day, gettext("M j") if day.year == today.year else gettext("M j, Y"))
 
 
-# Of `training.plans.ROBOT_LEVELS`.
-ROBOT_LEVEL_LABELS: dict[str, Any] = {
-    "normal": _("normal"),
-    "gentle": _("gentle"),
-    "off": _("off"),
-    "": "",
-}
 # What `source_choices` returns and a session stores, in English.
 SOURCE_LABELS = (
     gettext_noop("Live sensor"),
@@ -86,16 +77,6 @@ def format_source(source: str) -> str:
     return gettext(source) if source else ""
 
 
-# Shown beside a session's result; a finished session needs none.
-STATE_LABELS: dict[State, Any] = {
-    State.READY: _("not started"),
-    State.RUNNING: _("running"),
-    State.PAUSED: _("paused"),
-    State.FINISHED: "",
-    State.ABORTED: _("ended early"),
-}
-
-
 def format_schedule(schedule: Schedule) -> str:
     """Return when feedback comes, in a few words."""
     values = {"steps": schedule.interval, "band": round(100 * schedule.band)}
@@ -113,8 +94,8 @@ def format_schedule(schedule: Schedule) -> str:
 
 
 def format_state(state: str) -> str:
-    """Return a session's state as text; empty for a finished one."""
-    return str(STATE_LABELS[State(state)])
+    """Return a session's state as text; empty for a finished one, whose result says it."""
+    return "" if state == State.FINISHED else gettext(STATE_LABELS[State(state)])
 
 
 def clinic_time(moment: datetime, clinic: Clinic) -> datetime:

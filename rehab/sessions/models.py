@@ -10,9 +10,11 @@ from typing import Any, ClassVar
 from django.db import models
 from django.db.models import Case, Exists, F, OuterRef, Q, QuerySet, When
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.feedback.translation import valence_choices
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.policy import erased, personal_fields, retained
@@ -20,18 +22,9 @@ from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
-from rehab.training.changes import ENDED_STATES, OPEN_STATES, State
+from rehab.training.changes import ENDED_STATES, OPEN_STATES, STATE_LABELS, State
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
-
-STATES = {
-    State.READY: _("Ready"),
-    State.RUNNING: _("Running"),
-    State.PAUSED: _("Paused"),
-    State.FINISHED: _("Finished"),
-    State.ABORTED: _("Aborted"),
-}
-
 
 WALKED = retained("what was walked and how, under a pseudonym", shown=True, research=True)
 SCORES_SHOWN_FOR = timedelta(minutes=15)
@@ -129,7 +122,7 @@ class TrainingSession(ClinicModel):
     valence = models.CharField(
         _("feedback type"),
         max_length=16,
-        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+        choices=valence_choices,
         db_index=True,
     )
     # Follows from the log, as the columns below `state` do.
@@ -155,7 +148,7 @@ class TrainingSession(ClinicModel):
     state = models.CharField(
         _("state"),
         max_length=16,
-        choices=[(state.value, label) for state, label in STATES.items()],
+        choices=[(state.value, capfirst(_(label))) for state, label in STATE_LABELS.items()],
         default=State.READY.value,
     )
     goal = models.FloatField(

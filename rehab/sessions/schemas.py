@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ninja import Field, Schema
-from pydantic import AfterValidator
+from pydantic import AfterValidator, create_model
 
 from rehab.people.api import PatientName, ShortText
 from rehab.people.web.api_base import (
@@ -21,18 +22,15 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
-from rehab.training.adaptation import AdaptationMode
+from rehab.sessions.setup.option import Option
+from rehab.sessions.setup.options import OPTIONS
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
-from rehab.training.cueing import CueRule
-from rehab.training.schedules import ScheduleKind
 from rehab.training.steps import Side
 from rehab.training.summary.metrics import METRICS
 from rehab.training.valences import VALENCES, find_valence
 
 STEPS_MAX = 1000
-ShortLine = Annotated[TextLine, Field(max_length=MAX_DEVICE_LETTERS)]
 ValenceSlug = Annotated[
     str,
     AfterValidator(lambda slug: find_valence(slug).slug),
@@ -133,44 +131,53 @@ class MeasureOut(Schema):
     channel: str = Field(description="The extra value that holds it; empty: the step's value.")
 
 
-class SessionRequestBody(RequestBody):
+class _SessionRequestRows(RequestBody):
     """A new session. What is left out is like the patient's last time."""
 
     patient: Key
-    feedback_type: ValenceSlug = optional()
     measure: Key = optional(description="What is trained, as `GET /measures` lists it.")
-    goal: float = optional(description="In the measure's unit, or give `goal_percent`.")
-    goal_percent: float = optional(description="Percent of the baseline.")
-    wanted_hits: StrictInt | None = Field(None, description="Percent of the steps.")
-    minutes: StrictInt | None = None
     protocol: Key = optional()
     station: Key = optional()
-    source: TextLine = optional(description="`live`, `synthetic good`, `recording walk.csv`, …")
     trained_side: Side = optional(strict=False)
-    robot: TextLine = optional(description="As in the set-up: `off`, `gentle`, `normal`.")
-    robot_above: TextLine = optional(description="Gesture after a window above the threshold.")
-    robot_below: TextLine = optional(description="Gesture after a window below it.")
-    device: ShortLine = optional(description="What the patient walks on or with.")
-    belt_speed: float | None = Field(None, description="Of the treadmill, m/s.")
-    weight_support: float | None = Field(None, description="Percent of the body's weight.")
-    robot_threshold: StrictInt = optional(description="Percent of the goal, 1 to 200.")
-    robot_answers: CueRule = optional(strict=False, description="What a gesture answers.")
-    robot_window: float = optional(description="Seconds of a window, 2 to 60.")
-    robot_count: StrictInt = optional(description="Steps of a streak or group, 1 to 100.")
-    robot_rest: float = optional(description="Least seconds between two gestures, 0 to 600.")
-    schedule: ScheduleKind = optional(strict=False, description="When the patient is told.")
-    schedule_steps: StrictInt = optional(
-        description="Told after each so many steps; of `faded` the most, of `summary` the block."
+
+
+def describe_option(option: Option) -> tuple[Any, Any]:
+    """Return the type and the description of a set-up option as a field of a request."""
+    kind: Any = {int: StrictInt, str: TextLine}.get(option.kind, option.kind)
+    if option.name == "valence":
+        kind = ValenceSlug
+    elif option.max_length is not None:
+        kind = Annotated[TextLine, Field(max_length=option.max_length)]
+    text = option.help
+    if option.least is not None and option.most is not None:
+        text += f" {option.least:g} to {option.most:g} {option.unit}".rstrip() + "."
+    if option.kind is str and option.choices and not callable(option.choices):
+        text += f" One of: {', '.join(f'`{value}`' for value, _label in option.choices)}."
+    strict = {"strict": False} if issubclass(option.kind, StrEnum) else {}
+    # A goal is given or left out: null would be neither of its two kinds.
+    is_nullable = option.nullable and option.applies_to is None
+    return kind | None if is_nullable else kind, optional(description=text, **strict)
+
+
+def session_request_body() -> type[_SessionRequestRows]:
+    """Return the schema of a new session, with a field for each set-up option."""
+    fields: dict[str, Any] = {
+        option.api_name or option.name: describe_option(option)
+        for option in OPTIONS.values()
+        if option.name != "goal_by"  # which of the goals was sent says it
+    }
+    return create_model(
+        "SessionRequestBody",
+        __base__=_SessionRequestRows,
+        __doc__=_SessionRequestRows.__doc__,
+        **fields,
     )
-    schedule_band: StrictInt = optional(
-        description="`bandwidth`: told outside of ± so many percent of the goal, 1 to 50."
-    )
-    goal_follows: AdaptationMode = optional(
-        strict=False, description="Whether the goal stays, is suggested or follows by itself."
-    )
-    goal_asks: bool = optional(
-        description="Whether a therapist accepts the baseline's goal before it counts."
-    )
+
+
+if TYPE_CHECKING:
+    SessionRequestBody = _SessionRequestRows
+else:
+    SessionRequestBody = session_request_body()
 
 
 class ChangeRequestBody(RequestBody):

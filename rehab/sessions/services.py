@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
 
 from asgiref.sync import async_to_sync
@@ -22,15 +22,11 @@ from rehab.sessions.setup.gestures import composed_gestures, silence_cue
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
-from rehab.training.adaptation import GoalAdaptation
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.closeness import CloseSteps
-from rehab.training.cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
-from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
-from rehab.training.plans import SessionPlan
-from rehab.training.schedules import Schedule
+from rehab.training.plans import PlanSettings, SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence, find_valence
 
@@ -54,8 +50,8 @@ class StationTaken(InvalidSetting):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SessionRequest:
-    """What a new session is created from.
+class SessionRequest(PlanSettings):
+    """What a new session is created from: the settings of its plan, and what the rest follows from.
 
     ``phases``: those of the protocol unless given. ``measure``: A2 unless given.
     ``trained_side``: the patient's paretic side unless given. ``cue``: that of the feedback type
@@ -66,18 +62,11 @@ class SessionRequest:
 
     patient: Patient
     valence: str
-    goal: GoalRule
     phases: Iterable[Phase] | None = None
     protocol: Protocol | None = None
     measure: MeasureDefinition | None = None
     trained_side: Side | None = None
-    target: Target = field(default_factory=Target)
-    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
     cue: CueGestures | None = None
-    cue_timing: CueTiming = field(default_factory=CueTiming)
-    schedule: Schedule = field(default_factory=Schedule)
-    adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
-    robot_intensity: float = 1.0
     station: Station | None = None
     created_by: User | None = None
     source: str = ""
@@ -176,13 +165,7 @@ def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPl
         valence=valence,
         phases=tuple(phases),
         trained_side=side,
-        goal=request.goal,
-        target=request.target,
-        activation_threshold=request.activation_threshold,
-        robot_intensity=request.robot_intensity,
-        cue_timing=request.cue_timing,
-        schedule=request.schedule,
-        adaptation=request.adaptation,
+        **{one.name: getattr(request, one.name) for one in fields(PlanSettings)},
         close_steps=request.protocol.close_steps(patient.language)
         if request.protocol
         else CloseSteps(),

@@ -17,9 +17,9 @@ from rehab.people.ranges import NumberField, say_ranges
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
 from rehab.sessions.formatting import format_source
-from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.services import check_station_is_free
-from rehab.sessions.setup.answers import USUAL_ANSWERS
+from rehab.sessions.setup.option import Group, OptionForm
+from rehab.sessions.setup.options import OPTIONS, build_parts, options_of
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.stations.models import Station
@@ -173,7 +173,7 @@ class ArmForm(forms.ModelForm):
         """Return the answers, with the usual ones for a schedule's that were left empty."""
         data: Any = super().clean()
         empty = [name for name in SCHEDULE_FIELDS if data.get(name) in (None, "")]
-        return data | {name: USUAL_ANSWERS[name] for name in empty if name not in self.errors}
+        return data | {name: OPTIONS[name].default for name in empty if name not in self.errors}
 
 
 def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:
@@ -243,7 +243,7 @@ class EnrollmentForm(forms.Form):
         return tuple(self.cleaned_data[f"level_{n}"] for n in range(len(self.study.factors)))
 
 
-class PlaceForm(WalkingFields):
+class PlaceForm(OptionForm):
     """Where and how a visit's session is walked, and where its steps come from."""
 
     station: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
@@ -252,7 +252,7 @@ class PlaceForm(WalkingFields):
     source = forms.ChoiceField()
 
     def __init__(self, *args: Any, patient: Patient, by: User, **options: Any) -> None:
-        super().__init__(*args, **options)
+        super().__init__(*args, options=options_of(Group.WALKING), **options)
         self.patient = patient
         fields: dict[str, Any] = self.fields
         fields["station"].queryset = Station.objects.visible_to(by)
@@ -281,5 +281,5 @@ class PlaceForm(WalkingFields):
             source=dict(source_choices())[data["source"]],
             simulated=kind == "synthetic",
             source_args=tuple(build_source_args(kind, name, self.patient)),
-            walking=self.chosen_walking(),
+            walking=build_parts(self.chosen())["walking"],
         )

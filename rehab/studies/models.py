@@ -11,12 +11,13 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.feedback.translation import valence_choices
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
-from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_schedule
-from rehab.sessions.setup.answers import SCHEDULES, USUAL_ANSWERS, read_schedule
+from rehab.sessions.formatting import format_schedule
+from rehab.sessions.setup.options import OPTIONS, build_parts
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
 from rehab.studies.allocation.groups import Factor, Group
@@ -27,8 +28,6 @@ from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import ROBOT_LEVELS
-from rehab.training.schedules import INTERVAL_MAX
-from rehab.training.valences import VALENCES
 
 OUTCOMES = [(slug, _(label)) for slug, (label, _unit) in outcomes.OUTCOMES.items()]
 SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
@@ -199,26 +198,29 @@ class Arm(ScopedModel):
     valence = models.CharField(
         _("feedback type"),
         max_length=16,
-        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+        choices=valence_choices,
     )
     gain = models.FloatField(_("gain"), default=1.0)
     robot_intensity = models.FloatField(
         _("robot"),
-        choices=[(value, ROBOT_LEVEL_LABELS[level]) for level, value in ROBOT_LEVELS.items()],
+        choices=[(value, _(level)) for level, value in ROBOT_LEVELS.items()],
         default=1.0,
     )
     schedule = models.CharField(
-        _("feedback comes"), max_length=16, choices=SCHEDULES, default=USUAL_ANSWERS["schedule"]
+        _("feedback comes"),
+        max_length=16,
+        choices=OPTIONS["schedule"].choices_for(None),
+        default=OPTIONS["schedule"].default,
     )
     schedule_steps = models.PositiveSmallIntegerField(
         _("steps between feedback"),
-        default=USUAL_ANSWERS["schedule_steps"],
-        validators=between(1, INTERVAL_MAX),
+        default=OPTIONS["schedule_steps"].default,
+        validators=OPTIONS["schedule_steps"].validators,
     )
     schedule_band = models.PositiveSmallIntegerField(
         _("band without feedback, ± % of the goal"),
-        default=USUAL_ANSWERS["schedule_band"],
-        validators=between(1, 50, "%"),
+        default=OPTIONS["schedule_band"].default,
+        validators=OPTIONS["schedule_band"].validators,
     )
     measure = models.ForeignKey(
         MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
@@ -259,7 +261,7 @@ class Arm(ScopedModel):
             self.robot_intensity,
             self.measure_id,
             self.protocol_id or 0,
-            read_schedule(answers).essential,
+            build_parts(answers)["schedule"].essential,
         )
         return ArmRule(self.code, self.name, self.weight, condition)
 

@@ -11,7 +11,6 @@ from django.utils.translation import gettext as _
 
 from rehab.people.web.help_pages import find_part
 from rehab.sessions.formatting import (
-    ROBOT_LEVEL_LABELS,
     format_duration,
     format_rate,
     format_source,
@@ -68,4 +67,4 @@ def type_name(slug: str) -> str:
 @register.filter
 def level(name: str) -> str:
     """Return the label of a robot level."""
-    return str(ROBOT_LEVEL_LABELS[name])
+    return _(name) if name else ""

@@ -79,11 +79,11 @@ class NotAllowed(InvalidSetting):
 OPEN_STATES = frozenset({State.READY, State.RUNNING, State.PAUSED})
 ENDED_STATES = frozenset({State.FINISHED, State.ABORTED})
 
-# How refusals name them: programs know these words, and pages have them translated.
+# What people call them; pages translate it.
 STATE_LABELS = {
     State.READY: gettext_noop("ready"),
     State.RUNNING: gettext_noop("running"),
     State.PAUSED: gettext_noop("paused"),
     State.FINISHED: gettext_noop("finished"),
-    State.ABORTED: gettext_noop("aborted"),
+    State.ABORTED: gettext_noop("ended early"),
 }

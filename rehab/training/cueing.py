@@ -1,33 +1,30 @@
-"""What a robot's gestures answer, and how often: the part of a cue that the PT sets."""
+"""What a robot's gestures answer, and how often: the part of a cue that the PT sets.
+
+Its limits are those of the wire, so that a robot accepts what a plan may hold, and nothing else.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 
 from rehab.training.measures import InvalidSetting
-from robot.marking import gettext_noop
+from robot.wire.cue_limits import (
+    COUNT_MAX,
+    REST_MAX_S,
+    THRESHOLD_MAX,
+    WINDOW_MAX_S,
+    WINDOW_MIN_S,
+    CueRule,
+)
 
 # The paper's default (P 3.4.1): the robot responds to windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90
 
-WINDOW_MIN_S, WINDOW_MAX_S = 2.0, 60.0  # two steps at least, and still an answer to something
-REST_MAX_S = 600.0
-COUNT_MAX = 100
-
-
-class CueRule(StrEnum):
-    """What a gesture answers."""
-
-    WINDOWS = gettext_noop("windows")  # the mean performance of some seconds
-    STREAKS = gettext_noop("streaks")  # n steps in a row on one side of the threshold
-    STEPS = gettext_noop("steps")  # the mean performance of each n steps
-
 
 def check_activation_threshold(threshold: float) -> float:
     """Return the threshold as a float. Raises InvalidSetting outside (0, 2]."""
-    if not 0 < threshold <= 2:
+    if not 0 < threshold <= THRESHOLD_MAX:
         raise InvalidSetting(
             "The robot acts from more than 0 and up to 200 % of the goal (0.9 for 90 %)."
         )

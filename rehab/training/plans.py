@@ -21,10 +21,11 @@ from rehab.training.phases import Phase
 from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence
+from robot.marking import gettext_noop
 
-# How lively the robot is: the share of a gesture's size. The robot itself makes half of it gentle
-# (no sounds, half the speed).
-ROBOT_LEVELS = {"normal": 1.0, "gentle": 0.5, "off": 0.0}
+# How lively the robot is: the share of a gesture's size, by a name that pages translate. The robot
+# itself makes half of it gentle (no sounds, half the speed).
+ROBOT_LEVELS = {gettext_noop("normal"): 1.0, gettext_noop("gentle"): 0.5, gettext_noop("off"): 0.0}
 
 
 def check_robot_intensity(intensity: float) -> float:
@@ -57,9 +58,35 @@ def name_robot_level(intensity: float | None) -> str:
     return next((name for name, value in ROBOT_LEVELS.items() if value == intensity), "")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanSettings:
+    """The part of a plan that the PT sets.
+
+    Attributes
+    ----------
+    goal, target
+        What a step should reach, and what is wanted of the whole session.
+    activation_threshold, robot_intensity, cue_timing
+        Mean performance at which the robot celebrates, the share of its gestures' size, and what
+        they answer.
+    schedule
+        After which steps the patient gets feedback.
+    adaptation
+        Whether goals follow the patient.
+    """
+
+    goal: GoalRule
+    target: Target = field(default_factory=Target)
+    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
+    robot_intensity: float = 1.0
+    cue_timing: CueTiming = field(default_factory=CueTiming)
+    schedule: Schedule = field(default_factory=Schedule)
+    adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
+
+
 @dataclass(frozen=True, slots=True)
-class SessionPlan:
-    """What is measured and rewarded, in which phases, towards which goal, and what a robot does.
+class SessionPlan(PlanSettings):
+    """What is measured and rewarded, in which phases, and with which settings.
 
     Attributes
     ----------
@@ -67,19 +94,10 @@ class SessionPlan:
         What is trained, the rule set of feedback, and the session's parts.
     trained_side
         The leg whose steps are scored.
-    goal, target
-        What a step should reach, and what is wanted of the whole session.
-    activation_threshold, robot_intensity, cue_timing
-        Mean performance at which the robot celebrates, the share of its gestures' size, and what
-        they answer.
     gestures
         Composed gestures that a cue names, as they are sent to the robot.
     alternatives
         Valences that the session may be changed to, as they are then.
-    schedule
-        After which steps the patient is told.
-    adaptation
-        Whether goals follow the patient.
     close_steps
         Which steps are too uncertain to count as hit or miss.
     language
@@ -97,15 +115,8 @@ class SessionPlan:
     valence: Valence
     phases: tuple[Phase, ...]
     trained_side: Side
-    goal: GoalRule
-    target: Target = field(default_factory=Target)
-    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
-    robot_intensity: float = 1.0
     gestures: tuple[dict[str, Any], ...] = ()
     alternatives: tuple[Valence, ...] = ()
-    cue_timing: CueTiming = field(default_factory=CueTiming)
-    schedule: Schedule = field(default_factory=Schedule)
-    adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
     close_steps: CloseSteps = field(default_factory=CloseSteps)
     language: str = "en"
 

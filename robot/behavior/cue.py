@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from robot.wire.cue_limits import (
+    COUNT_MAX,
+    REST_MAX_S,
+    THRESHOLD_MAX,
+    WINDOW_MAX_S,
+    WINDOW_MIN_S,
+    CueRule,
+)
 from robot.wire.frames import BadFrame, read_number, read_whole
 from robot.wire.limits import MAX_CUE_GESTURES, MAX_NAME_CHARS
-
-# What a gesture answers: the mean of a window of time, so many steps in a row on one side of the
-# threshold, or the mean of so many steps.
-WINDOWS, STREAKS, STEPS = RULES = ("windows", "streaks", "steps")
 
 MIN_INTENSITY = 0.1
 # A cue of this intensity or less is performed quietly: without sounds, and at this share of every
@@ -31,7 +35,7 @@ class Cue:
     threshold
         Performance that a window's mean, or each step of a streak, has to reach; 1 is the goal.
     rule, count
-        What a gesture answers, one of ``RULES``; and how many steps that are, but for windows.
+        What a gesture answers; and how many steps that are, but for windows.
     window_s, rest_s
         Length of a window, and time from the start of one gesture to the start of the next, both
         on the source's clock [s], so that what a robot does follows from the log.
@@ -44,7 +48,7 @@ class Cue:
     above: str | None = None
     below: str | None = None
     threshold: float = 0.9
-    rule: str = WINDOWS
+    rule: CueRule = CueRule.WINDOWS
     count: int = 1
     window_s: float = 5.0
     rest_s: float = 5.0
@@ -60,19 +64,19 @@ class Cue:
         if 0 < intensity < MIN_INTENSITY:
             raise BadFrame(f'"intensity" is 0, or a number from {MIN_INTENSITY:g} to 1.')
         # A server from before there were rules names none.
-        if (rule := cue.get("rule", WINDOWS)) not in RULES:
-            raise BadFrame(f'"rule" is one of: {", ".join(RULES)}.')
+        if (rule := cue.get("rule", CueRule.WINDOWS)) not in list(CueRule):
+            raise BadFrame(f'"rule" is one of: {", ".join(CueRule)}.')
         gestures = cue.get("gestures", [])
         if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
             raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')
         return cls(
             above=_read_gesture(cue, "above"),
             below=_read_gesture(cue, "below"),
-            threshold=read_number(cue, "threshold", 0.0, 10.0),
-            rule=rule,
-            count=read_whole(cue, "count", low=1) if "count" in cue else 1,
-            window_s=read_number(cue, "window_s", 1.0, 600.0),
-            rest_s=read_number(cue, "rest_s", 0.0, 3600.0),
+            threshold=read_number(cue, "threshold", 0.0, THRESHOLD_MAX),
+            rule=CueRule(rule),
+            count=read_whole(cue, "count", low=1, high=COUNT_MAX) if "count" in cue else 1,
+            window_s=read_number(cue, "window_s", WINDOW_MIN_S, WINDOW_MAX_S),
+            rest_s=read_number(cue, "rest_s", 0.0, REST_MAX_S),
             intensity=intensity,
             gestures=tuple(gestures),
         )

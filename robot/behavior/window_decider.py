@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from robot.behavior.cue import STREAKS, WINDOWS, Cue
+from robot.behavior.cue import Cue
+from robot.wire.cue_limits import CueRule
 
 MIN_STEPS = 2  # of a window; with fewer valid steps there is no decision
 # A window above gets a gesture of full size from this mean performance on, where the strong words
@@ -104,7 +105,7 @@ class WindowDecider:
             self._first_s = time_s
             if self._started_s is not None and self._started_s > time_s:
                 self._started_s = time_s  # the clock was set back: how long ago it was is unknown
-        if self.cue.rule != WINDOWS:
+        if self.cue.rule != CueRule.WINDOWS:
             return self._add_to_group(time_s, performance)
         window = math.floor((time_s - self._first_s) / self.cue.window_s)
         if window < self._window:
@@ -122,7 +123,7 @@ class WindowDecider:
     def _add_to_group(self, time_s: float, performance: float) -> Decision | None:
         """Add a step to the open streak or group of steps, and return the decision at its end."""
         above = performance >= self.cue.threshold
-        if self.cue.rule == STREAKS and self._steps and above != self._is_above:
+        if self.cue.rule == CueRule.STREAKS and self._steps and above != self._is_above:
             self.drop_window()
         if self._first_s is None or time_s < self._first_s:
             self.drop_window()
@@ -136,7 +137,7 @@ class WindowDecider:
             return None
         mean = self._sum / self._steps
         # Each step of a streak is on its side; their mean may be rounded to the other one.
-        above = above if self.cue.rule == STREAKS else mean >= self.cue.threshold
+        above = above if self.cue.rule == CueRule.STREAKS else mean >= self.cue.threshold
         decision = self._conclude(self._first_s, time_s, time_s, above=above)
         self.drop_window()
         return decision

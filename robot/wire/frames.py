@@ -71,11 +71,12 @@ def read_name(message: Mapping[str, Any], name: str) -> str:
     return value
 
 
-def read_whole(message: Mapping[str, Any], name: str, *, low: int) -> int:
-    """Return a whole number of a message, from ``low`` to 2³¹ - 1. Raises BadFrame."""
+def read_whole(message: Mapping[str, Any], name: str, *, low: int, high: int = 2**31 - 1) -> int:
+    """Return a whole number of a message, from ``low`` to ``high``. Raises BadFrame."""
     value = message.get(name)
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value < 2**31:
-        raise BadFrame(f'"{name}" is a whole number of {low} or more.')
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        upto = f"{low} or more" if high == 2**31 - 1 else f"{low} to {high}"
+        raise BadFrame(f'"{name}" is a whole number of {upto}.')
     return value
 
 

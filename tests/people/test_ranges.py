@@ -12,8 +12,7 @@ from rehab.patients.forms import PatientForm
 from rehab.people.ranges import NumberField, WholeNumberField, range_message
 from rehab.people.roles import Role
 from rehab.sessions.forms.session import SessionForm
-from rehab.sessions.setup.presets import Preset
-from rehab.studies.models import Study
+from rehab.studies.models import Arm, Study
 from tests.support.world import NOW, World
 
 
@@ -84,8 +83,7 @@ def test_a_models_range_is_said_also_below_zero(world: World, mass: str) -> None
 @pytest.mark.parametrize(
     ("model", "field", "said"),
     [
-        (Preset, "wanted_hits", "Give 1 to 100 %."),
-        (Preset, "robot_window", "Give 2 to 60 s."),
+        (Arm, "schedule_band", "Give 1 to 50 %."),
         (Study, "goal_percent", "Give 50 to 200 %."),
     ],
 )

@@ -146,9 +146,9 @@ for name, valence, percent, minutes in (
     ("Gentle start", "positive", 95, 10), ("Challenge", "binary", 118, 20),
 ):
     Preset.everywhere.create(
-        clinic=first_clinic(), name=name, valence=valence, goal_by="percent", goal_percent=percent,
-        measure=MeasureDefinition.everywhere.get(clinic=None, slug="a2"), protocol=blocks,
-        wanted_hits=60, minutes=minutes,
+        clinic=first_clinic(), name=name, protocol=blocks,
+        measure=MeasureDefinition.everywhere.get(clinic=None, slug="a2"),
+        options={"valence": valence, "goal_percent": percent, "minutes": minutes},
     )
 for station, kind, name, seen in (
     ("Treadmill 1", "tablet", "Tablet by the window", True),

@@ -165,9 +165,7 @@ def multiply(world: World) -> None:
         Preset.everywhere.create(
             clinic=world.clinic,
             name=f"More {number}",
-            valence="binary",
             measure=MeasureDefinition.everywhere.get(clinic=None, slug="a2"),
-            goal_value=2,
             protocol=protocol,
         )
 

@@ -15,13 +15,14 @@ from rehab.sessions.services import SessionRequest, change_session, create_sessi
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
-from rehab.training.cueing import CueRule, CueTiming
+from rehab.training.cueing import CueTiming
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
 from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
+from robot.wire.cue_limits import CueRule
 from tests.support.page_text import plain
 from tests.support.world import World, build_world, client_of
 
@@ -142,7 +143,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
     [
         ("goal_value", "0", "above 0 and up to 15 W/kg"),
         ("goal_value", "16", "above 0 and up to 15 W/kg"),
-        ("goal_value", "nan", "Goal value: Enter a number"),
+        ("goal_value", "nan", "Goal, in the measure’s unit: Enter a number"),
         ("goal_value", "", "either as a value or as percent"),
         ("wanted_hits", "101", "Give 1 to 100 %"),
         ("minutes", "-1", "Give 1 to 240 minutes"),
@@ -151,7 +152,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
         ("station", "999999", "Select a valid choice"),
         ("robot", "wild", "Select a valid choice"),
         ("robot_above", "somersault", "Select a valid choice"),
-        ("robot_below", "", "Robot below: This field is required"),
+        ("robot_below", "", "After weak steps: This field is required"),
     ],
 )
 def test_what_cannot_be_walked_is_refused_in_words(pt, patient, station, field, value, words):

@@ -253,10 +253,9 @@ def build_world(name: str) -> World:
         Preset.everywhere.create(
             clinic=clinic,
             name=mark(name, Preset),
-            valence="binary",
             measure=measure,
-            goal_value=1.5,
             protocol=protocol,
+            options={"valence": "binary", "goal_by": "value", "goal_value": 1.5},
         ),
         Questionnaire.everywhere.create(
             clinic=clinic, name=mark(name, Questionnaire), items="Zqtiredqz | zq | zq | 5"

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.adaptation import (
+    DEFAULT_HIT_RATE,
     SUGGESTION_STRIDES,
     AdaptationMode,
     GoalAdaptation,
@@ -64,16 +65,35 @@ def test_a_session_suggests_from_valid_training_strides_as_they_are_shown():
 
 
 @pytest.mark.parametrize(
-    ("hits", "factor"), [(20, 1.04), (16, 1.02), (14, None), (12, None), (10, None), (4, 0.96)]
+    ("wanted", "hits", "factor"),
+    [
+        *((0.6, hits, None) for hits in (14, 12, 10)),
+        *((0.6, hits, factor) for hits, factor in ((20, 1.04), (16, 1.02), (4, 0.96))),
+        # In binary figures 16/20 − 0.7 is a hair more than the tolerance of 0.1.
+        (DEFAULT_HIT_RATE, 16, None),
+        (DEFAULT_HIT_RATE, 12, None),
+        (DEFAULT_HIT_RATE, 17, 1.015),
+        (DEFAULT_HIT_RATE, 11, 0.985),
+    ],
 )
-def test_a_block_moves_the_goal_by_its_weighted_steps(hits, factor):
+def test_a_block_moves_the_goal_by_its_weighted_steps(wanted, hits, factor):
     staircase = Staircase()
     moved = [
-        staircase.add(AUTOMATIC, A2, 0.6, goal=4.0, gain=1.0, hit=number < hits)
+        staircase.add(AUTOMATIC, A2, wanted, goal=4.0, gain=1.0, hit=number < hits)
         for number in range(20)
     ]
     assert moved[:-1] == [None] * 19
     assert moved[-1] == (None if factor is None else pytest.approx(4.0 * factor))
+
+
+def test_another_gain_begins_a_new_block():
+    staircase = Staircase()
+    gains = [1.0] * 19 + [0.9] * 20
+    moved = [
+        staircase.add(AUTOMATIC, A2, 0.6, goal=4.0, gain=gain, hit=gain != 1) for gain in gains
+    ]
+    # Nineteen misses before are no part of the block of twenty hits.
+    assert moved == [None] * 38 + [pytest.approx(4.16)]
 
 
 def test_where_lower_is_better_hits_lower_the_goal():

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind, PauseReason, State
-from rehab.training.cueing import CueTiming
+from rehab.training.cueing import CueTiming, check_activation_threshold
 from rehab.training.fold.tallies import Tally
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
@@ -15,6 +15,9 @@ from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import find_valence
+from robot.behavior.cue import Cue
+from robot.wire.cue_limits import CueRule
+from robot.wire.frames import BadFrame
 from tests.training.sessions import make_plan, start, walk
 
 BASELINE = make_phase("baseline", strides=50)
@@ -108,18 +111,52 @@ def test_mean_and_sd_are_those_of_the_textbook(values, cut):
     assert first.sd_value == pytest.approx(stdev(values), abs=1e-9)
 
 
+@pytest.mark.parametrize(("first", "second"), [("hhhm", "hhm"), ("hhm", "hhhm"), ("hh", "hhm")])
+def test_the_longest_row_of_hits_lies_in_one_of_the_parts(first, second):
+    parts = []
+    for hits in (first, second):
+        fold = start(make_plan())
+        walk(fold, [5.0 if one == "h" else 3.0 for one in hits])
+        parts.append(fold.feedback)
+    whole, other = parts
+    whole.merge(other)
+    assert (whole.best_streak, whole.streak) == (max(first.count("h"), second.count("h")), 0)
+
+
 def test_one_value_has_no_sd():
     fold = start(make_plan(make_phase("baseline")))
     walk(fold, [4.0])
     assert fold.trained.sd_value is None
 
 
+SENT = {"threshold": 0.9, "window_s": 5, "rest_s": 5, "count": 5, "intensity": 1}
+
+
 @pytest.mark.parametrize(
-    "figures", [{"window_s": 1}, {"window_s": 61}, {"rest_s": -1}, {"count": 0}, {"count": 101}]
+    ("name", "least", "most", "by"),
+    [("window_s", 2, 60, 0.01), ("rest_s", 0, 600, 0.01), ("count", 1, 100, 1)],
 )
-def test_a_cue_s_figures_have_bounds(figures):
+def test_plans_and_robots_have_the_same_limits(name, least, most, by):
+    for figure in (least, most):
+        assert getattr(CueTiming(**{name: figure}), name) == figure
+        assert getattr(Cue.read(SENT | {name: figure}), name) == figure
+    for figure in (least - by, most + by):
+        with pytest.raises(InvalidSetting):
+            CueTiming(**{name: figure})
+        with pytest.raises(BadFrame, match=name):
+            Cue.read(SENT | {name: figure})
+
+
+def test_plans_and_robots_have_the_same_thresholds_and_rules():
+    assert check_activation_threshold(2) == Cue.read(SENT | {"threshold": 2}).threshold
     with pytest.raises(InvalidSetting):
-        CueTiming(**figures)
+        check_activation_threshold(2.01)
+    with pytest.raises(BadFrame):
+        Cue.read(SENT | {"threshold": 2.01})
+    for rule in CueRule:
+        assert Cue.read(SENT | {"rule": rule.value}).rule is rule
+    with pytest.raises(BadFrame, match="windows, streaks, steps"):
+        Cue.read(SENT | {"rule": "dances"})
 
 
 def test_plans_from_before_there_was_a_choice_follow_the_old_rules():

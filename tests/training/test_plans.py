@@ -54,7 +54,7 @@ def test_a_plan_from_before_alternatives_is_read_and_cannot_be_changed() -> None
 def test_a_plan_needs_a_phase() -> None:
     plan = make_plan()
     with pytest.raises(InvalidSetting, match="at least one phase"):
-        SessionPlan(plan.measure, plan.valence, (), plan.trained_side, plan.goal)
+        SessionPlan(plan.measure, plan.valence, (), plan.trained_side, goal=plan.goal)
 
 
 @pytest.mark.parametrize("goal", [0.0, 16.0, math.nan])

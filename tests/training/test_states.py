@@ -10,6 +10,7 @@ import pytest
 
 from rehab.training.bands import bands_to_json
 from rehab.training.changes import (
+    STATE_LABELS,
     Change,
     ChangeKind,
     ChangeValue,
@@ -81,7 +82,8 @@ def test_a_change_leads_on_or_is_refused_in_words(kind: ChangeKind, state: State
         fold.change(change)
         assert fold.state is LEADS_TO[kind, state] is CONTROLS[kind].next_state(state)
     else:
-        with pytest.raises(NotAllowed, match=f"that is {state} cannot .* '{kind}'; it must be "):
+        label = STATE_LABELS[state]
+        with pytest.raises(NotAllowed, match=f"that is {label} cannot .* '{kind}'; it must be "):
             fold.change(change)
         assert vars(fold) == before
 
@@ -92,8 +94,8 @@ def test_steps_come_only_while_running_or_paused(state: State) -> None:
     if state in (S.RUNNING, S.PAUSED):
         assert step_at(fold, 1.0).valid == (state is S.RUNNING)
     else:
-        before = copy.deepcopy(vars(fold))
-        with pytest.raises(NotAllowed, match=f"that is {state} takes no steps; it must be running"):
+        before, label = copy.deepcopy(vars(fold)), STATE_LABELS[state]
+        with pytest.raises(NotAllowed, match=f"is {label} takes no steps; it must be running"):
             step_at(fold, 1.0)
         assert vars(fold) == before
 

@@ -6,11 +6,14 @@ import copy
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import InvalidReason, Measurement, ScoredStep, Side
+from rehab.training.summary.metrics import compute_metrics
 from rehab.training.summary.summary import summarize_phases
 from rehab.training.valences import VALENCES, CueGestures
 from tests.training.sessions import make_plan, others_than, start, walk
@@ -53,6 +56,28 @@ def test_a_judged_step(valence: str, value: float, hit: bool) -> None:
     assert step.rules_version == RULES_VERSION
     assert fold.score == points
     assert (fold.feedback.judged, fold.feedback.hits) == (1, int(hit))
+
+
+WALKED = st.lists(st.sampled_from([HIT, HIT, MISS, MISS, MISS, None]), min_size=30, max_size=60)
+
+
+@given(values=WALKED)
+@pytest.mark.parametrize("valence", list(EARNED))
+def test_points_follow_from_each_step_alone(valence: str, values: list[float | None]) -> None:
+    """What a step earns does not depend on those before it; the score is their sum."""
+    fold = start(make_plan(valence=valence))
+    steps = walk(fold, values)
+    of_hit, of_miss = EARNED[valence]
+    assert [step.points for step in steps] == [
+        None if value is None else of_hit if value >= GOAL else of_miss for value in values
+    ]
+    hits, misses = values.count(HIT), values.count(MISS)
+    figures = compute_metrics(fold)
+    assert figures.get("steps", 0) == hits + misses
+    if of_hit is None or of_miss is None:
+        assert (fold.score, "score" in figures) == (None, False)
+        return
+    assert fold.score == figures["score"] == of_hit * hits + of_miss * misses
 
 
 @pytest.mark.parametrize(

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
-from django import forms
 from django.contrib import admin
+from django.db.models import QuerySet
 from django.http import HttpRequest
-from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin
+from rehab.people.web.row_forms import ClinicForm
 from rehab.sessions.questionnaires import Questionnaire
-from rehab.sessions.setup.gestures import robot_gesture_choices
-from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.option import Group, Option
+from rehab.sessions.setup.options import ANSWERS, OPTIONS, options_of, preset_options
+from rehab.sessions.setup.presets import Preset, PresetOptionForm
 
 
 @admin.register(Questionnaire)
@@ -25,60 +26,99 @@ class QuestionnaireAdmin(ScopedAdmin):
     search_fields = ("name", "items")
 
 
+class PresetForm(ClinicForm):
+    """A preset. The fields of its options come with `PresetAdmin.get_form`."""
+
+    def __init__(self, *args: Any, **others: Any) -> None:
+        super().__init__(*args, **others)
+        self.initial = self.instance.values | self.initial
+
+    def _post_clean(self) -> None:
+        if not self.errors:  # else the preset would report the same once more
+            self.instance.options = {name: self.cleaned_data[name] for name in self.instance.values}
+            super()._post_clean()  # type: ignore[misc]  # Django's hook between form and model
+
+
+class OptionFilter(admin.SimpleListFilter):
+    """Filters a list of presets by an option that has few choices."""
+
+    option: ClassVar[Option]
+
+    def lookups(self, request: HttpRequest, model_admin: Any) -> Any:
+        """Return the choices of the option."""
+        return self.option.choices_for(None)
+
+    def queryset(self, request: HttpRequest, queryset: QuerySet[Preset]) -> QuerySet[Preset]:
+        """Return the presets with the chosen value."""
+        chosen = self.value()
+        return queryset.filter(**{f"options__{self.option.name}": chosen}) if chosen else queryset
+
+
+def _filter_by(name: str) -> type[OptionFilter]:
+    option = OPTIONS[name]
+    return type(
+        f"{name}_filter",
+        (OptionFilter,),
+        {"option": option, "title": option.label, "parameter_name": name},
+    )
+
+
 @admin.register(Preset)
 class PresetAdmin(ScopedAdmin):
     """Presets, which the set-up offers as one tap."""
 
-    list_display = ("name", "valence", "goal_label", "wanted_hits", "minutes", "protocol", "robot")
-    list_filter = ("valence", "robot")
+    form = PresetForm
+    list_display = ("name", "summary", "wanted_hits", "protocol", "robot")
+    list_filter = (_filter_by("valence"), _filter_by("robot"))
     list_select_related = ("protocol", "measure")
     search_fields = ("name", "protocol__name")
-    radio_fields = {"valence": admin.HORIZONTAL, "goal_by": admin.HORIZONTAL}
-    fieldsets = (
-        (None, {"fields": ("name", "valence", "protocol")}),
-        (
-            _("Goal"),
-            {
-                "fields": (
-                    ("measure", "goal_by"),
-                    ("goal_value", "goal_percent"),
-                    ("wanted_hits", "minutes"),
-                )
-            },
-        ),
-        (
-            _("Feedback and goal"),
-            {
-                "fields": (
-                    ("schedule", "schedule_steps", "schedule_band"),
-                    ("goal_follows", "goal_asks"),
-                )
-            },
-        ),
-        (
-            _("Robot and source"),
-            {
-                "fields": (
-                    "robot",
-                    ("robot_above", "robot_below"),
-                    ("robot_threshold", "robot_answers"),
-                    ("robot_window", "robot_count", "robot_rest"),
-                    "source",
-                )
-            },
-        ),
-    )
 
-    def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
-        """Offer the gestures that this clinic has."""
-        if db_field.name in {"robot_above", "robot_below"}:
-            return forms.ChoiceField(
-                choices=robot_gesture_choices(user_of(request)),
-                label=capfirst(db_field.verbose_name),
+    def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fields of the options; to those who only read, their values as text."""
+        rows = ("name", "protocol", "measure")
+        if not self.has_change_permission(request, obj):
+            return [(None, {"fields": (*rows, "described")})]
+        shown = {None: (Group.MAIN,), _("When page and robot answer"): ANSWERS}
+        return [
+            (
+                title,
+                {
+                    "fields": (
+                        *(rows if title is None else ()),
+                        *(option.name for option in options_of(*groups)),
+                    )
+                },
             )
-        return super().formfield_for_dbfield(db_field, request, **kwargs)
+            for title, groups in shown.items()
+        ]
 
-    @admin.display(description=_("goal"))
-    def goal_label(self, preset: Preset) -> str:
-        """The goal as text."""
-        return preset.goal_label
+    def get_form(
+        self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any
+    ) -> Any:
+        """Return the form with a field for each option."""
+        fields = PresetOptionForm(by=user_of(request)).fields
+        form = type(PresetForm.__name__, (PresetForm,), dict(fields))
+        return super().get_form(request, obj, change, **kwargs, form=form)
+
+    @admin.display(description=_("set-up"))
+    def summary(self, preset: Preset) -> str:
+        """Its feedback type, goal and duration."""
+        return preset.summary
+
+    @admin.display(description=_("wanted hits, % of the steps"))
+    def wanted_hits(self, preset: Preset) -> int | None:
+        """The wanted share of hits."""
+        return preset.values["wanted_hits"]  # type: ignore[no-any-return]
+
+    @admin.display(description=_("robot"))
+    def robot(self, preset: Preset) -> str:
+        """How lively the robot is."""
+        return OPTIONS["robot"].describe(preset.values["robot"])
+
+    @admin.display(description=_("options"))
+    def described(self, preset: Preset) -> str:
+        """Its options as text, a line each."""
+        return "\n".join(
+            f"{option.label}: {option.describe(preset.values[option.name])}"
+            for option in preset_options()
+        )

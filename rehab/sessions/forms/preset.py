@@ -11,10 +11,11 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Patient, User
 from rehab.sessions.forms.session import SessionForm
-from rehab.sessions.setup.presets import NAME_TAKEN, Preset
+from rehab.sessions.setup.options import preset_options
+from rehab.sessions.setup.presets import NAME_TAKEN, SOURCES, Preset
 
-# Not part of a preset: they depend on the patient and the place.
-EXCLUDED_FIELDS = ("station", "trained_side", "device", "belt_speed", "weight_support")
+# Fields of the set-up that no preset has: they depend on the patient and the place.
+EXCLUDED_FIELDS = ("station", "trained_side")
 
 
 def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
@@ -27,12 +28,16 @@ def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
         del form.fields[field]
     if not form.is_valid():
         raise ValidationError([message for errors in form.errors.values() for message in errors])
-    chosen = form.cleaned_data | form.chosen_answers()
-    kinds = {slug for slug, _words in Preset._meta.get_field("source").flatchoices}
+    data = form.cleaned_data
+    chosen = {option.name: form.chosen()[option.name] for option in preset_options()}
+    if chosen["source"] not in SOURCES:
+        chosen["source"] = ""
     preset = Preset(
         clinic=clinic_of(by),
         name=name,
-        **chosen | {"source": chosen["source"] if chosen["source"] in kinds else ""},
+        measure=data["measure"],
+        protocol=data["protocol"],
+        options=chosen,
     )
     if not name:
         preset.name = _free_name(preset.summary, by)

@@ -17,10 +17,9 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.sessions.control_text import chart_marks
 from rehab.sessions.corrections import add_note
-from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
 from rehab.sessions.log import EVENTS, REMARK_RANGES, FallSeverity, Remark
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.answers import ADAPTATIONS
+from rehab.sessions.setup.options import OPTIONS
 from rehab.training.plans import ROBOT_LEVELS
 
 NOTE_MAX_CHARS = 500
@@ -64,11 +63,9 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
             for what, icon in ICONS.items()
         ],
         "borg": range(REMARK_RANGES[Remark.BORG][1] + 1),
-        "adaptations": ADAPTATIONS,
+        "adaptations": OPTIONS["goal_follows"].choices,
         "severities": [(each.value, capfirst(each.label)) for each in FallSeverity],
-        "levels": [
-            (capfirst(ROBOT_LEVEL_LABELS[name]), share) for name, share in ROBOT_LEVELS.items()
-        ],
+        "levels": [(capfirst(_(name)), share) for name, share in ROBOT_LEVELS.items()],
     }
     return render(request, "sessions/monitor.html", context)
 

@@ -9,6 +9,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_http_methods
 
 from rehab.feedback.clinic_valences import valences_of
@@ -19,7 +20,8 @@ from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.answers import USUAL_ANSWERS
+from rehab.sessions.setup.option import Group
+from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.outline import outline_protocol, protocol_minutes
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
@@ -28,7 +30,12 @@ from rehab.stations.builtin import first_station
 
 # Where the person who set the session up may go next.
 NEXT_PAGES = ("walk", "monitor")
-_USUAL = tuple(USUAL_ANSWERS.items())
+# The headings of the part that says when page and robot answer.
+HEADINGS = {
+    Group.GOAL: _("Goal"),
+    Group.FEEDBACK: _("Feedback on the patient’s page"),
+    Group.ROBOT: _("Robot"),
+}
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -96,9 +103,14 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
             }
             for key, rule in measures.items()
         },
+        "answers": [
+            (group, words, [(option, form[option.name]) for option in options_of(group)])
+            for group, words in HEADINGS.items()
+        ],
         "answers_changed": any(
-            form[name].value() != usual for name, usual in USUAL_ANSWERS.items()
+            form[option.name].value() != option.default for option in options_of(*ANSWERS)
         ),
+        "walking": [form[option.name] for option in options_of(Group.WALKING)],
         "presets": presets,
         "preset": chosen,
         "preset_name": name,

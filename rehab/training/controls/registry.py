@@ -75,11 +75,7 @@ _MONITOR_AND_CUE = {Audience.MONITOR: Payload.VALUE, Audience.ROBOT: Payload.CUE
 
 _TYPES: Choices = {one.slug: one.label for one in VALENCES.values()}
 _SWITCH: Choices = {1: gettext_noop("on"), 0: gettext_noop("off")}
-_LEVELS: Choices = {
-    ROBOT_LEVELS["normal"]: gettext_noop("normal"),
-    ROBOT_LEVELS["gentle"]: gettext_noop("gentle"),
-    ROBOT_LEVELS["off"]: gettext_noop("off"),
-}
+_LEVELS: Choices = {share: level for level, share in ROBOT_LEVELS.items()}
 _CHART_STYLES: Choices = {
     ChartStyle.POINTS.value: gettext_noop("points"),
     ChartStyle.LINE.value: gettext_noop("line"),

@@ -5,10 +5,11 @@ from __future__ import annotations
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
-from rehab.training.cueing import CueRule, CueTiming
+from rehab.training.cueing import CueTiming
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
 from rehab.training.schedules import Schedule, ScheduleKind
+from robot.wire.cue_limits import CueRule
 from tests.support.callers import a_step, restart
 
 TRAINING = make_phase("training")

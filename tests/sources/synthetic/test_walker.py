@@ -130,7 +130,7 @@ PHASES = st.lists(
 @settings(deadline=None)
 @given(PHASES, st.integers(0, 99))
 def test_walker_and_session_agree_on_the_phase_of_every_stride(phases, seed):
-    plan = SessionPlan(A2, VALENCES["positive"], tuple(phases), Side.LEFT, GoalRule(value=3.9))
+    plan = SessionPlan(A2, VALENCES["positive"], tuple(phases), Side.LEFT, goal=GoalRule(value=3.9))
     fold = SessionFold(plan)
     fold.change(Change(ChangeKind.START))
     walker = SyntheticWalker(GOOD, seed)

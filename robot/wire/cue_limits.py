@@ -1,0 +1,20 @@
+"""What a cue may ask of a robot: plans are made within these limits, and robots refuse others."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from robot.marking import gettext_noop
+
+THRESHOLD_MAX = 2.0  # share of the goal; it lies above 0
+WINDOW_MIN_S, WINDOW_MAX_S = 2.0, 60.0  # two steps at least, and still an answer to something
+REST_MAX_S = 600.0
+COUNT_MAX = 100
+
+
+class CueRule(StrEnum):
+    """What a gesture answers."""
+
+    WINDOWS = gettext_noop("windows")  # the mean performance of some seconds
+    STREAKS = gettext_noop("streaks")  # n steps in a row on one side of the threshold
+    STEPS = gettext_noop("steps")  # the mean performance of each n steps
