@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from ninja import Field, Schema
+from ninja import Field, ModelSchema, Schema
 from pydantic import AfterValidator
 
 from rehab.people.api import PatientName, ShortText
@@ -19,7 +19,7 @@ from rehab.people.web.api_base import (
     may_see_names,
     optional,
 )
-from rehab.sessions.log import SessionMetric
+from rehab.sessions.log import STEP_COLUMNS, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
 from rehab.training.adaptation import AdaptationMode
@@ -184,27 +184,17 @@ class ChangeRequestBody(RequestBody):
     )
 
 
-class StepOut(Schema):
-    """A scored stride."""
+class StepOut(ModelSchema):
+    """A scored stride: all that is stored of it."""
 
-    number: int
-    time_s: float
-    received_at: datetime
-    side: str
-    value: float | None
-    gain: float
-    shown: float | None
-    goal: float | None
-    performance: float | None
-    hit: bool | None
-    close: bool
-    late: bool
-    points: int | None
-    valid: bool
     reasons: list[str]
-    phase: int
-    rules_version: int
     extra: dict[str, float]
+
+    class Meta:
+        """All fields but the keys."""
+
+        model = Step
+        fields: ClassVar = [column.field for column in STEP_COLUMNS]
 
 
 class StepPage(Schema):
