@@ -35,14 +35,7 @@ FILES = {
     "boards.json": _("the rows on leaderboards, and the groups of boards"),
     "studies.json": _("the part in studies; the arm once a study is closed"),
     "changes.json": _("when details were changed, each with its value before and after"),
-    "sessions.csv": _("a row for each session"),
-    "steps.csv": _("a row for each step"),
-    "events.csv": _("a row for each thing done or noted during a session"),
-    "corrections.csv": _("a row for each correction of a session after its end"),
-    "feedback.csv": _("what the page said and showed after each step"),
-    "answers.csv": _("a row for each question of a questionnaire"),
-    "study_visits.csv": _("which session was which visit of a study"),
-    "incidents.csv": _("what the robot recorded around its stops"),
+    **{table.file: table.title for table in TABLES},
     "codebook.csv": _("what every column means, with its unit"),
 }
 README_TEXT = _("""\
@@ -95,8 +88,7 @@ def session_files(user: User, now: datetime) -> Iterator[tuple[str, Any]]:
 
 def _session_tables(selection: Selection) -> Iterator[tuple[str, Any]]:
     for table in TABLES:
-        header = [column.name for column in table.columns]
-        yield table.file, write_csv(header, selection.read(table))
+        yield table.file, write_csv(table.header, table.read(selection))
     yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
 
 

@@ -191,9 +191,7 @@ class TrainingSession(ClinicModel):
             "active_s excluded": WALKED,
             "clinic station created_by": retained("places and staff", shown=False, research=False),
             "checkpoint": retained("None once it has ended", shown=False, research=False),
-            "last_number epoch owner": retained(
-                "the server's own", shown=False, research=False
-            ),
+            "last_number epoch owner": retained("the server's own", shown=False, research=False),
         }
     )
 

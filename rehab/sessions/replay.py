@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Collection, Iterable, Iterator
+from dataclasses import fields
 from datetime import datetime
 from typing import Any, NamedTuple
 
@@ -157,18 +158,14 @@ def to_change(event: SessionEvent) -> Change:
 
 
 # What a source sent of a step. Plain rows: a model's object for each would take most of the time.
-MEASURED = ("number", "time_s", "side", "value", "reasons", "extra", "rules_version")
-StoredMeasurement = tuple[int, float, str, float | None, list[str], dict[str, float], int]
+MEASURED = tuple(field.name for field in fields(Measurement))
+StoredMeasurement = tuple[Any, ...]
 
 
 def to_measurement(
-    number: int,
-    time_s: float,
-    side: str,
-    value: float | None,
-    reasons: list[str],
-    extra: dict[str, float],
-    rules_version: int,
+    number: int, time_s: float, side: str, value: float | None, reasons: list[str], *rest: Any
 ) -> Measurement:
-    """Return a step as its source sent it; scoring it again gives the stored verdict."""
-    return Measurement(number, time_s, Side(side), value, tuple(reasons), extra, rules_version)
+    """Return a step (its columns ``MEASURED``) as its source sent it; scoring it again gives the
+    stored verdict.
+    """
+    return Measurement(number, time_s, Side(side), value, tuple(reasons), *rest)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from datetime import datetime
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ninja import Field, Schema
+from ninja import Field, ModelSchema, Schema
 from pydantic import AfterValidator, create_model
 
 from rehab.people.api import PatientName, ShortText
@@ -20,7 +20,7 @@ from rehab.people.web.api_base import (
     may_see_names,
     optional,
 )
-from rehab.sessions.log import SessionMetric
+from rehab.sessions.log import STEP_COLUMNS, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.option import Option
 from rehab.sessions.setup.options import OPTIONS
@@ -191,27 +191,17 @@ class ChangeRequestBody(RequestBody):
     )
 
 
-class StepOut(Schema):
-    """A scored stride."""
+class StepOut(ModelSchema):
+    """A scored stride: all that is stored of it."""
 
-    number: int
-    time_s: float
-    received_at: datetime
-    side: str
-    value: float | None
-    gain: float
-    shown: float | None
-    goal: float | None
-    performance: float | None
-    hit: bool | None
-    close: bool
-    late: bool
-    points: int | None
-    valid: bool
     reasons: list[str]
-    phase: int
-    rules_version: int
     extra: dict[str, float]
+
+    class Meta:
+        """All fields but the keys."""
+
+        model = Step
+        fields: ClassVar = [column.field for column in STEP_COLUMNS]
 
 
 class StepPage(Schema):

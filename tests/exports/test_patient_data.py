@@ -21,7 +21,9 @@ from django.urls import reverse
 from rehab.boards.models import Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.selection import PAGE_ROWS, Selection
-from rehab.exports.tables import STEPS, TABLES
+from rehab.exports.session_table import SESSIONS
+from rehab.exports.step_tables import STEPS
+from rehab.exports.tables import TABLES
 from rehab.patients.visits import plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
@@ -58,7 +60,7 @@ def test_a_table_of_sessions_costs_the_same_however_many_there_are(world):
     def cost() -> int:
         chosen = Selection(user, TrainingSession.objects.visible_to(user), named=True)
         with CaptureQueriesContext(connection) as queries:
-            told = list(chosen.session_rows())
+            told = list(SESSIONS.read(chosen))
         assert len(told) == TrainingSession.everywhere.count()
         return len(queries)
 
@@ -219,7 +221,7 @@ def test_the_codebook_says_what_every_column_means(world):
     told = {(row["file"], row["column"]): row["meaning"] for row in rows_of(files["codebook.csv"])}
     for table in TABLES:
         header = next(csv.reader(io.StringIO(files[table.file])))
-        assert header == [column.name for column in table.columns]
+        assert header == table.header
         assert all(told[table.file, name] for name in header)
     assert len(told) == sum(len(table.columns) for table in TABLES)
 
@@ -286,9 +288,8 @@ def test_pages_of_steps_join_without_a_gap(world):
     Step.everywhere.bulk_create(Step(**columns | {"id": None, "number": n}) for n in numbers)
     user = world.people[Role.LEAD]
     sessions = TrainingSession.objects.visible_to(user)
-    place = [column.name for column in STEPS.columns].index("number")
-    rows = Selection(user, sessions, named=False).step_rows()
-    assert [row[place] for row in rows] == list(range(1, 2 * PAGE_ROWS + 1))
+    rows = STEPS.read(Selection(user, sessions, named=False))
+    assert [row.number for row in rows] == list(range(1, 2 * PAGE_ROWS + 1))
 
 
 @pytest.mark.long

@@ -19,7 +19,8 @@ from rehab.exports.research import package as packages
 from rehab.exports.research.dates import shift_of, without_clocks
 from rehab.exports.research.package import Package, sessions_for
 from rehab.exports.selection import Selection
-from rehab.exports.tables import FEEDBACK, TABLES
+from rehab.exports.step_tables import FEEDBACK
+from rehab.exports.tables import TABLES
 from rehab.patients.erasure import erase
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
@@ -82,7 +83,7 @@ def test_tables_are_those_of_the_plain_export_with_a_typed_codebook(world, tmp_p
     files = unpack(export(lead, tmp_path / "x"))
     chosen = Selection(lead, sessions_for(lead, None), named=False)
     for each in TABLES:
-        assert len(table(files, each.file)) == len(list(chosen.read(each)))
+        assert len(table(files, each.file)) == len(list(each.read(chosen)))
     codebook = table(files, "codebook.csv")
     assert {row["file"] for row in codebook} == {each.file for each in TABLES}
     kinds = {(row["file"], row["column"]): row["type"] for row in codebook}
@@ -114,8 +115,7 @@ def test_the_words_and_confetti_are_those_that_the_page_was_told(world):
     )
     lead = world.people[Role.LEAD]
     one = Selection(lead, TrainingSession.everywhere.filter(pk=session.pk), named=False)
-    names = [column.name for column in FEEDBACK.columns]
-    told = [dict(zip(names, row, strict=True)) for row in one.feedback_rows()]
+    told = [row._asdict() for row in FEEDBACK.read(one)]
     assert [row["number"] for row in told] == [1, 2, 3, 4, 6]
     plan = session.to_plan()
     bands = plan.valence.band(1.25), plan.valence.band(0.75)

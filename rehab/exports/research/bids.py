@@ -10,35 +10,23 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from datetime import datetime
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from rehab.exports.research.recordings import PLACES
 from rehab.exports.research.sinks import Rows
-from rehab.people.models import Patient
-from rehab.people.policy import covariates
+from rehab.exports.session_table import PARTICIPANT
+from rehab.exports.step_tables import STEPS
 from rehab.people.web.csv_tables import format_cell
+from rehab.sessions.log import MEASURE_UNIT
 
 BIDS_VERSION = "1.10.0"
 TASK, SYSTEM = "walking", "strides"
 MISSING = "n/a"
-# Name, type and unit of each channel ("": the measure's), in the order of the columns.
-CHANNELS = (
-    ("latency", "LATENCY", "s"),
-    ("number", "MISC", MISSING),
-    ("right_leg", "MISC", MISSING),
-    ("trained", "MISC", MISSING),
-    ("value", "MISC", ""),
-    ("gain", "MISC", MISSING),
-    ("shown", "MISC", ""),
-    ("goal", "MISC", ""),
-    ("performance", "MISC", MISSING),
-    ("hit", "MISC", MISSING),
-    ("points", "MISC", MISSING),
-    ("valid", "MISC", MISSING),
-    ("phase", "MISC", MISSING),
-)
-PLAIN_CHANNELS = [name for name, _type, _unit in CHANNELS if name in PLACES]
+# The channels: latency and leg, then columns of the table of steps.
+STORED = [column for column in STEPS.columns if column.is_channel]
+CHANNEL_COUNT = 2 + len(STORED)
+read_stored = attrgetter(*(column.name for column in STORED))
 
 
 def subject_of(pseudonym: str) -> str:
@@ -66,17 +54,12 @@ class MotionSink:
     def write(self, rows: Rows) -> None:
         """Write some strides."""
         for row in rows:
-            time_s = row[PLACES["time"]]
             if self.first_at is None:
-                self.first_at, self._first_s = row[PLACES["received_at"]], time_s
-            self._last_s = time_s
+                self.first_at, self._first_s = row.received_at, row.time
+            self._last_s = row.time
             self.count += 1
-            cells = dict(zip(PLAIN_CHANNELS, (row[PLACES[n]] for n in PLAIN_CHANNELS), strict=True))
-            cells |= {
-                "latency": time_s - self._first_s,
-                "right_leg": row[PLACES["side"]] == "right",
-            }
-            self._file.write("\t".join(_format(cells[n]) for n, _t, _u in CHANNELS) + "\n")
+            cells = (row.time - self._first_s, row.side == "right", *read_stored(row))
+            self._file.write("\t".join(map(_format, cells)) + "\n")
 
     def close(self) -> None:
         """Close the run and describe it; without strides, remove it."""
@@ -91,9 +74,9 @@ class MotionSink:
             "TaskDescription": "Walking with feedback on each step of the trained leg.",
             "TrackingSystemName": SYSTEM,
             "SamplingFrequency": (self.count - 1) / lasted_s if lasted_s > 0 else 1.0,
-            "MotionChannelCount": len(CHANNELS),
+            "MotionChannelCount": CHANNEL_COUNT,
             "LATENCYChannelCount": 1,
-            "MISCChannelCount": len(CHANNELS) - 1,
+            "MISCChannelCount": CHANNEL_COUNT - 1,
             "TrackedPointsCount": 0,
             "RecordingType": "discontinuous",
             "MissingValues": MISSING,
@@ -101,8 +84,11 @@ class MotionSink:
         self._path("motion.json").write_text(json.dumps(sidecar, indent=2) + "\n", "utf-8")
         own_unit = format_cell(" ".join(self._unit.split()))  # a clinic's own words
         lines = ["name\tcomponent\ttype\ttracked_point\tunits"]
-        for name, kind, unit in CHANNELS:
-            lines.append(f"{name}\t{MISSING}\t{kind}\t{MISSING}\t{unit or own_unit or MISSING}")
+        lines.append(f"latency\t{MISSING}\tLATENCY\t{MISSING}\ts")
+        lines.append(f"right_leg\t{MISSING}\tMISC\t{MISSING}\t{MISSING}")
+        for column in STORED:
+            unit = own_unit if column.unit == MEASURE_UNIT else ""
+            lines.append(f"{column.name}\t{MISSING}\tMISC\t{MISSING}\t{unit or MISSING}")
         self._path("channels.tsv").write_text("\n".join(lines) + "\n", "utf-8")
 
 
@@ -116,10 +102,10 @@ class EventSink:
     def write(self, rows: Rows) -> None:
         """Take some events; a session has some hundred of them."""
         began = self._motion.first_at
-        for _session, _patient, at, _after, kind, _old, value, *_rest in rows:
+        for row in rows:
             if began is not None:
-                onset = (at - began).total_seconds()
-                self._lines.append((onset, f"{onset}\t0\t{kind}\t{_format(value)}"))
+                onset = (row.at - began).total_seconds()
+                self._lines.append((onset, f"{onset}\t0\t{row.kind}\t{_format(row.value)}"))
 
     def close(self) -> None:
         """Write the file, in the order of time."""
@@ -154,11 +140,14 @@ def dataset_files(
         "A sample is a stride; the channel latency has its time. The codebook of the export, one "
         "folder above, says what each channel means.\n",
     )
-    columns = {each.name: each.meaning for each in covariates(Patient).values()}
-    yield "participants.json", _json({k: {"Description": v} for k, v in columns.items()})
-    lines = ["\t".join(["participant_id", *columns])]
+    about = {
+        column.name: {"Description": f"At the first session: {column.meaning}"}
+        for column in PARTICIPANT
+    }
+    yield "participants.json", _json(about)
+    lines = ["\t".join(["participant_id", *about])]
     for row in participants:
-        cells = [row["participant_id"], *(row.get(name) or MISSING for name in columns)]
+        cells = [row["participant_id"], *(row.get(name) or MISSING for name in about)]
         lines.append("\t".join(map(str, cells)))
     yield "participants.tsv", "\n".join(lines) + "\n"
     events = {

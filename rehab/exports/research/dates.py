@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from datetime import date, timedelta
 from typing import Any
 
@@ -22,13 +22,13 @@ def shift_of(pseudonym: str) -> timedelta:
     return -timedelta(weeks=1 + int.from_bytes(digest[:8], "big") % MAX_WEEKS)
 
 
-def shift_rows(rows: Iterable[Sequence[Any]], shift: timedelta | None) -> Iterator[Sequence[Any]]:
-    """Yield rows with every date moved, and without times since 1970 within JSON."""
+def shift_rows(rows: Iterable[Any], shift: timedelta | None) -> Iterator[Any]:
+    """Yield rows of a table with every date moved, and without times since 1970 within JSON."""
     if shift is None:
         yield from rows
         return
     for row in rows:
-        yield [_shift(cell, shift) for cell in row]
+        yield row._make(_shift(cell, shift) for cell in row)
 
 
 def _shift(cell: Any, shift: timedelta) -> Any:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_OID, uuid5
 
+from rehab.exports.session_table import CONDITIONS, SessionRow
 from rehab.people.models import User
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -90,11 +91,11 @@ def _figures(user: User, session: TrainingSession) -> Iterator[tuple[str, str, s
         metric = METRICS.get(slug)
         if metric is not None:
             yield slug, metric.label, metric.unit, value
-    walking = session.walking
-    if walking.belt_speed_m_s is not None:
-        yield "belt_speed", "Belt speed", "m/s", walking.belt_speed_m_s
-    if walking.weight_support_percent is not None:
-        yield "weight_support", "Body-weight support", "%", walking.weight_support_percent
+    row = SessionRow(session, source="")
+    for column in CONDITIONS:
+        if (value := column.get(row)) is not None:
+            label = column.name.replace("_", " ").capitalize()
+            yield column.name, label, column.unit, value
 
 
 def _answers(row: QuestionnaireResponse, shift: timedelta) -> dict[str, Any]:

@@ -174,8 +174,7 @@ class Package:
         yield "README.txt", [self._readme(len(parts))]
         yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
         for table in TABLES:
-            header = [column.name for column in table.columns]
-            yield table.file, _concatenate(header, [part / table.file for part in parts])
+            yield table.file, _concatenate(table.header, [part / table.file for part in parts])
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
             yield f"bids/{name}", [text]
         for part in parts:

@@ -11,12 +11,13 @@ from typing import Any
 from rehab.exports.research.bids import EventSink, MotionSink
 from rehab.exports.research.dates import SINCE_1970_S, shift_of, shift_rows
 from rehab.exports.research.fhir import write_bundle
-from rehab.exports.research.recordings import PLACES, RecordingSink
+from rehab.exports.research.recordings import RecordingSink
 from rehab.exports.research.sinks import CsvSink, ParquetSink, Sink, has_parquet, pump
 from rehab.exports.selection import Selection
-from rehab.exports.tables import EVENTS, FEEDBACK, INCIDENTS, SESSIONS, STEPS, TABLES
-from rehab.people.models import Patient, User
-from rehab.people.policy import covariates
+from rehab.exports.session_table import PARTICIPANT, SESSIONS
+from rehab.exports.step_tables import FEEDBACK, STEPS
+from rehab.exports.tables import EVENTS, INCIDENTS, TABLES
+from rehab.people.models import User
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 
@@ -57,17 +58,16 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
             place = aside / "parquet" / table.file.removesuffix(".csv")
             place.mkdir()
             sinks.append(ParquetSink(_of(place, session, "parquet"), table))
-        rows: Iterable[Sequence[Any]] = shift_rows(selection.read(table), shift)
+        rows: Iterable[Any] = shift_rows(table.read(selection), shift)
         if shift is not None and table is STEPS:
             rows = _from_first_step(rows)
         if shift is not None and table is INCIDENTS:
-            rows = ([*row[:-1], ""] for row in rows)  # the robot's file may tell the time of day
+            rows = (row._replace(recording="") for row in rows)  # it may tell the time of day
         pump(rows, sinks)
     write_bundle(_of(aside / "fhir", session, "json"), user, session, shift)
     about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
-    row = next(iter(selection.session_rows()))
-    names = [column.name for column in SESSIONS.columns]
-    about |= {c.name: row[names.index(c.name)] for c in covariates(Patient).values()}
+    row = next(SESSIONS.read(selection))
+    about |= {column.name: getattr(row, column.name) for column in PARTICIPANT}
     (aside / ABOUT).write_text(json.dumps(about), "utf-8")
 
 
@@ -90,15 +90,10 @@ def _has_one_goal(user: User, session: TrainingSession) -> bool:
     return len(goals) == 1 and goals[0] is not None
 
 
-def _from_first_step(rows: Iterable[Sequence[Any]]) -> Iterator[Sequence[Any]]:
+def _from_first_step(rows: Iterable[Any]) -> Iterator[Any]:
     """Yield steps whose times do not tell the date: a clock since 1970 begins at the first one."""
-    at_time, origin = PLACES["time"], None
+    origin = None
     for row in rows:
         if origin is None:
-            origin = row[at_time] if abs(row[at_time]) >= SINCE_1970_S else 0.0
-        if origin:
-            changed = list(row)
-            changed[at_time] = row[at_time] - origin
-            yield changed
-        else:
-            yield row
+            origin = row.time if abs(row.time) >= SINCE_1970_S else 0.0
+        yield row._replace(time=row.time - origin) if origin else row

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from rehab.exports.research.sinks import Rows
-from rehab.exports.tables import STEPS
 from rehab.people.web.csv_tables import CsvWriter
 from rehab.sources.recording.plain import PLAIN
 
-# Column of the recording: column of the table.
+# Column of the recording: column of the table of steps.
 COLUMNS = {
     "number": "number",
     "time_s": "time",
@@ -27,7 +27,6 @@ COLUMNS = {
     "feedback": "feedback",
     "gain": "gain",
 }
-PLACES = {column.name: place for place, column in enumerate(STEPS.columns)}
 
 
 class RecordingSink:
@@ -47,11 +46,10 @@ class RecordingSink:
 
     def write(self, rows: Rows) -> None:
         """Write some strides."""
-        places, at_extra = [PLACES[name] for name in self._columns.values()], PLACES["extra"]
+        cells = attrgetter(*self._columns.values())
         for row in rows:
-            extra: dict[str, Any] = row[at_extra] or {}
-            more = (extra.get(name) for name in self._extras)
-            self._writer.write([(*(row[p] for p in places), *more)])
+            extra: dict[str, Any] = row.extra or {}
+            self._writer.write([(*cells(row), *map(extra.get, self._extras))])
 
     def close(self) -> None:
         """Close the file."""

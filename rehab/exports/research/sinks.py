@@ -10,11 +10,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
-from rehab.exports.tables import Table, Type
+from rehab.exports.table import Table, Type
 from rehab.people.web.csv_tables import CsvWriter
 
 BATCH_ROWS = 1000  # held in memory
-Rows = list[Sequence[Any]]
+Rows = list[Any]  # as `Table.read` yields them
 
 
 class Sink(Protocol):
@@ -27,7 +27,7 @@ class Sink(Protocol):
         """Finish what was written."""
 
 
-def pump(rows: Iterable[Sequence[Any]], sinks: Sequence[Sink]) -> int:
+def pump(rows: Iterable[Any], sinks: Sequence[Sink]) -> int:
     """Write rows to every sink, finish them, and return how many rows there were."""
     remaining, count = iter(rows), 0
     with ExitStack() as closing:  # every file, also where a row cannot be written

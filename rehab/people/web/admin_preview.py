@@ -18,7 +18,7 @@ from rehab.people.web.admin_base import ScopedAdmin
 
 
 class PreviewAdmin(ScopedAdmin):
-    """Rows whose form updates a preview in a frame while one types (static/js/admin/form_preview.js)."""
+    """Rows whose form updates a preview while one types (static/js/admin/form_preview.js)."""
 
     def get_urls(self) -> list[URLPattern]:
         """Return the URLs, with that of the preview."""

@@ -21,6 +21,9 @@ from rehab.training.plans import SessionPlan
 from rehab.training.schedules import ScheduleKind, Untold
 from rehab.training.steps import InvalidReason
 
+# What a chart needs of a past step.
+CHART_FIELDS = ("number", "performance", "hit", "close", "points", "valid", "phase")
+
 
 def history_entry(
     audience: Audience, plan: SessionPlan, step: StoredStep, told: Container[int]
@@ -36,18 +39,8 @@ def history_entry(
             return None
     if step.side != plan.trained_side:
         return None
-    entry: Message = {
-        "number": step.number,
-        "performance": step.performance,
-        "hit": step.hit,
-        "close": step.close,
-        "points": step.points,
-        "valid": step.valid,
-        "phase": step.phase,
-    }
-    if audience is Audience.MONITOR:
-        entry |= {"time_s": step.time_s, "value": step.value}
-    return entry
+    fields = CHART_FIELDS if audience is Audience.PATIENT else (*CHART_FIELDS, "time_s", "value")
+    return {name: getattr(step, name) for name in fields}
 
 
 def snapshot(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from operator import attrgetter
+from typing import NamedTuple
 
 from rehab.sessions.events.event import LiveEvent
+from rehab.sessions.log import Step
 from rehab.sessions.payloads import (
     Message,
     describe_coaching,
@@ -21,34 +24,10 @@ from rehab.training.schedules import ScheduleKind, Untold
 from rehab.training.steps import ScoredStep
 from rehab.training.valences import Emblem, Valence
 
-
-class StoredStep(Protocol):
-    """What a scored step and its row in the log have in common."""
-
-    @property
-    def number(self) -> int: ...
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def value(self) -> float | None: ...
-    @property
-    def performance(self) -> float | None: ...
-    @property
-    def hit(self) -> bool | None: ...
-    @property
-    def close(self) -> bool: ...
-    @property
-    def points(self) -> int | None: ...
-    @property
-    def shown(self) -> float | None: ...
-    @property
-    def valid(self) -> bool: ...
-    @property
-    def phase(self) -> int: ...
-    @property
-    def side(self) -> str: ...
-    @property
-    def reasons(self) -> Sequence[str]: ...
+StoredStep = Step | ScoredStep
+# What the therapist's page gets of a step, under the same names: all that its scoring says.
+MONITOR_FIELDS = tuple(field.name for field in fields(ScoredStep) if field.name != "rules_version")
+_monitor_values = attrgetter(*MONITOR_FIELDS)
 
 
 class StepContext(NamedTuple):
@@ -95,7 +74,10 @@ def _for_patient(
 
 def _for_monitor(fold: SessionFold, _: StepContext, step: ScoredStep, live: bool) -> Message:
     return {
-        **_monitor_step(step, live=live),
+        "kind": "step",
+        "live": live,
+        **dict(zip(MONITOR_FIELDS, _monitor_values(step), strict=True)),
+        "extra": dict(step.extra),
         "score": fold.score,
         "streak": fold.feedback.streak,
         **describe_rates(fold.feedback),
@@ -188,28 +170,6 @@ def _summary(
         "streak": streak if valence.rewards else None,
         "shown": None if valence.has_points else round(answer.mean_shown, 2),
         "summary": {"hits": answer.hits, "steps": answer.steps, "close": answer.close},
-    }
-
-
-def _monitor_step(step: ScoredStep, *, live: bool) -> Message:
-    return {
-        "kind": "step",
-        "number": step.number,
-        "live": live,
-        "time_s": step.time_s,
-        "side": step.side,
-        "value": step.value,
-        "gain": step.gain,
-        "shown": step.shown,
-        "goal": step.goal,
-        "performance": step.performance,
-        "hit": step.hit,
-        "close": step.close,
-        "points": step.points,
-        "valid": step.valid,
-        "reasons": step.reasons,
-        "phase": step.phase,
-        "extra": dict(step.extra),
     }
 
 

@@ -1,4 +1,4 @@
-"""What is measured while steps go by, for monitoring (pages/server/metrics.py). Nothing of a patient."""
+"""What is measured of steps, for monitoring (pages/server/metrics.py). Nothing of a patient."""
 
 from __future__ import annotations
 
