@@ -86,6 +86,12 @@ def plan_visit(patient: Patient, day: date, at: time | None) -> Visit:
     return visit
 
 
+def next_visit(patient_id: int, after: datetime) -> Visit | None:
+    """Return the next visit that a patient is expected for after a moment, in the clinic's zone."""
+    planned = Visit.everywhere.filter(patient=patient_id, day__gte=after.date())
+    return planned.exclude(day=after.date(), at__lt=after.time()).order_by("day", "at").first()
+
+
 def suggested_time(user: User, patient: Patient, now: datetime) -> time | None:
     """Return the time to suggest for the next visit: today's, or when the last session began.
 

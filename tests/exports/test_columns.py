@@ -6,7 +6,7 @@ A column that takes another's value turns its table red; a new one without a val
 from __future__ import annotations
 
 from datetime import UTC, date, datetime
-from types import SimpleNamespace as Row
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,6 +20,7 @@ from rehab.sessions.log import STEP_COLUMNS, Step
 from rehab.sessions.schemas import StepOut
 from rehab.training.summary.metrics import METRICS
 
+Row: Any = SimpleNamespace  # stands for any row of the database
 # What is stored of a step and in no file, with why.
 NOT_EXPORTED = {"id": "says nothing", "session": "the column that every table begins with"}
 OTHER_NAMES = {"time_s": "time"}  # of a field in files
@@ -68,6 +69,9 @@ VISIT = Row(number=11, attempt=12, period=13, day="<day>", version=Row(number=14
 INSTRUMENT = Row(title="<title>", language="<language>", validated="<validated>")
 RESPONSE = Row(slug="<slug>", asked_at="<asked>", finished_at="<finished>")
 
+after: Any = "<after>"
+trained: Any = "<trained>"
+
 # Of each table a row, and its cells.
 ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
     "sessions.csv": (
@@ -85,10 +89,10 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
         },
     ),
     "steps.csv": (
-        StepRow(Row(**STEP), "<trained>", Row(**text("kind", "name", "feedback")), "<type>"),
+        StepRow(Row(**STEP), trained, Row(**text("kind", "name", "feedback")), "<type>"),
         {OTHER_NAMES.get(field, field): value for field, value in STEP.items()}
         | {
-            "reasons": "odd late", "trained": "<trained>", "phase_kind": "<kind>",
+            "reasons": "odd late", "trained": trained, "phase_kind": "<kind>",
             "phase_name": "<name>", "feedback": "<feedback>", "feedback_type": "<type>",
         },
     ),
@@ -108,12 +112,12 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
         },
     ),
     "study_visits.csv": (
-        VisitRow(VISIT, ENROLLMENT, "<after>", "A-B", "B"),
+        VisitRow(VISIT, ENROLLMENT, after, "A-B", "B"),
         {
             "study": "VAL", "participant": "VAL-003", "visit": 11, "attempt": 12, "period": 13,
             "planned_day": "<day>", "version": 14, "levels": "old, mild",
             "enrolled_at": "<enrolled>", "withdrawn_at": "<withdrawn>",
-            "after_withdrawal": "<after>", "group": "A-B", "arm": "B",
+            "after_withdrawal": after, "group": "A-B", "arm": "B",
         },
     ),
 }  # fmt: skip

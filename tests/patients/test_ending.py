@@ -10,10 +10,11 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
-from rehab.patients.ending import SessionResult, describe_change, is_milestone
 from rehab.patients.visits import plan_visit
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.patient_summary import describe_today, is_milestone
+from rehab.sessions.reports.results import Result
 from rehab.stations.models import Station
 from rehab.training.valences import VALENCES
 from tests.support.boards import tablet_at
@@ -50,7 +51,7 @@ def read(world: World, session: TrainingSession, client: Client | None = None) -
     ],
 )
 def test_the_sentence_is_true_of_both_days(rate: float, goal: float, said: str) -> None:
-    assert describe_change(SessionResult(rate, 2.0, goal), SessionResult(0.6, 2.0, 2.0)) == said
+    assert describe_today(Result(rate, 2.0, goal), Result(0.6, 2.0, 2.0)) == said
 
 
 def test_today_stands_beside_last_time(world, patient):

@@ -17,9 +17,8 @@ from rehab.patients import family
 from rehab.patients.closure import end_program
 from rehab.patients.erasure import erase
 from rehab.patients.family import FamilyLink, FamilyLinkRefused, find_link, give_link
-from rehab.patients.family_summary import describe_change, summarize_for_family
 from rehab.patients.pages import family as page
-from rehab.patients.visits import plan_visit
+from rehab.patients.visits import next_visit, plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
@@ -27,6 +26,8 @@ from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in.gate import AddressLimit
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.patient_summary import describe_weeks
+from rehab.sessions.reports.results import Result
 from rehab.studies.enrolling import withdraw
 from tests.support.studies import enrolled, running_study
 from tests.support.world import NOW, build_world, client_of
@@ -236,18 +237,21 @@ def test_the_next_visit_is_one_that_is_to_come(agreed):
     patient = agreed.patient
     for day, at in ((3, None), (4, time(9)), (11, time(9, 30))):
         plan_visit(patient, now.date().replace(day=day), at)
-    summary = summarize_for_family(patient, now)
-    assert (summary.next_day.day, summary.next_at) == (11, time(9, 30))
+    visit = next_visit(patient.pk, now)
+    assert (visit.day.day, visit.at) == (11, time(9, 30))
 
 
 @pytest.mark.parametrize(
-    ("rates", "word"),
+    ("rates", "goals", "word"),
     [
-        ([0.9, 0.8, 0.8, 0.5, 0.6, 0.5], "more steps"),
-        ([0.4, 0.5, 0.5, 0.7, 0.6, 0.8], "fewer steps"),
-        ([0.6, 0.6, 0.6, 0.6, 0.6, 0.62], "as many"),
-        ([0.9, 0.1, 0.1, 0.1, 0.1], ""),
+        ([0.5, 0.6, 0.5, 0.9, 0.8, 0.8], [2.0] * 6, "more steps"),
+        ([0.7, 0.6, 0.8, 0.4, 0.5, 0.5], [2.0] * 6, "fewer steps"),
+        ([0.6, 0.6, 0.6, 0.6, 0.6, 0.62], [2.0] * 6, "as many"),
+        ([0.7, 0.6, 0.8, 0.4, 0.5, 0.5], [2.0] * 3 + [2.2] * 3, "the goal was higher"),
+        ([0.4, 0.5, 0.5, 0.7, 0.6, 0.8], [2.2] * 3 + [2.0] * 3, "the goal was lower"),
+        ([0.1, 0.1, 0.1, 0.1, 0.9], [2.0] * 5, ""),
     ],
 )
-def test_the_sentence_says_what_was_and_judges_nobody(rates, word):
-    assert word in describe_change(rates)
+def test_the_sentence_says_what_was_and_judges_nobody(rates, goals, word):
+    said = describe_weeks([Result(*one) for one in zip(rates, [None] * 6, goals, strict=False)])
+    assert word in said if word else said == ""

@@ -27,7 +27,7 @@ from rehab.sessions.corrections import (
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day.week import week_summary
-from rehab.sessions.reports.takehome import summarize_for_patient
+from rehab.sessions.reports.patient_summary import describe_take_home
 from rehab.sessions.reports.trend import load_trend
 from tests.support.boards import all_rows, figures_of, rows_computed_anew
 from tests.support.walks import strides, walk
@@ -141,7 +141,7 @@ def test_what_is_left_out_is_in_no_board_trend_week_or_paper_and_comes_back(worl
             figures_of(board).get(rosa.pk),
             [point.session.pk for point in load_trend(pt, mine)],
             week_summary(pt, world.clinic, now).total.sessions,
-            summarize_for_patient(pt, mine, now)["count"],
+            describe_take_home(mine, now)["count"],
         )
 
     before = figures()

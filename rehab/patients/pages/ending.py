@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
-from rehab.patients.ending import describe_ending, next_visit
+from rehab.patients.visits import next_visit
 from rehab.people.access import actor_of, for_roles
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time, format_duration
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.questions import page_after
+from rehab.sessions.reports.patient_summary import describe_ending
 from rehab.training.changes import OPEN_STATES, State
 
 
@@ -30,11 +33,13 @@ def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
     if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     tablet = not request.user.is_authenticated
+    tomorrow = clinic_time(timezone.now(), session.clinic) + timedelta(days=1)
+    midnight = tomorrow.replace(hour=0, minute=0, second=0, microsecond=0)
     context = {
         "session": session,
         "tablet": tablet,
         "walked": format_duration(session.active_s),
-        "visit": next_visit(session, clinic_time(timezone.now(), session.clinic).date()),
+        "visit": next_visit(session.patient_id, midnight),
         "after": page_after(session, actor, tablet=tablet),
     } | describe_ending(session)
     return render(request, "patients/ending.html", context)

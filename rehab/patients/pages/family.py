@@ -24,8 +24,8 @@ from rehab.patients.family import (
     note_opening,
     why_not,
 )
-from rehab.patients.family_summary import summarize_for_family
 from rehab.patients.pages.records import get_patient
+from rehab.patients.visits import next_visit
 from rehab.people.access import for_roles, public, user_of
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
@@ -34,6 +34,7 @@ from rehab.people.sign_in import step_up
 from rehab.people.sign_in.gate import AddressLimit
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
+from rehab.sessions.reports.patient_summary import describe_for_family
 
 # Of each address, in each server: a family shares one, and whoever guesses needs 2^255 tries.
 limit = AddressLimit(burst=20, interval_s=3.0)
@@ -62,8 +63,12 @@ def show_family(request: HttpRequest, token: str) -> HttpResponse:
     if link is not None and request.method == "POST":
         note_opening(link, client_address(request), now)
         local = clinic_time(now, link.patient.clinic)
-        context |= {"summary": summarize_for_family(link.patient, local), "today": local.date()}
-        context["patient"] = link.patient
+        context |= {
+            "patient": link.patient,
+            "summary": describe_for_family(link.patient, local),
+            "visit": next_visit(link.patient.pk, local),
+            "today": local.date(),
+        }
     status = 429 if wait_s else 404 if link is None else 200
     response = render(request, "patients/family.html", context, status=status)
     for name, value in HEADERS.items():

@@ -13,7 +13,7 @@ from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.takehome import summarize_for_patient
+from rehab.sessions.reports.patient_summary import describe_take_home
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -29,6 +29,6 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
         patient=patient, simulated=patient.simulated
     )
     now = clinic_time(timezone.now(), patient.clinic)
-    summary = summarize_for_patient(user, sessions, now)
+    summary = describe_take_home(sessions, now)
     context = {"patient": patient, "summary": summary, "today": now.date()}
     return render(request, "sessions/takehome.html", context)
