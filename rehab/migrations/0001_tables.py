@@ -1,4 +1,6 @@
-"""All tables of version 0.1, with their constraints; triggers are made by people.audit.guards."""
+"""All tables with their constraints. Triggers are made by people.audit.guards."""
+
+from typing import Any
 
 import django.contrib.auth.validators
 import django.core.serializers.json
@@ -9,12 +11,38 @@ import django.utils.timezone
 from django.conf import settings
 from django.db import migrations, models
 
+import rehab.boards.changes
+import rehab.feedback.translation
 import rehab.people.audit.history
 import rehab.people.models.accounts
 import rehab.people.models.clinics
 import rehab.people.models.patients
 import rehab.people.networks
 import rehab.people.sign_in.tokens
+
+# Leases of the servers on a hosted database (rehab/sessions/live/database/lease.py). No model: the
+# rows are no clinic's, are read and written by the database's clock alone, and belong in no backup.
+# SQLite has one server, which needs none.
+LEASES = """
+CREATE TABLE rehab_server (
+    id varchar(32) PRIMARY KEY,
+    address varchar(200) NOT NULL,
+    shares boolean NOT NULL,
+    expires_at timestamp with time zone NOT NULL
+)
+"""
+
+
+def create_leases(apps: Any, schema_editor: Any) -> None:
+    """Make the table of leases, on PostgreSQL."""
+    if schema_editor.connection.vendor == "postgresql":
+        schema_editor.execute(LEASES)
+
+
+def drop_leases(apps: Any, schema_editor: Any) -> None:
+    """Drop the table of leases."""
+    if schema_editor.connection.vendor == "postgresql":
+        schema_editor.execute("DROP TABLE rehab_server")
 
 
 class Migration(migrations.Migration):
@@ -699,12 +727,7 @@ class Migration(migrations.Migration):
                 (
                     "slug",
                     models.CharField(
-                        choices=[
-                            ("positive", "Positive"),
-                            ("negative", "Negative"),
-                            ("binary", "Binary"),
-                            ("explicit", "Explicit"),
-                        ],
+                        choices=rehab.feedback.translation.valence_choices,
                         max_length=16,
                         verbose_name="feedback type",
                     ),
@@ -1250,14 +1273,6 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
-                    "built_to",
-                    models.BigIntegerField(
-                        editable=False,
-                        help_text="Key of the last patient whose rows are built; empty when all are.",
-                        null=True,
-                    ),
-                ),
-                (
                     "clinic",
                     models.ForeignKey(
                         blank=True,
@@ -1282,7 +1297,7 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
-            name="BoardCount",
+            name="BoardSnapshot",
             fields=[
                 (
                     "id",
@@ -1290,15 +1305,14 @@ class Migration(migrations.Migration):
                         auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
                     ),
                 ),
-                ("valence", models.CharField(blank=True, max_length=16)),
-                ("figure", models.IntegerField()),
-                ("rows", models.PositiveIntegerField()),
+                ("definition", models.TextField()),
+                ("results", models.JSONField()),
+                ("version", models.BigIntegerField(default=rehab.boards.changes.draw_token)),
                 (
                     "board",
-                    models.ForeignKey(
-                        db_index=False,
+                    models.OneToOneField(
                         on_delete=django.db.models.deletion.CASCADE,
-                        related_name="counts",
+                        related_name="snapshot",
                         to="rehab.leaderboard",
                     ),
                 ),
@@ -1881,69 +1895,6 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
-            name="BoardEntry",
-            fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                (
-                    "valence",
-                    models.CharField(
-                        blank=True,
-                        choices=[
-                            ("positive", "Positive"),
-                            ("negative", "Negative"),
-                            ("binary", "Binary"),
-                            ("explicit", "Explicit"),
-                        ],
-                        max_length=16,
-                    ),
-                ),
-                ("figure", models.IntegerField(help_text="As it is shown: a whole number.")),
-                (
-                    "points_at_stake",
-                    models.IntegerField(
-                        help_text="The points that could be kept, where points can only be lost.",
-                        null=True,
-                    ),
-                ),
-                ("key", models.CharField(max_length=48)),
-                (
-                    "stale_on",
-                    models.DateField(help_text="The day from which it is out of date.", null=True),
-                ),
-                (
-                    "board",
-                    models.ForeignKey(
-                        db_index=False,
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="entries",
-                        to="rehab.leaderboard",
-                    ),
-                ),
-                (
-                    "patient",
-                    models.ForeignKey(
-                        db_index=False,
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="+",
-                        to="rehab.patient",
-                    ),
-                ),
-            ],
-            options={
-                "abstract": False,
-                "base_manager_name": "everywhere",
-                "default_manager_name": "everywhere",
-            },
-            managers=[
-                ("everywhere", django.db.models.manager.Manager()),
-            ],
-        ),
-        migrations.CreateModel(
             name="AuditEntry",
             fields=[
                 (
@@ -2123,212 +2074,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 ("name", models.CharField(max_length=64, verbose_name="name")),
-                (
-                    "valence",
-                    models.CharField(
-                        choices=[
-                            ("positive", "Positive"),
-                            ("negative", "Negative"),
-                            ("binary", "Binary"),
-                            ("explicit", "Explicit"),
-                        ],
-                        max_length=16,
-                        verbose_name="feedback type",
-                    ),
-                ),
-                (
-                    "goal_by",
-                    models.CharField(
-                        choices=[("value", "value"), ("percent", "% of baseline")],
-                        default="value",
-                        max_length=8,
-                        verbose_name="goal is given as",
-                    ),
-                ),
-                (
-                    "goal_value",
-                    models.FloatField(
-                        blank=True, null=True, verbose_name="goal, in the measure's unit"
-                    ),
-                ),
-                (
-                    "goal_percent",
-                    models.FloatField(blank=True, null=True, verbose_name="goal, % of baseline"),
-                ),
-                (
-                    "wanted_hits",
-                    models.PositiveSmallIntegerField(
-                        blank=True,
-                        null=True,
-                        validators=[
-                            django.core.validators.MinValueValidator(1),
-                            django.core.validators.MaxValueValidator(100),
-                        ],
-                        verbose_name="wanted hits, % of the steps",
-                    ),
-                ),
-                (
-                    "minutes",
-                    models.PositiveSmallIntegerField(
-                        blank=True,
-                        null=True,
-                        validators=[
-                            django.core.validators.MinValueValidator(1),
-                            django.core.validators.MaxValueValidator(240),
-                        ],
-                        verbose_name="planned minutes",
-                    ),
-                ),
-                (
-                    "robot",
-                    models.CharField(
-                        choices=[("normal", "Normal"), ("gentle", "Gentle"), ("off", "Off")],
-                        default="normal",
-                        max_length=16,
-                        verbose_name="robot",
-                    ),
-                ),
-                (
-                    "robot_above",
-                    models.CharField(
-                        default="(usual)", max_length=64, verbose_name="after strong steps"
-                    ),
-                ),
-                (
-                    "robot_below",
-                    models.CharField(
-                        default="(usual)", max_length=64, verbose_name="after weak steps"
-                    ),
-                ),
-                (
-                    "robot_threshold",
-                    models.PositiveSmallIntegerField(
-                        default=90,
-                        validators=[
-                            django.core.validators.MinValueValidator(1),
-                            django.core.validators.MaxValueValidator(200),
-                        ],
-                        verbose_name="robot acts from, % of the goal",
-                    ),
-                ),
-                (
-                    "robot_answers",
-                    models.CharField(
-                        choices=[
-                            ("windows", "some seconds"),
-                            ("streaks", "steps in a row"),
-                            ("steps", "every so many steps"),
-                        ],
-                        default="windows",
-                        max_length=16,
-                        verbose_name="robot answers",
-                    ),
-                ),
-                (
-                    "robot_window",
-                    models.FloatField(
-                        default=5.0,
-                        validators=[
-                            django.core.validators.MinValueValidator(2.0),
-                            django.core.validators.MaxValueValidator(60.0),
-                        ],
-                        verbose_name="robot’s window, in seconds",
-                    ),
-                ),
-                (
-                    "robot_count",
-                    models.PositiveSmallIntegerField(
-                        default=5,
-                        validators=[
-                            django.core.validators.MinValueValidator(1),
-                            django.core.validators.MaxValueValidator(100),
-                        ],
-                        verbose_name="steps that the robot answers",
-                    ),
-                ),
-                (
-                    "robot_rest",
-                    models.FloatField(
-                        default=5.0,
-                        validators=[
-                            django.core.validators.MinValueValidator(0),
-                            django.core.validators.MaxValueValidator(600.0),
-                        ],
-                        verbose_name="robot’s rest, in seconds",
-                    ),
-                ),
-                (
-                    "schedule",
-                    models.CharField(
-                        choices=[
-                            ("every", "after every step, or every so many"),
-                            ("bandwidth", "only outside of a band about the goal"),
-                            ("faded", "more and more rarely"),
-                            ("summary", "as a summary of so many steps"),
-                        ],
-                        default="every",
-                        max_length=16,
-                        verbose_name="feedback comes",
-                    ),
-                ),
-                (
-                    "schedule_steps",
-                    models.PositiveSmallIntegerField(
-                        default=1,
-                        validators=[
-                            django.core.validators.MinValueValidator(1),
-                            django.core.validators.MaxValueValidator(100),
-                        ],
-                        verbose_name="steps between feedback",
-                    ),
-                ),
-                (
-                    "schedule_band",
-                    models.PositiveSmallIntegerField(
-                        default=10,
-                        validators=[
-                            django.core.validators.MinValueValidator(1),
-                            django.core.validators.MaxValueValidator(50),
-                        ],
-                        verbose_name="band without feedback, ± % of the goal",
-                    ),
-                ),
-                (
-                    "goal_follows",
-                    models.CharField(
-                        choices=[
-                            ("off", "stays"),
-                            ("suggest", "is suggested"),
-                            ("automatic", "follows by itself"),
-                        ],
-                        default="suggest",
-                        max_length=16,
-                        verbose_name="the goal",
-                    ),
-                ),
-                (
-                    "goal_asks",
-                    models.BooleanField(
-                        default=False, verbose_name="ask before the baseline’s goal counts"
-                    ),
-                ),
-                (
-                    "source",
-                    models.CharField(
-                        blank=True,
-                        choices=[
-                            ("", "As last time"),
-                            ("live", "Live sensor"),
-                            ("synthetic good", "Simulated patient, good"),
-                            ("synthetic demo", "Simulated patient, demo"),
-                            ("synthetic poor", "Simulated patient, poor"),
-                            ("synthetic fatiguing", "Simulated patient, fatiguing"),
-                            ("synthetic dropout", "Simulated patient, dropout"),
-                        ],
-                        max_length=64,
-                        verbose_name="steps come from",
-                    ),
-                ),
+                ("options", models.JSONField(default=dict, verbose_name="options")),
                 (
                     "clinic",
                     models.ForeignKey(
@@ -2994,12 +2740,7 @@ class Migration(migrations.Migration):
                 (
                     "valence",
                     models.CharField(
-                        choices=[
-                            ("positive", "Positive"),
-                            ("negative", "Negative"),
-                            ("binary", "Binary"),
-                            ("explicit", "Explicit"),
-                        ],
+                        choices=rehab.feedback.translation.valence_choices,
                         max_length=16,
                         verbose_name="feedback type",
                     ),
@@ -3292,12 +3033,7 @@ class Migration(migrations.Migration):
                 (
                     "valence",
                     models.CharField(
-                        choices=[
-                            ("positive", "Positive"),
-                            ("negative", "Negative"),
-                            ("binary", "Binary"),
-                            ("explicit", "Explicit"),
-                        ],
+                        choices=rehab.feedback.translation.valence_choices,
                         db_index=True,
                         max_length=16,
                         verbose_name="feedback type",
@@ -3358,7 +3094,7 @@ class Migration(migrations.Migration):
                             ("running", "Running"),
                             ("paused", "Paused"),
                             ("finished", "Finished"),
-                            ("aborted", "Aborted"),
+                            ("aborted", "Ended early"),
                         ],
                         default="ready",
                         max_length=16,
@@ -3403,7 +3139,6 @@ class Migration(migrations.Migration):
                 ("legacy_row", models.JSONField(editable=False, null=True)),
                 ("last_number", models.PositiveIntegerField(default=0, editable=False)),
                 ("checkpoint", models.JSONField(editable=False, null=True)),
-                ("boards_due", models.BooleanField(default=False, editable=False)),
                 ("epoch", models.PositiveIntegerField(default=0, editable=False)),
                 (
                     "owner",
@@ -3574,6 +3309,14 @@ class Migration(migrations.Migration):
                         db_default=False,
                         help_text="Too uncertain to count as hit or miss.",
                         verbose_name="close",
+                    ),
+                ),
+                (
+                    "late",
+                    models.BooleanField(
+                        db_default=False,
+                        help_text="It came too late to be shown as live.",
+                        verbose_name="late",
                     ),
                 ),
                 ("points", models.SmallIntegerField(null=True, verbose_name="points")),
@@ -3924,6 +3667,38 @@ class Migration(migrations.Migration):
                 ("everywhere", django.db.models.manager.Manager()),
             ],
         ),
+        migrations.CreateModel(
+            name="BoardChange",
+            fields=[
+                (
+                    "token",
+                    models.BigIntegerField(
+                        default=rehab.boards.changes.draw_token, primary_key=True, serialize=False
+                    ),
+                ),
+                ("patient_key", models.BigIntegerField()),
+                ("at", models.DateTimeField(default=django.utils.timezone.now)),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        db_constraint=False,
+                        db_index=False,
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="+",
+                        to="rehab.clinic",
+                    ),
+                ),
+            ],
+            options={
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+                "indexes": [models.Index(fields=["clinic", "at"], name="board_change_by_clinic")],
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
         migrations.AddConstraint(
             model_name="user",
             constraint=models.CheckConstraint(
@@ -3981,12 +3756,6 @@ class Migration(migrations.Migration):
             model_name="importtombstone",
             constraint=models.UniqueConstraint(
                 fields=("clinic", "id_hash"), name="import_tombstone_once_per_clinic"
-            ),
-        ),
-        migrations.AddConstraint(
-            model_name="boardcount",
-            constraint=models.UniqueConstraint(
-                fields=("board", "valence", "figure"), name="board_count_once"
             ),
         ),
         migrations.AddConstraint(
@@ -4087,20 +3856,6 @@ class Migration(migrations.Migration):
                 condition=models.Q(("withdrawn_at__isnull", True)),
                 fields=("patient", "purpose"),
                 name="consent_holds_once",
-            ),
-        ),
-        migrations.AddIndex(
-            model_name="boardentry",
-            index=models.Index(fields=["board", "valence", "key"], name="entry_by_place"),
-        ),
-        migrations.AddIndex(
-            model_name="boardentry",
-            index=models.Index(fields=["board", "stale_on"], name="entry_by_staleness"),
-        ),
-        migrations.AddConstraint(
-            model_name="boardentry",
-            constraint=models.UniqueConstraint(
-                fields=("patient", "board", "valence"), name="board_entry_once"
             ),
         ),
         migrations.AddIndex(
@@ -4221,12 +3976,6 @@ class Migration(migrations.Migration):
             model_name="trainingsession",
             index=models.Index(fields=["station", "state"], name="session_by_station_and_state"),
         ),
-        migrations.AddIndex(
-            model_name="trainingsession",
-            index=models.Index(
-                condition=models.Q(("boards_due", True)), fields=["id"], name="session_boards_due"
-            ),
-        ),
         migrations.AddConstraint(
             model_name="trainingsession",
             constraint=models.UniqueConstraint(
@@ -4269,4 +4018,5 @@ class Migration(migrations.Migration):
             model_name="visit",
             constraint=models.UniqueConstraint(fields=("patient", "day"), name="visit_once_a_day"),
         ),
+        migrations.RunPython(create_leases, drop_leases),
     ]
