@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import polib
 import pytest
@@ -33,11 +34,11 @@ def missing_parts(valence: Valence) -> Iterator[str]:
         if text not in (ROOT / file).read_text():
             yield f"{file}: {part}"
     words = [valence.label, *(band.words for band in valence.bands)]
-    for file in sorted(ROOT.glob("locale/*/LC_MESSAGES/django.po")):
-        known = {entry.msgid for entry in polib.pofile(str(file)) if entry.translated()}
+    for catalog in sorted(ROOT.glob("locale/*/LC_MESSAGES/django.po")):
+        known = {entry.msgid for entry in polib.pofile(str(catalog)) if entry.translated()}
         for text in words:
             if text not in known:
-                yield f"{file.relative_to(ROOT)}: “{text}” (make messages)"
+                yield f"{catalog.relative_to(ROOT)}: “{text}” (make messages)"
 
 
 @pytest.mark.parametrize("valence", VALENCES.values(), ids=list(VALENCES))
@@ -57,7 +58,7 @@ def test_what_a_new_type_lacks_is_named() -> None:
 
 
 def test_a_new_type_needs_no_migration(monkeypatch: pytest.MonkeyPatch) -> None:
-    columns = [
+    columns: list[Any] = [
         field
         for model in apps.get_app_config("rehab").get_models()
         for field in model._meta.get_fields()

@@ -143,7 +143,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
     [
         ("goal_value", "0", "above 0 and up to 15 W/kg"),
         ("goal_value", "16", "above 0 and up to 15 W/kg"),
-        ("goal_value", "nan", "Goal, in the measure’s unit: Enter a number"),
+        ("goal_value", "nan", "Goal, in the measure&#x27;s unit: Enter a number"),
         ("goal_value", "", "either as a value or as percent"),
         ("wanted_hits", "101", "Give 1 to 100 %"),
         ("minutes", "-1", "Give 1 to 240 minutes"),

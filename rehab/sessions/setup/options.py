@@ -95,7 +95,7 @@ OPTIONS: dict[str, Option] = {
         ),
         Option(
             name="goal_by",
-            label=_("Goal is given as"),
+            label=capfirst(_("goal is given as")),
             help="Follows from `goal` or `goal_percent`.",
             kind=str,
             choices=[("value", _("value")), ("percent", _("% of baseline"))],
@@ -109,7 +109,7 @@ OPTIONS: dict[str, Option] = {
         Option(
             name="goal_value",
             api_name="goal",
-            label=_("Goal, in the measure’s unit"),
+            label=capfirst(_("goal, in the measure's unit")),
             help="In the measure's unit, or give `goal_percent`.",
             kind=float,
             nullable=True,
@@ -119,7 +119,7 @@ OPTIONS: dict[str, Option] = {
         ),
         Option(
             name="goal_percent",
-            label=_("Goal, % of baseline"),
+            label=capfirst(_("goal, % of baseline")),
             help="Percent of the baseline.",
             kind=float,
             nullable=True,
@@ -132,7 +132,7 @@ OPTIONS: dict[str, Option] = {
         ),
         Option(
             name="wanted_hits",
-            label=_("Wanted hits, % of the steps"),
+            label=capfirst(_("wanted hits, % of the steps")),
             help="Percent of the steps.",
             kind=int,
             nullable=True,

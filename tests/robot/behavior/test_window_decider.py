@@ -19,6 +19,7 @@ from robot.behavior.window_decider import (
     Decision,
     WindowDecider,
 )
+from robot.wire.cue_limits import CueRule
 from robot.wire.frames import BadFrame
 
 CUE = Cue(above="celebrate", below="droop")
@@ -216,20 +217,20 @@ def decisions(cue, *performances):
 
 
 def test_streaks_answer_so_many_steps_in_a_row_on_one_side():
-    cue = replace(CUE, rule="streaks", count=3)
+    cue = replace(CUE, rule=CueRule.STREAKS, count=3)
     assert decisions(cue, 1, 1, 0.5, 1, 0.9, 1, 1, 1, 1) == [(6, True, 3), (9, True, 3)]
     assert decisions(cue, 0.1, 0.2, 0.3, 0.1, 1, 0.1) == [(3, False, 3)]
 
 
 def test_steps_answer_the_mean_of_each_so_many():
-    cue = replace(CUE, rule="steps", count=4)
+    cue = replace(CUE, rule=CueRule.STEPS, count=4)
     assert decisions(cue, 1, 1, 0.9, 0.8, 0.1, 0.1, 0.1, 3, 1) == [(4, True, 4), (8, False, 4)]
     assert decisions(replace(cue, count=1), 1, 0.5) == [(1, True, 1), (2, False, 1)]
 
 
 @given(steps, st.integers(1, 9))
 def test_a_streak_is_on_one_side_and_no_step_counts_twice(walk, count):
-    decider = WindowDecider(replace(CUE, rule="streaks", count=count))
+    decider = WindowDecider(replace(CUE, rule=CueRule.STREAKS, count=count))
     performances = [percent / 100 for _gap, percent in walk]
     last = 0
     for at, performance in enumerate(performances, 1):
@@ -244,7 +245,7 @@ def test_a_streak_is_on_one_side_and_no_step_counts_twice(walk, count):
 
 
 def test_a_streak_rests_and_a_pause_ends_it():
-    decider = WindowDecider(replace(CUE, rule="streaks", count=2, rest_s=10))
+    decider = WindowDecider(replace(CUE, rule=CueRule.STREAKS, count=2, rest_s=10))
     decider.add(0, 1.0)
     decider.drop_window()
     assert decider.add(1, 1.0) is None
@@ -256,7 +257,7 @@ def test_a_streak_rests_and_a_pause_ends_it():
 
 
 def test_a_clock_that_is_set_back_begins_a_new_streak():
-    decider = WindowDecider(replace(CUE, rule="steps", count=2, rest_s=10))
+    decider = WindowDecider(replace(CUE, rule=CueRule.STEPS, count=2, rest_s=10))
     decider.mark_started(Decision(90, 100, 100, 2, 1, 0.9, True))
     assert decider.add(100, 1.0) is None
     assert decider.add(3, 1.0) is None
