@@ -106,9 +106,7 @@ def paths_to_patient() -> dict[type[Model], str]:
 
     The empty lookup is the patient's own.
     """
-    from rehab.people.models import Patient
-
-    paths: dict[type[Model], str] = {Patient: ""}
+    paths: dict[type[Model], str] = {apps.get_model("rehab", "Patient"): ""}
     models = apps.get_models(include_auto_created=True)
     while True:
         found = {

@@ -10,6 +10,7 @@ from django.utils.translation import gettext as _
 
 from rehab.people.audit.audit_log import Act, AuditEntry, truncate_address
 from rehab.people.random_codes import random_code
+from rehab.people.rate_limits import TokenBuckets
 from rehab.people.row_values import read_values, save_changes
 from rehab.people.sign_in.tokens import hash_token
 from rehab.stations.models import Device, Pairing, Station
@@ -22,6 +23,8 @@ KNOWN_FOR = timedelta(days=30)
 MAX_PENDING_PER_ADDRESS = 20  # a clinic's tablets may share an address
 MAX_STARTED_PER_ADDRESS = 100  # within the lifetime of a code; a tablet keeps its own
 MAX_ATTEMPTS = 10
+starts = TokenBuckets(MAX_STARTED_PER_ADDRESS, LIFETIME.total_seconds() / MAX_STARTED_PER_ADDRESS)
+attempts = TokenBuckets(MAX_ATTEMPTS, LIFETIME.total_seconds() / MAX_ATTEMPTS)  # of an approver
 
 
 class PairingRefused(ValueError):
@@ -40,7 +43,7 @@ def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
     many pending: strangers, however many their addresses, leave room for the clinics' networks.
     """
     Pairing.everywhere.filter(expires_at__lte=now).delete()
-    if _count(f"pairing-started-{address}") > MAX_STARTED_PER_ADDRESS:
+    if starts.take(address, now.timestamp()):
         raise PairingRateLimited(
             _("Too many codes were asked for from this network. Try again in five minutes.")
         )
@@ -70,12 +73,6 @@ def _is_known(address: str, now: datetime) -> bool:
     return bool(sign_ins.filter(address=truncate_address(address)).exists())
 
 
-def _count(name: str) -> int:
-    """Increment a counter that lasts as long as a code. Return its new value."""
-    cache.add(name, 0, LIFETIME.total_seconds())
-    return cache.incr(name)
-
-
 def find_pairing(secret: str, now: datetime) -> Pairing | None:
     """Return the pairing that a tablet has started; None once it has expired."""
     started = Pairing.everywhere.filter(secret_hash=hash_token(secret), expires_at__gt=now)
@@ -87,8 +84,7 @@ def approve_pairing(code: str, station: Station, approver_id: int, now: datetime
 
     Raises PairingRefused.
     """
-    attempts = f"pairing-attempts-{approver_id}"
-    if _count(attempts) > MAX_ATTEMPTS:
+    if attempts.take(approver_id, now.timestamp()):
         raise PairingRefused(_("Too many wrong codes. Wait five minutes."))
     wanted = Pairing.everywhere.filter(
         code=code.strip().upper(), device__isnull=True, expires_at__gt=now
@@ -109,7 +105,7 @@ def approve_pairing(code: str, station: Station, approver_id: int, now: datetime
     if not wanted.update(device=device):  # another request was faster
         device.delete()
         raise PairingRefused(_("This tablet has just been paired."))
-    cache.delete(attempts)
+    attempts.forget(approver_id)
     return device
 
 

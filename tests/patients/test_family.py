@@ -23,8 +23,8 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import EndReason, ErasureReason, Patient
+from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
-from rehab.people.sign_in.gate import AddressLimit
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.patient_summary import describe_weeks
 from rehab.sessions.reports.results import Result
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.django_db
 
 @pytest.fixture(autouse=True)
 def calm_gate(monkeypatch):
-    monkeypatch.setattr(page, "limit", AddressLimit(burst=1000))
+    monkeypatch.setattr(page, "limit", TokenBuckets(burst=1000, interval_s=2.0))
 
 
 @pytest.fixture
@@ -199,7 +199,7 @@ def test_another_clinic_neither_sees_nor_ends_it(agreed):
 
 def test_who_asks_too_often_waits(agreed, monkeypatch):
     path = give(agreed)
-    monkeypatch.setattr(page, "limit", AddressLimit(burst=3, interval_s=60.0))
+    monkeypatch.setattr(page, "limit", TokenBuckets(burst=3, interval_s=60.0))
     client = Client()
     assert [client.get(path).status_code for _ in range(5)] == [200, 200, 200, 429, 429]
     assert int(client.get(path)["Retry-After"]) > 0

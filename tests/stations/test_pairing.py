@@ -11,6 +11,7 @@ from django.utils import timezone
 
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.random_codes import ALPHABET
+from rehab.people.rate_limits import TokenBuckets
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
 from tests.support.world import World, build_world, client_of
@@ -91,7 +92,8 @@ def test_the_token_is_given_to_the_tablet_that_showed_the_code_and_once(pt, stat
     assert not copy.get("/tablet/state/").json()["paired"]
 
 
-def test_wrong_codes_are_few(pt, station):
+def test_wrong_codes_are_few(pt, station, monkeypatch):
+    monkeypatch.setattr(pairing, "attempts", TokenBuckets(pairing.MAX_ATTEMPTS, 300.0))
     for _ in range(pairing.MAX_ATTEMPTS):
         page = pt.post("/tablets/pair/", {"code": "XXXXXX", "station": station.pk})
         assert "No tablet shows this code" in page.content.decode()
@@ -131,7 +133,7 @@ def test_codes_cannot_be_filled_by_forged_addresses(settings, monkeypatch):
 def test_a_flood_from_one_address_shuts_no_other_clinic_out(monkeypatch):
     monkeypatch.setattr(pairing, "MAX_PENDING", 6)
     monkeypatch.setattr(pairing, "MAX_PENDING_PER_ADDRESS", 3)
-    monkeypatch.setattr(pairing, "MAX_STARTED_PER_ADDRESS", 8)
+    monkeypatch.setattr(pairing, "starts", TokenBuckets(8, 300.0))
     early, elsewhere = Client(REMOTE_ADDR="203.0.113.9"), Client(REMOTE_ADDR="203.0.113.9")
     code = shown_code(early)
     pages = [Client(REMOTE_ADDR="198.51.100.7").get("/tablet/") for _ in range(10)]

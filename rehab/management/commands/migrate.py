@@ -1,4 +1,4 @@
-"""`manage.py migrate`: Django's command, which refuses databases of development versions."""
+"""`manage.py migrate`: Django's command, with all the time that PostgreSQL needs."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ from typing import Any
 from django.core.management.commands import migrate
 from django.db import connections
 
-from rehab.people.sign_in.first_start import refuse_development_database
-
 
 class Command(migrate.Command):
-    """Applies migrations, except to a database made by a development version."""
+    """Applies migrations, without the time limit of other statements."""
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Migrate. Raises CommandError, with the cure, where that cannot be done."""
-        refuse_development_database(options["database"])
+        """Migrate."""
         connection = connections[options["database"]]
         if connection.vendor == "postgresql":  # an index of a large table takes its time
             with connection.cursor() as cursor:

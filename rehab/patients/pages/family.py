@@ -29,15 +29,15 @@ from rehab.patients.visits import next_visit
 from rehab.people.access import for_roles, public, user_of
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
+from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
-from rehab.people.sign_in.gate import AddressLimit
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.reports.patient_summary import describe_for_family
 
 # Of each address, in each server: a family shares one, and whoever guesses needs 2^255 tries.
-limit = AddressLimit(burst=20, interval_s=3.0)
+limit = TokenBuckets(burst=20, interval_s=3.0)
 HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
@@ -54,7 +54,7 @@ def show_family(request: HttpRequest, token: str) -> HttpResponse:
     The first page has nothing but the button: programs that send links along open them as well,
     to draw a preview.
     """
-    wait_s = limit.wait_s(client_address(request), time.monotonic())
+    wait_s = limit.take(client_address(request), time.monotonic())
     now = timezone.now()
     link = None if wait_s else find_link(token, now)
     if link is not None:

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from django.conf import settings
 from django.core.management import CommandError, call_command
-from django.db import DEFAULT_DB_ALIAS, DatabaseError, connection, connections, transaction
+from django.db import DatabaseError, connection, transaction
 from django.db.migrations.executor import MigrationExecutor
-from django.db.migrations.recorder import MigrationRecorder
 
 from rehab.people.models import Clinic, User
 from rehab.people.random_codes import random_code
@@ -17,17 +16,14 @@ from rehab.people.roles import Role
 
 FIRST_USERNAME = "pt"
 FIRST_CLINIC = "My clinic"
-# The first migrations of development versions from before 23 November 2026.
-DEVELOPMENT_MIGRATIONS = {("rehab", "0001_initial"), ("rehab", "0001_version_0_1")}
 
 
 def prepare_database() -> None:
-    """Apply pending migrations; on a hosted server, refuse to start until somebody has.
+    """Apply pending migrations; on a hosted server, refuse to start while some are pending.
 
     Raises CommandError, with the cure, where the database cannot be reached or is not up to date.
     """
     try:
-        refuse_development_database()
         executor = MigrationExecutor(connection)
         pending = executor.migration_plan(executor.loader.graph.leaf_nodes())
     except DatabaseError as problem:
@@ -42,20 +38,6 @@ def prepare_database() -> None:
             "`manage.py migrate`."
         )
     call_command("migrate", verbosity=0, interactive=False)
-
-
-def refuse_development_database(using: str = DEFAULT_DB_ALIAS) -> None:
-    """Raise CommandError, with the cure, for a database made by a development version."""
-    applied = MigrationRecorder(connections[using]).applied_migrations()
-    if DEVELOPMENT_MIGRATIONS.isdisjoint(applied):
-        return
-    name = connections[using].settings_dict["NAME"]
-    raise CommandError(
-        f"The database {name} was made by a development version of GARRY from before 23 November "
-        "2026, and this one cannot read it. Nothing was changed. To begin anew, move it away or "
-        "name another one (GARRY_DATA_DIR, GARRY_DATABASE_URL); to see what it holds, run the "
-        "version that made it."
-    )
 
 
 def first_clinic() -> Clinic:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -19,33 +18,15 @@ from django.utils.translation import gettext as _
 from django.utils.translation.trans_real import parse_accept_lang_header
 
 from rehab.people.networks import resolve_client_address
+from rehab.people.rate_limits import TokenBucket, TokenBuckets
 
 PATH = "/sign-in/"
 BURST = 30  # attempts at once from one address: the staff of a clinic may share one
 INTERVAL_S = 2.0  # between further ones
-MAX_ADDRESSES = 10_000
 ALL_BURST = 40  # attempts at once from all addresses
 ALL_INTERVAL_S = 0.25  # between further ones
 AT_ONCE = 1  # inside Django: several held up each other and the steps (docs/performance.md)
 MAX_WAITING = 19
-
-
-class AddressLimit:
-    """How often each address may try: a burst, then one attempt in each interval."""
-
-    def __init__(self, burst: int = BURST, interval_s: float = INTERVAL_S) -> None:
-        self._burst_s = (burst - 1) * interval_s
-        self._interval_s = interval_s
-        self._free_at: OrderedDict[str, float] = OrderedDict()  # when all of a burst is there again
-
-    def wait_s(self, address: str, now_s: float) -> float:
-        """Count an attempt; return 0, or how long to wait where it is refused and not counted."""
-        free_at = max(now_s, self._free_at.pop(address, now_s))
-        wait_s = max(0.0, free_at - now_s - self._burst_s)
-        self._free_at[address] = free_at if wait_s else free_at + self._interval_s
-        if len(self._free_at) > MAX_ADDRESSES:
-            self._free_at.popitem(last=False)
-        return wait_s
 
 
 class SignInGate:
@@ -54,8 +35,8 @@ class SignInGate:
     def __init__(self, inner: Any, clock: Callable[[], float] = time.monotonic) -> None:
         self._inner = inner
         self._clock = clock
-        self._addresses = AddressLimit()
-        self._all = AddressLimit(ALL_BURST, ALL_INTERVAL_S)
+        self._addresses = TokenBuckets(BURST, INTERVAL_S)
+        self._all = TokenBucket(ALL_BURST, ALL_INTERVAL_S)
         self._turns = asyncio.Semaphore(AT_ONCE)
         self._inside = 0
 
@@ -72,7 +53,7 @@ class SignInGate:
         peer = (scope.get("client") or [""])[0]
         address = resolve_client_address(headers.get(b"x-forwarded-for", ""), peer)
         now_s = self._clock()
-        wait_s = self._addresses.wait_s(address, now_s) or self._all.wait_s("", now_s)
+        wait_s = self._addresses.take(address, now_s) or self._all.take(now_s)
         if wait_s or self._inside >= AT_ONCE + MAX_WAITING:
             await _refuse(send, headers.get(b"accept-language", ""), int(wait_s) + 1)
             return

@@ -14,7 +14,6 @@ from typing import Annotated, Any, Generic, TypeVar
 
 import pydantic
 from django.conf import settings
-from django.core.cache import cache
 from django.core.exceptions import NON_FIELD_ERRORS
 from django.db.models import QuerySet
 from django.http import HttpRequest
@@ -30,10 +29,11 @@ from rehab.people import roles
 from rehab.people.access import UndeclaredView
 from rehab.people.audit import sign_in_log
 from rehab.people.models import User
+from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import TokenScope, find_user_by_token
 
-CALLS_A_MINUTE = 600  # of one person, on one server process
+CALLS_A_MINUTE = 600
 PAGE_SIZE, MAX_PAGE_SIZE = 50, 200
 # One line of text without spaces around it, without characters that databases refuse.
 _LINE, _ENDS = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]", r"[^\x00-\x20\x7f-\x9f\u2028\u2029]"
@@ -142,18 +142,20 @@ def may_see_names(context: dict[str, Any]) -> bool:
     return roles.may_see_names(caller(context["request"]).role)
 
 
+# Of one person, on one server process.
+calls = TokenBuckets(CALLS_A_MINUTE, 60 / CALLS_A_MINUTE)
+
+
 class PerUserThrottle(BaseThrottle):
     """Limits the calls per minute of one person, through all tokens and browsers."""
 
     def allow_request(self, request: HttpRequest) -> bool:
         """Count a call. Return whether it is within the limit."""
-        key = f"api-calls-{caller(request).pk}-{int(time.time() // 60)}"
-        cache.add(key, 0, 120)
-        return cache.incr(key) <= CALLS_A_MINUTE
+        return not calls.take(caller(request).pk, time.monotonic())
 
     def wait(self) -> float:
-        """Return the seconds until the next minute begins."""
-        return 60 - time.time() % 60
+        """Return the seconds after which there is room for a call again."""
+        return max(1.0, calls.interval_s)
 
 
 # --- requests and responses ---------------------------------------------------------------------

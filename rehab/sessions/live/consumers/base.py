@@ -12,6 +12,7 @@ from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
 from django.db import DatabaseError
 
+from rehab.people.rate_limits import TokenBucket
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
@@ -71,7 +72,7 @@ class Socket(AsyncWebsocketConsumer):
         self.outbox = Outbox(self.send, self.write)
         self._tasks: set[asyncio.Task[None]] = set()
         self._context = contextvars.copy_context()
-        self._budget, self._budget_at = FRAME_BURST, self.runtime.loop.time()
+        self._frames = TokenBucket(FRAME_BURST, 1 / FRAMES_PER_S)
         self.runtime.sockets.add(self)
         try:
             await self._serve(receive)
@@ -107,7 +108,9 @@ class Socket(AsyncWebsocketConsumer):
 
     def _take(self, text: str) -> bool:
         """Handle a text at once, where it is its turn and nothing has to be waited for."""
-        if not self._is_receiving or self.is_closed or self._budget < 1:
+        if not self._is_receiving or self.is_closed:
+            return False
+        if self._frames.wait_s(self.runtime.loop.time()):
             return False
         try:
             taken = self.handle_now(text)
@@ -116,7 +119,7 @@ class Socket(AsyncWebsocketConsumer):
         ):  # whatever it was, the usual way meets it too, and reports it to the client
             return False
         if taken:
-            self._spend_budget()
+            self._count_frame()
         return taken
 
     def handle_now(self, text: str) -> bool:
@@ -124,15 +127,12 @@ class Socket(AsyncWebsocketConsumer):
         return False
 
     async def _on_frame(self, message: dict[str, Any]) -> None:
-        self._spend_budget()
+        self._count_frame()
         await self.on_frame(message.get("text"))
 
-    def _spend_budget(self) -> None:
+    def _count_frame(self) -> None:
         """Count a frame. Raises CloseSocket if they come faster than any real client sends."""
-        now = self.runtime.loop.time()
-        elapsed, self._budget_at = now - self._budget_at, now
-        self._budget = min(FRAME_BURST, self._budget + elapsed * FRAMES_PER_S) - 1
-        if self._budget < 0:
+        if self._frames.take(self.runtime.loop.time()):
             raise CloseSocket(
                 CloseCode.TOO_MANY, "flood", f"Send at most {FRAMES_PER_S:g} frames a second."
             )
