@@ -17,6 +17,7 @@ from rehab.boards.cache import read_lists
 from rehab.boards.changes import BoardChange, delete_old_changes
 from rehab.boards.choices import DisplayMode, TieRule
 from rehab.boards.models import Leaderboard
+from rehab.boards.ranking import results
 from rehab.boards.ranking.anonymity import cutoff_rank, find_visible_rows
 from rehab.boards.ranking.results import Result, make_key
 from rehab.boards.ranking.standings import Standings
@@ -84,7 +85,7 @@ def test_only_the_patients_concerned_are_computed_anew(clinic, monkeypatch):
     walk_down(people)
     assert len(figures_of(board)) == 6
     read: list[Any] = []
-    real = cache.read_results
+    real = results.read_results
 
     def read_results(board: Leaderboard, *how: Any) -> Any:
         read.append(how[1:])
