@@ -1,4 +1,4 @@
-"""A picture in the documents is out of date when what its page is made of changed, and only then."""
+"""A picture in the documents is out of date when its page's template or style changed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pictures in docs/images: which screenshot each is, and whether its page looks otherwise by now.
+"""The pictures in docs/images: which screenshot each is, and whether its page changed since.
 
 ``docs/images/sources.json`` holds, for each picture, a digest of the template and the style sheets
 of its page as they were when it was taken. ``make pictures`` takes them; ``make check`` compares.
@@ -89,18 +89,16 @@ def take() -> None:
     ):
         command = [sys.executable, "-m", "pytest", "-q", "-m", "screenshots", "-k", choice]
         subprocess.run([*command, f"tests/screenshots/{file}"], cwd=ROOT, check=True)
+    smaller = ["pngquant", "96", "--force", "--speed", "1", "--strip", "--output"]
     for name, picture in PICTURES.items():
-        subprocess.run(
-            ["pngquant", "96", "--force", "--speed", "1", "--strip"]
-            + ["--output", IMAGES / f"{name}.png", ROOT / f"screenshots/{picture.screenshot}.png"],
-            check=True,
-        )
+        screenshot = ROOT / f"screenshots/{picture.screenshot}.png"
+        subprocess.run([*smaller, IMAGES / f"{name}.png", screenshot], check=True)
     stored = {name: digest(picture.template) for name, picture in PICTURES.items()}
     SOURCES.write_text(json.dumps(stored, indent=2) + "\n")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser = argparse.ArgumentParser(description="Take the pictures that docs show, anew.")
     parser.add_argument("--check", action="store_true", help="only say which are out of date")
     if not parser.parse_args().check:
         take()
