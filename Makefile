@@ -99,6 +99,7 @@ check: setup ## Check format, lint, types, imports, migrations and settings
 	    echo 'These lines are longer than 120 characters; no formatter breaks a string.' >&2; exit 1; fi
 	$(call quiet,$(VENV)/bin/mypy)
 	$(call quiet,$(VENV)/bin/lint-imports --no-logo)
+	$(call quiet,$(PYTHON) -m tests.support.pictures --check)
 	$(call quiet,$(PYTHON) manage.py makemigrations --check --dry-run)
 	$(call quiet,$(PYTHON) manage.py check --fail-level WARNING)
 	$(call quiet,$(HOSTED) $(PYTHON) manage.py check --deploy --fail-level WARNING)
@@ -130,16 +131,8 @@ messages: setup ## Collect the pages' words into locale/ and compile the transla
 	    --ignore tests --ignore node_modules || exit; done
 	$(PYTHON) manage.py compilemessages --ignore $(VENV) --verbosity 0
 
-# docs/images: its name there, and of which picture it is a smaller copy.
-PICTURES = start:start-laptop patient-page:patient-laptop set-up:set-up-laptop report:report-laptop \
-	therapist:therapist-laptop past-sessions:past-sessions-laptop scores:scores-points-laptop \
-	pairing:pairing-tablet-portrait leave:walk-leave-tablet-landscape \
-	walking:walk-positive-hit-tablet-portrait patient:walk-positive-hit-tablet-landscape \
-	paused:walk-paused-tablet-portrait largest:walk-side-largest-tablet-portrait
-
-pictures: ## Copy the pictures that docs show into docs/images (after screenshots; needs pngquant)
-	for each in $(PICTURES); do pngquant 96 --force --speed 1 --strip \
-	    --output "docs/images/$${each%%:*}.png" "screenshots/$${each##*:}.png"; done
+pictures: setup ## Take the pictures that docs show anew, into docs/images (needs pngquant)
+	$(PYTHON) -m tests.support.pictures
 
 setup: $(VENV)/.dev $(VENV)/.twin node_modules/.dev ## Install all that development needs
 

@@ -4,7 +4,7 @@ import { _, number } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { remarkName, severityName } from "garry/shared/labels";
 
-// Of each kind of change its badge, label, format and labelled values (rehab/training/controls/).
+// Of each kind of change its badge, label, format and labelled values (rehab/training/controls/registry.py).
 const MARKS = JSON.parse(document.getElementById("chart-marks").textContent);
 const FORMATS = {
   none: () => "",
