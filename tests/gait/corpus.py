@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, Stride, measure_both_legs
@@ -35,8 +36,8 @@ class CorpusWalk:
     """A recorded walk in SI units, with what its own file says of it.
 
     ``power_w_kg`` is the file's own ankle power by side, where it has one; ``events_s`` are its
-    initial and terminal contacts by side, where it has any. ``known`` are the clean stances of a walk
-    that was made of another one: side, begin and end [s].
+    initial and terminal contacts by side, where it has any. ``known`` are the clean stances of a
+    walk that was made of another one: side, begin and end [s].
     """
 
     name: str
@@ -153,9 +154,7 @@ def _read_moore() -> CorpusWalk:
 READERS = {
     "moore2013": _read_moore,
     "gaitalytics treadmill": _read_gaitalytics,
-    "BTK flatfoot": lambda: _read_vicon(
-        "btk_pig_flatfoot_full.c3d", 47.5, "", is_overground=True
-    ),
+    "BTK flatfoot": lambda: _read_vicon("btk_pig_flatfoot_full.c3d", 47.5, "", is_overground=True),
     "BTK motion3": lambda: _read_vicon("btk_pig_motion3_ff.c3d", 74.0, "V", is_overground=True),
     "OpenSim subject01": _read_opensim,
 }
@@ -250,6 +249,13 @@ def filter_power(walk: CorpusWalk, side: str) -> np.ndarray:
     return np.interp(walk.t_s, grid, power)
 
 
+def bend(walk: CorpusWalk, values: np.ndarray) -> CubicSpline:
+    """Return a smooth curve through samples 10 ms apart, as motion capture takes them."""
+    every = max(1, round(0.01 * walk.rate_hz))
+    known = np.isfinite(values[::every])
+    return CubicSpline(walk.t_s[::every][known], values[::every][known])
+
+
 def vary(
     walk: CorpusWalk, *, braking_s: float = 0.0, tempo: float = 1.0, stiffness: float = 1.0
 ) -> CorpusWalk:
@@ -275,9 +281,9 @@ def vary(
             rise = np.clip((after_s + 0.12) / 0.16, 0, 1)
             fall = np.clip((0.35 - after_s) / 0.25, 0, 1)
             moved -= braking_s * (1 - np.cos(np.pi * np.minimum(rise, fall))) / 2
-        force, moment, angle = (
-            np.interp(at, walk.t_s, row)
-            for at, row in zip((before_s, before_s, moved), rows, strict=True)
+        force = np.interp(before_s, walk.t_s, rows[0])
+        moment, angle = (
+            bend(walk, row)(at) for at, row in zip((before_s, moved), rows[1:], strict=True)
         )
         legs[side] = LegSamples(force, moment, angle / stiffness)
     known = tuple(

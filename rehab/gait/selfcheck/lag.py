@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rehab.gait.stances.lag_watch import AROUND_S, GRID_HZ, BrakingFinder
 from rehab.gait.strides import Stride
 
-SEARCH_S = (-0.05, 0.15)
+SEARCH_S = (-0.1, 0.2)
 STRIDES_MIN = 10
 
 

@@ -14,7 +14,7 @@ from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import find_deceleration_peak
-from rehab.gait.setup.proposal import Proposal, propose
+from rehab.gait.setup.proposal import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
@@ -130,13 +130,12 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
             if guess is None:
                 continue
             what = f"{side}.{channel}={column.name}"
-            if not guess.is_certain:
-                continue
             if guess.column != column.name:
-                wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
-            elif guess.factor * column.factor < 0:
+                if guess.is_certain:
+                    wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
+            elif guess.factor * column.factor < 0 and guess.likeness > CERTAIN_LIKE:
                 wrong.append(f"{what}: its sign is turned. Give a factor of {guess.factor:.6g}.")
-            elif abs(column.factor / guess.factor - 1) > SAME_FACTOR:
+            elif abs(column.factor / guess.factor - 1) > SAME_FACTOR and guess.is_certain:
                 wrong.append(
                     f"{what}: it is in {guess.unit}. Give a factor of {guess.factor:.6g}, "
                     f"not {column.factor:.6g}."

@@ -45,7 +45,7 @@ MOMENT_LAG_S = (-0.03, 0.03)
 # strides or a tighter limit lose up to a tenth of some walks. Who scatters by more may drift by more.
 STRIDES, OWN_STRIDES = 5, 7
 DRIFT_MAX_S = 0.02  # a steady walker's own drifts by 10 ms in a minute (moore2013)
-DRIFT_SCATTERS = 4.0  # median deviations of a person's own first strides
+DRIFT_SCATTERS, DRIFT_MOST_S = 3.0, 0.06  # mean deviations of a person's own first strides; at most
 # A clock that runs away is seen earlier by the slope of the lag over the newest strides: five times
 # its own error, by what strides scatter, which few strides tell less of than 4 ms known before.
 SLOPE_STRIDES, SLOPE_LEAST = 12, 5
@@ -80,8 +80,8 @@ class LagWatch:
         if len(self._own) < OWN_STRIDES:
             self._own.append(lag_s)
             self._own_s = median(self._own)
-            scatter_s = median(abs(one_s - self._own_s) for one_s in self._own)
-            self._drift_max_s = max(DRIFT_MAX_S, DRIFT_SCATTERS * scatter_s)
+            scatter_s = sum(abs(one_s - self._own_s) for one_s in self._own) / len(self._own)
+            self._drift_max_s = min(max(DRIFT_MAX_S, DRIFT_SCATTERS * scatter_s), DRIFT_MOST_S)
 
     @property
     def beyond_s(self) -> float:
