@@ -46,6 +46,7 @@ class Flag(StrEnum):
     OFFSET = "offset"  # the plate's zero has moved by more than 15 N; taken out of the contacts
     SUPPORTED = "supported"  # a handrail or harness carries more than 5 % of the weight
     CLONUS = "clonus"  # the ankle beats in stance
+    UNUSUAL_TIMING = "unusual_timing"  # the ankle brakes when nobody's known does; A2 is less sure
     LATE = "late"  # samples came late and were put back to when they were taken
     LOST = "lost"  # samples are missing where A2 does not notice
 

@@ -8,6 +8,7 @@ import pytest
 from rehab.gait import LegSamples, check_signals
 from rehab.gait.contacts.force_plate import STUCK_S
 from rehab.gait.selfcheck.cures import CURES
+from rehab.gait.stances.lag_watch import BRAKING_S
 from rehab.gait.stances.plausibility import STANCE_MAX_S
 from rehab.gait.strides import RejectionReason
 from tests.gait.walks import ANGLE, FORCE, MOMENT, make_walk, read_moore
@@ -48,21 +49,36 @@ def test_a_good_recording_is_good(moore):
     assert found.rate_hz == pytest.approx(100, rel=0.01)
 
 
-@pytest.mark.parametrize("lag_s", [-0.02, -0.01, 0.0, 0.005, 0.01, 0.02])
-def test_an_injected_lag_is_reported(moore, lag_s):
+@pytest.mark.parametrize("lag_s", [-0.1, -0.05, -0.02, 0.02, 0.05, 0.1])
+def test_braking_is_unusual_beyond_what_people_do_and_never_a_lag(moore, lag_s):
     found = check(shift(moore, lag_s))
+    least_s, most_s = BRAKING_S
+    unusual = {f.side for f in found.findings if f.code == "timing_unusual"}
 
-    assert found.lag_s == pytest.approx(lag_s, abs=0.003)
-    assert ("lag" in {finding.code for finding in found.findings}) == (abs(lag_s) >= 0.01)
+    assert found.lag_s is None
+    assert not any("@" in f.message or f.code == "lag" for f in found.findings)
+    assert unusual == {
+        side
+        for side, at_s in found.deceleration_s.items()
+        if at_s is not None and not least_s <= at_s <= most_s
+    }
+    if lag_s > 0.03:
+        assert unusual == {"left", "right"}
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("lag_s", [-0.01, 0.01])
-def test_one_leg_knows_the_lag_too(moore, side, lag_s):
+def test_one_leg_knows_its_own_lag_too(moore, side, lag_s):
+    own = {side: check(moore).deceleration_s[side]}
     shifted = shift(moore, lag_s)
     legs = {"left": None, "right": None} | {side: LegSamples(*getattr(shifted, side))}
     found = check_signals(
-        shifted.t_s, legs["left"], legs["right"], rate_hz=100, mass_kg=moore.mass_kg
+        shifted.t_s,
+        legs["left"],
+        legs["right"],
+        rate_hz=100,
+        mass_kg=moore.mass_kg,
+        own_deceleration_s=own,
     )
 
     assert found.lag_s == pytest.approx(lag_s, abs=0.003)

@@ -89,6 +89,7 @@ def make_walk(
         Sensors(**sensors),
         seed,
         a2_w_kg if other_a2_w_kg is None else other_a2_w_kg,
+        longest_s=2 * stride_s,
     )
     legs = [
         np.array([leg.force_n, leg.moment_nm, leg.angle_rad])

@@ -8,9 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from rehab.gait.recordings.plates import assign_plates
 from rehab.gait.recordings.rates import resample_channel
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
+
+PLATE_TYPES = (2, 4)  # of the C3D manual: forces and moments, as they act on the plate
+ANKLE_MARKERS = ("ANK", "LM", "ANKL", "LMAL")  # lateral, after the letter of the side
 
 
 def read_table(path: Path) -> dict[str, Floats]:
@@ -50,7 +54,39 @@ def read_table(path: Path) -> dict[str, Floats]:
     for place, label in enumerate(_read_labels(file, "POINT")[: points.shape[1]]):
         for axis, name in enumerate("XYZ"):
             columns[f"{label}.{name}"] = resample_channel(points[axis, place], rates[0], time)
-    return columns
+    return columns | _read_plates(file, columns)
+
+
+def _read_plates(file: Any, columns: dict[str, Floats]) -> dict[str, Floats]:
+    """Return the vertical force of each leg [N] as ``plates.left`` and ``plates.right``.
+
+    Empty where the file does not say where its plates are, or has no markers at the ankles.
+    """
+    group = file["parameters"].get("FORCE_PLATFORM", {})
+    corners = np.asarray(group.get("CORNERS", {}).get("value", []), dtype=np.float64)
+    channels = np.asarray(group.get("CHANNEL", {}).get("value", []), dtype=np.int64)
+    types = np.asarray(group.get("TYPE", {}).get("value", []), dtype=np.int64).ravel()
+    if corners.ndim != 3 or channels.ndim != 2 or not np.isin(types, PLATE_TYPES).all():
+        return {}
+    labels = _read_labels(file, "ANALOG")
+    vertical = channels[2] - 1
+    if not ((vertical >= 0) & (vertical < len(labels))).all():
+        return {}
+    markers = {
+        side: name
+        for side, letter in (("left", "L"), ("right", "R"))
+        for name in reversed(ANKLE_MARKERS)
+        if f"{letter}{name}.Z" in columns
+    }
+    if len(markers) < 2:
+        return {}
+    ankles = {
+        side: np.array([columns[f"{side[0].upper()}{name}.{axis}"] for axis in "XYZ"])
+        for side, name in markers.items()
+    }
+    up_n = -np.array([columns[labels[place]] for place in vertical.tolist()])
+    forces, _ = assign_plates(up_n, corners.transpose(2, 1, 0)[:, :, :2], ankles)
+    return {f"plates.{side}": force for side, force in forces.items()}
 
 
 def _read_rate(file: Any, group: str) -> float:

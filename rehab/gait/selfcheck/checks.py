@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
 from rehab.gait.online import StrideDetector
 from rehab.gait.selfcheck.cures import CURES
-from rehab.gait.selfcheck.lag import PERSON_TOLERANCE_S, find_deceleration_peak
+from rehab.gait.selfcheck.lag import find_deceleration_peak
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
-from rehab.gait.stances.lag_watch import DECELERATION_S
+from rehab.gait.stances.lag_watch import BRAKING_S
 from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW, TwoLegDetector
 
@@ -60,12 +60,12 @@ class SignalCheck:
         Median rate of the samples.
     weight_ratio
         Median force of both plates by body weight; None with one leg.
-    lag_s, deceleration_s
-        By how much the angles come later than the forces [s] (mean of the legs), and when each
-        ankle brakes hardest after terminal contact [s] (``find_deceleration_peak``), by side. Keep
-        ``deceleration_s`` of a session whose synchronization was measured: given as
-        ``own_deceleration_s``, it reduces the uncertainty of later checks of that person from 8 to
-        3 ms.
+    lag_s
+        By how much the angles come later than in an earlier check of this person [s] (mean of the
+        legs), to 3 ms; None without one. Nothing else tells a lag: people differ by more.
+    deceleration_s
+        When each ankle brakes hardest after terminal contact [s] (``find_deceleration_peak``), by
+        side. Store that of a session whose synchronization was measured, for later checks.
     """
 
     findings: tuple[Finding, ...]
@@ -128,8 +128,8 @@ def check_signals(
         findings += _check_load(
             _compute_mean_load(time, leg, strides) / GRAVITY_M_S2, mass_kg, side
         )
-    lag_s = _find_lag(decelerations, own_deceleration_s)
-    findings += _check_lag(lag_s, OWN_TOLERANCE_S if own_deceleration_s else PERSON_TOLERANCE_S)
+    lag_s = _find_lag(decelerations, own_deceleration_s or {})
+    findings += _check_lag(lag_s) if own_deceleration_s else _check_braking(decelerations)
     return SignalCheck(
         findings=tuple(findings),
         strides=len(strides),
@@ -241,22 +241,39 @@ def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
     return [Finding("weight_unusual", message, side)]
 
 
-def _find_lag(decelerations: dict[str, float | None], own: dict[str, float] | None) -> float | None:
+def _find_lag(decelerations: dict[str, float | None], own: dict[str, float]) -> float | None:
     """Return the mean lag of the legs [s]: both plates have one clock, both ankles another."""
     lags = [
-        deceleration_s - (DECELERATION_S if own is None else own[side])
+        deceleration_s - own[side]
         for side, deceleration_s in decelerations.items()
-        if deceleration_s is not None and (own is None or side in own)
+        if deceleration_s is not None and side in own
     ]
     return float(np.mean(lags)) if lags else None
 
 
-def _check_lag(lag_s: float | None, tolerance_s: float) -> list[Finding]:
-    if lag_s is None or abs(lag_s) <= tolerance_s:
+def _check_braking(decelerations: dict[str, float | None]) -> list[Finding]:
+    """Check when the ankles brake, which is unusual but may be a person's own way to walk."""
+    least_s, most_s = BRAKING_S
+    return [
+        Finding(
+            "timing_unusual",
+            f"The {side} ankle brakes {at_s * 1000:.0f} ms after its foot has left; "
+            f"{least_s * 1000:.0f} to {most_s * 1000:.0f} ms are known of people. This may be how "
+            "this person walks. If plate and motion capture may be out of time, show it with a "
+            "synchronization pulse or heel drops: A2 changes by about 1.4 % a millisecond.",
+            side,
+        )
+        for side, at_s in decelerations.items()
+        if at_s is not None and not least_s <= at_s <= most_s
+    ]
+
+
+def _check_lag(lag_s: float | None) -> list[Finding]:
+    if lag_s is None or abs(lag_s) <= OWN_TOLERANCE_S:
         return []
     order = "later" if lag_s > 0 else "earlier"
     message = (
-        f"The ankle angle comes about {abs(lag_s) * 1000:.0f} ms {order} than the force; 5 ms "
-        "shift A2 by 6 to 8 %. Synchronize plate and motion capture."
+        f"The ankle angle comes about {abs(lag_s) * 1000:.0f} ms {order} than in this person's "
+        "earlier check; 5 ms shift A2 by 6 to 8 %. Synchronize plate and motion capture."
     )
     return [Finding("lag", message)]

@@ -1,4 +1,4 @@
-"""By how much the kinematics come later than the force, estimated from walking itself."""
+"""When the ankle brakes after the foot has left, from walking itself."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from rehab.gait.stances.lag_watch import AROUND_S, GRID_HZ, BrakingFinder
 from rehab.gait.strides import Stride
 
-PERSON_TOLERANCE_S = 0.008
-SEARCH_S = (-0.05, 0.15)
+SEARCH_S = (-0.1, 0.2)
 STRIDES_MIN = 10
 
 

@@ -13,18 +13,17 @@ from rehab.gait.offline import measure_both_legs, measure_strides
 from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
-from rehab.gait.selfcheck.lag import PERSON_TOLERANCE_S, find_deceleration_peak
-from rehab.gait.setup.proposal import Proposal, propose
+from rehab.gait.selfcheck.lag import find_deceleration_peak
+from rehab.gait.setup.proposal import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
-from rehab.gait.stances.lag_watch import DECELERATION_S, find_moment_lag
+from rehab.gait.stances.lag_watch import find_moment_lag
 from rehab.gait.stances.timing import LATE_S
 from rehab.gait.strides import GaitInputError, Stride
 
-# Moment and force fall together within 11 ms (moore2013: +8 and +5; simulated: -11 to -3).
+# Moment and force fall together within 8 ms (five people: ``lag_watch``; simulated: -11 to -3).
 MOMENT_TOLERANCE_S = 0.012
-DELAY_TOLERANCES_S = {"angle": PERSON_TOLERANCE_S, "moment": MOMENT_TOLERANCE_S}
 SAME_FACTOR = 0.02
 STRIDES_MIN = 8
 
@@ -39,9 +38,10 @@ class SetupCheck:
         Columns, units, signs, legs, mass.
     columns
         The same as a map to measure with.
-    delays_s
-        By how much each moment and angle comes late [s], by side and channel; None where it cannot
-        be told.
+    timing_s
+        By how much each moment falls later than its force, and how long after its foot has left
+        each ankle brakes [s], by side and channel; None where it cannot be told. No delay: people
+        differ in the latter by more than any delay that matters.
     late, lost
         Samples that came late, and times without samples.
     strides, valid
@@ -52,21 +52,12 @@ class SetupCheck:
 
     proposal: Proposal
     columns: ColumnMap
-    delays_s: dict[tuple[str, str], float | None]
+    timing_s: dict[tuple[str, str], float | None]
     late: int
     lost: int
     strides: int
     valid: int
     findings: tuple[str, ...]
-
-    @property
-    def proposed_delays_s(self) -> dict[tuple[str, str], float]:
-        """Delays to take out [s], of the channels that come later or earlier than people differ."""
-        return {
-            key: round(delay_s, 3)
-            for key, delay_s in self.delays_s.items()
-            if delay_s is not None and abs(delay_s) > DELAY_TOLERANCES_S[key[1]]
-        }
 
     @property
     def is_certain(self) -> bool:
@@ -93,8 +84,8 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
     found = _make_map(proposal)
     time_s, legs = apply_columns(columns, found)
     strides = _measure(time_s, legs, proposal)
-    delays = {
-        (side, channel): _find_delay(channel, time_s, leg, [s for s in strides if s.side == side])
+    timing = {
+        (side, channel): _find_timing(channel, time_s, leg, [s for s in strides if s.side == side])
         for side, leg in legs.items()
         for channel in ("moment", "angle")
     }
@@ -111,12 +102,12 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
     findings = [
         f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt
     ]
-    findings += _describe_missing(proposal) + _describe_delays(delays)
-    findings += [finding.message for finding in check.findings if finding.code != "lag"]
+    findings += _describe_missing(proposal) + _describe_timing(timing)
+    findings += [finding.message for finding in check.findings]
     return SetupCheck(
         proposal=proposal,
         columns=found,
-        delays_s=delays,
+        timing_s=timing,
         late=late,
         lost=lost,
         strides=len(strides),
@@ -126,7 +117,10 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
 
 
 def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
-    """Return what a person's map of columns has wrong, with what was seen; empty if nothing."""
+    """Return what a person's map of columns has wrong, with what was seen; empty if nothing.
+
+    Only what is certain contradicts a person.
+    """
     wrong = []
     if columns.time.name != check.proposal.time:
         wrong.append(f"The time is {check.proposal.time}, not {columns.time.name}.")
@@ -137,8 +131,9 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
                 continue
             what = f"{side}.{channel}={column.name}"
             if guess.column != column.name:
-                wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
-            elif guess.factor * column.factor < 0:
+                if guess.is_certain:
+                    wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
+            elif guess.factor * column.factor < 0 and guess.likeness > CERTAIN_LIKE:
                 wrong.append(f"{what}: its sign is turned. Give a factor of {guess.factor:.6g}.")
             elif abs(column.factor / guess.factor - 1) > SAME_FACTOR and guess.is_certain:
                 wrong.append(
@@ -178,13 +173,12 @@ def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) ->
     )
 
 
-def _find_delay(
+def _find_timing(
     channel: str, time_s: Floats, leg: LegSamples, strides: list[Stride]
 ) -> float | None:
-    """Return by how much a channel comes later than the force [s], None where it cannot be told."""
+    """Return when the ankle brakes, or by how much later than its force the moment falls [s]."""
     if channel == "angle":
-        peak_s = find_deceleration_peak(time_s, leg.angle_rad, strides)
-        return None if peak_s is None else peak_s - DECELERATION_S
+        return find_deceleration_peak(time_s, leg.angle_rad, strides)
     force, moment = np.asarray(leg.force_n), np.asarray(leg.moment_nm)
     lags = []
     for stride in strides:
@@ -210,18 +204,19 @@ def _describe_missing(proposal: Proposal) -> list[str]:
     ]
 
 
-def _describe_delays(delays: dict[tuple[str, str], float | None]) -> list[str]:
+def _describe_timing(timing: dict[tuple[str, str], float | None]) -> list[str]:
+    """Return what is unusual about the moments' times; of the angles the self-check tells it."""
     found = []
-    for (side, channel), delay_s in delays.items():
-        if delay_s is None:
+    for (side, channel), at_s in timing.items():
+        if at_s is None:
             found.append(
                 f"Whether the {side} {channel} is in time cannot be told: too few strides."
             )
-        elif abs(delay_s) > DELAY_TOLERANCES_S[channel]:
-            order = "late" if delay_s > 0 else "early"
+        elif channel == "moment" and abs(at_s) > MOMENT_TOLERANCE_S:
+            order = "later" if at_s > 0 else "earlier"
             found.append(
-                f"The {side} {channel} comes {abs(delay_s) * 1000:.0f} ms {order}, by which A2 is "
-                f"about {abs(delay_s) * 1400:.0f} % off. Synchronize it, or give its delay: "
-                f"{side}.{channel}=COLUMN@{delay_s:.3f}"
+                f"The {side} moment falls {abs(at_s) * 1000:.0f} ms {order} than its force; up to "
+                f"{MOMENT_TOLERANCE_S * 1000:.0f} ms are usual. Look at how the two are "
+                "synchronized: A2 changes by about 1.4 % a millisecond."
             )
     return found

@@ -19,15 +19,16 @@ def describe_setup(check: SetupCheck) -> list[str]:
         f"mass   {proposal.mass_kg:.1f} kg, {measured}",
     ]
     for (side, channel), guess in sorted(proposal.guesses.items()):
-        lines.append(f"{side:5}  {_describe_guess(guess, check.delays_s.get((side, channel)))}")
+        lines.append(f"{side:5}  {_describe_guess(guess, check.timing_s.get((side, channel)))}")
     lines.append(f"{check.strides} strides, {check.valid} valid")
     lines += [f"! {text}" for text in check.findings]
     return [*lines, "", "If that is right, measure with:", "  " + format_arguments(check)]
 
 
-def _describe_guess(guess: Guess, delay_s: float | None) -> str:
+def _describe_guess(guess: Guess, at_s: float | None) -> str:
     sign = "turned, " if guess.factor < 0 else ""
-    timing = "" if delay_s is None else f", {1000 * delay_s:+.0f} ms"
+    after = "after its foot has left" if guess.channel == "angle" else "after its force"
+    timing = "" if at_s is None else f", {1000 * at_s:+.0f} ms {after}"
     sure = "sure" if guess.is_certain else "look at it"
     return f"{guess.channel:7} {guess.column} in {guess.unit} ({sign}{sure}{timing})"
 
@@ -81,8 +82,7 @@ def setup_to_json(check: SetupCheck, columns: list[str]) -> dict[str, Any]:
                 "unit": guess.unit,
                 "is_certain": guess.is_certain,
                 "doubt": guess.doubt,
-                "delay_s": check.delays_s.get((side, channel)),
-                "proposed_delay_s": check.proposed_delays_s.get((side, channel), 0.0),
+                "timing_s": check.timing_s.get((side, channel)),
             }
             for (side, channel), guess in sorted(proposal.guesses.items())
         ],

@@ -25,10 +25,9 @@ from rehab.gait.stances.continuity import (
 )
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
 from rehab.gait.stances.lag_watch import (
-    ANGLE_LAG_MAX_S,
     AROUND_S,
-    DECELERATION_S,
-    MOMENT_LAG_MAX_S,
+    BRAKING_S,
+    MOMENT_LAG_S,
     BrakingFinder,
     LagWatch,
     find_moment_lag,
@@ -126,8 +125,8 @@ class StanceAnalyzer:
         self._before = int(BEFORE_S * rate_hz)
         self._clock = ClockJudge(rate_hz)
         self._braking = BrakingFinder()
-        self._angle_lag = LagWatch(DECELERATION_S, ANGLE_LAG_MAX_S)
-        self._moment_lag = LagWatch(0.0, MOMENT_LAG_MAX_S)
+        self._angle_lag = LagWatch(BRAKING_S)
+        self._moment_lag = LagWatch(MOMENT_LAG_S)
         self._last_end: tuple[int, float] | None = None
 
     def measure(self, contact: Contact, stop: int) -> Stance:
@@ -173,8 +172,10 @@ class StanceAnalyzer:
             push_off = None if stance is None else self._analyzer.measure(stance)
             if stance is not None and push_off is not None:
                 self._check_push_off(contact, stance, push_off, gap_s, reasons, flags)
-                drift_s = self._angle_lag.moved_s
-                a2_sd = self._uncertainty.find(stance, push_off, clock.late_s, drift_s)
+                angle = self._angle_lag
+                a2_sd = self._uncertainty.find(
+                    stance, push_off, clock.late_s, angle.moved_s, angle.beyond_s
+                )
         if push_off is None and not reasons:
             reasons.append(RejectionReason.NO_PUSH_OFF)
         return Stance(
@@ -209,6 +210,8 @@ class StanceAnalyzer:
         toes, late = stance.index(LEVER_FROM) - half, stance.index(LATE_FROM) - half
         reasons += check_lever(force_n, moment_nm, toes, self._weight_n)
         reasons += self._check_lags(force_n[late:], moment_nm[late:])
+        if self._angle_lag.beyond_s:
+            flags.append(Flag.UNUSUAL_TIMING)
         reasons += check_push_off(push_off, stance, self._is_velocity)
         if not self._is_velocity and has_clonus(push_off, stance):
             flags.append(Flag.CLONUS)
@@ -232,9 +235,9 @@ class StanceAnalyzer:
         """Return which channels are out of time by this stride's late stance and those before."""
         self._moment_lag.add(find_moment_lag(force_n, moment_nm, self._even_hz))
         reasons = []
-        if self._moment_lag.is_off:
+        if self._moment_lag.beyond_s or self._moment_lag.has_drifted:
             reasons.append(RejectionReason.MOMENT_OUT_OF_STEP)
-        if self._angle_lag.is_off:
+        if self._angle_lag.has_drifted:
             reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
         return reasons
 

@@ -32,14 +32,16 @@ MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
 ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
 VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
 
-# Spikes and steps are looked for h = 10 ms apart: in the angle by its bend, x(t−h) − 2x(t) +
-# x(t+h); in the moment, which falls steeply, by the change of its distance from its own smooth
-# curve. Of both a walker makes less than k × range × (h / stance)², since the curves of walkers
-# differ in size and in the time that they take more than in form: where nothing was wrong, k was
-# 150 at most for the angle and 110 for the moment (both legs of moore2013; synthetic people, 0.3 to
-# 6.5 W/kg). Added to that: a constant, and a multiple of the median, for the sensor's noise.
+# Spikes and steps are looked for h = 10 ms apart: in the angle by its fourth difference, to which a
+# push-off adds little however fast it is, a spike six and a step three times its size; in the
+# moment, which falls steeply, by the change of its distance from its own smooth curve. Of both a
+# walker makes less than k × range × (h / stance)², since the curves of walkers differ in size and
+# in the time that they take more than in form. Where nothing was wrong k was, for the angle,
+# beyond the two terms for the sensor's noise, 0 (BTK's two), 40 (moore2013, OpenSim's subject01) and
+# 225 (gaitalytics, unfiltered) at most; for the moment 110 (both legs of moore2013, synthetic people
+# of 0.3 to 6.5 W/kg; the others less). These terms are a constant and a multiple of the median.
 APART_S = 0.01
-ANGLE_BEND = (160.0, 0.008, 6.0)  # rad
+ANGLE_FOURTH = (350.0, 0.01, 6.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
 CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change it
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
@@ -193,7 +195,7 @@ def check_steps(
     first = stance.index(CHECK_FROM)
     last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
     angle = stance.signals[ANGLE - FORCE, first:]
-    if last - first <= apart or len(angle) <= 2 * apart:
+    if last - first <= apart or len(angle) <= 4 * apart:
         return []
     reasons = []
     moment = push_off.moment_nm_kg[first:last]
@@ -204,7 +206,9 @@ def check_steps(
     if not is_velocity:
         bends = angle[2 * apart :] - 2 * angle[apart:-apart]
         bends += angle[: -2 * apart]
-        if _is_discontinuous(np.abs(bends), angle, walking, *ANGLE_BEND):
+        fourth = bends[2 * apart :] - 2 * bends[apart:-apart]
+        fourth += bends[: -2 * apart]
+        if _is_discontinuous(np.abs(fourth), angle, walking, *ANGLE_FOURTH):
             reasons.append(RejectionReason.ANGLE_LOST)
     return reasons
 

@@ -44,9 +44,10 @@ LEVER_FORCE = 0.15  # of body weight
 # that comes 30 ms early has 0.4 to 0.7, one that comes 50 ms late 1.5 to 2.2.
 LEAVING_SHARE = 0.3
 LEVER_CHANGE = (0.45, 2.5)
-# rad. A stiff ankle in an orthosis moves by 0.05, a free one by 0.4-0.6 in stance.
+# rad. A stiff ankle in an orthosis moves by 0.05, a free one by 0.3-0.6 in stance
+# (moore2013, gaitalytics, BTK's two, OpenSim's subject01).
 ANGLE_RANGE_MIN = 0.02
-ANGLE_RANGE_MAX = 1.6
+ANGLE_RANGE_MAX = 2.5  # of degrees even a stiff ankle's 0.05 rad are 2.9
 A2_MAX = 12.0  # W/kg: 2 Nm/kg at 6 rad/s
 PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.88-0.90 of it; an earlier peak is no push-off
 REVERSED_SHARE = 0.5  # of the peak; an ankle that pushed does not brake so much before it leaves

@@ -41,7 +41,12 @@ class Uncertainty:
         self._velocity_gain = math.sqrt(float(slope @ slope))
 
     def find(
-        self, stance: ResampledStance, push_off: PushOff, late_s: float, drift_s: float
+        self,
+        stance: ResampledStance,
+        push_off: PushOff,
+        late_s: float,
+        drift_s: float,
+        beyond_s: float = 0.0,
     ) -> float:
         """Return the standard deviation of an A2 [W/kg].
 
@@ -52,6 +57,8 @@ class Uncertainty:
         late_s, drift_s
             By how much samples came late at most, and by how much the angle's lag has changed since
             the first strides [s].
+        beyond_s
+            By how much that lag is beyond what is known of people [s].
         """
         peak, velocity = push_off.peak, push_off.velocity_rad_s
         part = slice(stance.index(PUSH_OFF_FROM), stance.end + 1)
@@ -67,6 +74,7 @@ class Uncertainty:
         after = velocity.item(min(peak + 1, len(velocity) - 1))
         by_time = push_off.a2_moment_nm_kg * (after - before) * self._rate_hz / 2
         apart_s = max(0.0, abs(drift_s) - USUAL_DRIFT_S) + (PUT_BACK_S if late_s > 0 else 0.0)
+        apart_s += abs(beyond_s)
         return math.hypot(noise, ahead, by_time * apart_s)
 
 

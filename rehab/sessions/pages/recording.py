@@ -141,12 +141,12 @@ def _describe(checked: Checked, chosen: dict[str, dict[str, str]]) -> dict[str, 
 
 
 def _proposed(checked: Checked) -> dict[str, dict[str, str]]:
-    """Return what the check found as a person would write it, with the delays it proposes."""
+    """Return what the check found as a person would write it; a delay has to be measured."""
     return {
         f"{one['side']}.{one['channel']}": {
             "column": one["column"],
             "factor": f"{one['factor']:.9g}",
-            "delay_ms": f"{1000 * one['proposed_delay_s']:.0f}" if one["proposed_delay_s"] else "",
+            "delay_ms": "",
         }
         for one in (checked.found or {"channels": []})["channels"]
     }

@@ -161,18 +161,20 @@ def make_signals(
     sensors: Sensors | None = None,
     seed: int = 0,
     other_a2_w_kg: float = A2_DEFAULT_W_KG,
+    longest_s: float = 3.0,
 ) -> SyntheticRecording:
     """Return the signals of a walk whose strides of one leg are given, as ``walk`` yields them.
 
     A stride lasts until the next one's time; where that is no stride time (pauses between trials),
-    it lasts 1.1 s. The other leg steps half a stride later. A stride with reasons loses its force
+    it lasts 1.1 s: a time beyond
+    ``longest_s`` is a pause. The other leg steps half a stride later. A stride with reasons loses its force
     in mid-stance, one without a value its moment.
     """
     sensors = sensors or Sensors()
     rng = np.random.default_rng(seed)
     lengths = [b.time_s - a.time_s for a, b in pairwise(strides)]
     lengths = [*lengths, lengths[-1] if lengths else 1.1]
-    lengths = [length if 0.5 <= length <= 3.0 else 1.1 for length in lengths]
+    lengths = [length if 0.5 <= length <= longest_s else 1.1 for length in lengths]
     total_s = sum(lengths) + 2.0
     count = int(total_s * sensors.rate_hz)
     t_s = np.arange(count) / sensors.rate_hz

@@ -38,10 +38,11 @@ HIDDEN = {
         ("angle × 0.8", "angle × 1.2", "angle × 1.56"),
     ),
     3: Hidden(
-        "people brake 51 ± 8 ms after the foot has left, and strides of one scatter by 8 ms: out "
-        "of time by up to 40 ms (angle) or 30 ms (moment), or on the way there, is within that; "
-        "the first strides cannot know",
-        "the delays of moment and angle, from 8 and 12 ms on",
+        "people brake from 2 ms before to 61 ms after the foot has left, and strides of one "
+        "scatter by 8 ms: an angle that is out of time from the first stride on is another person's, and a "
+        "moment within 30 ms; a drift is seen by what strides scatter",
+        "a synchronization pulse or heel drops; beyond what is known of people, strides are marked "
+        "as unusual and their A2 as less sure; the moment's time from 12 ms on",
         ("angle +", "angle -", "moment +", "moment -", "drift of"),
     ),
     4: Hidden(
