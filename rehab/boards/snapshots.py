@@ -40,7 +40,7 @@ class BoardSnapshot(ScopedModel):
 
     def to_results(self) -> list[Result]:
         """Return the stored results."""
-        return [Result._make((*row[:-1], tuple(row[-1]))) for row in self.results]
+        return [Result._make([*row, tuple(key)]) for *row, key in self.results]
 
 
 def shared_boards(clinics: Iterable[int]) -> QuerySet[Leaderboard]:
