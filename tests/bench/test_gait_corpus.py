@@ -1,4 +1,4 @@
-"""Other people's walks: which clean strides are valid, their A2, and what the check says of them."""
+"""Other people's walks: which clean strides are valid, their A2, and what the check says."""
 
 from __future__ import annotations
 
