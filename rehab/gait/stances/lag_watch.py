@@ -24,9 +24,9 @@ from rehab.gait.signals.filters import (
 
 # A foot that has left the floor stops plantarflexing: from when to when the ankle brakes hardest,
 # after terminal contact. Of seven or eight people and five systems [ms]: moore2013 49 to 61;
-# gaitalytics -2 to 13 (treadmill), 4 to 10 (overground); BTK's two -2 to 22; OpenSim's two 27 to 35;
-# an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside, a
-# stride is marked as unusual and stays valid: nothing proves that nobody walks so.
+# gaitalytics -2 to 13 (treadmill), 4 to 10 (overground); BTK's two -2 to 22; OpenSim's two 27 to
+# 35; an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside,
+# a stride is marked as unusual and stays valid: nothing proves that nobody walks so.
 BRAKING_S = (-0.02, 0.075)
 BRAKING_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.1, 0.2)
