@@ -246,8 +246,7 @@ def filter_power(walk: CorpusWalk, side: str) -> np.ndarray:
         known = np.isfinite(values)
         rows.append(filtfilt(b, a, np.interp(grid, walk.t_s[known], values[known])))
     power = rows[0] / walk.mass_kg * np.gradient(rows[1], 1 / rate_hz)
-    found: np.ndarray = np.interp(walk.t_s, grid, power)
-    return found
+    return np.asarray(np.interp(walk.t_s, grid, power))
 
 
 def bend(walk: CorpusWalk, values: np.ndarray) -> CubicSpline:

@@ -36,11 +36,10 @@ VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
 # push-off adds little however fast it is, a spike six and a step three times its size; in the
 # moment, which falls steeply, by the change of its distance from its own smooth curve. Of both a
 # walker makes less than k × range × (h / stance)², since the curves of walkers differ in size and
-# in the time that they take more than in form. Where nothing was wrong k was, for the angle,
-# beyond the two terms for the sensor's noise, 0 (BTK's two), 40 (moore2013, OpenSim's subject01)
-# and 225 (gaitalytics, unfiltered) at most; for the moment 110 (both legs of moore2013, synthetic
-# people of 0.3 to 6.5 W/kg; the others less). These terms are a constant and a multiple of the
-# median.
+# in the time that they take more than in form. Added to that: a constant, and a multiple of the
+# median, for the sensor's noise. Beyond these, where nothing was wrong, k was for the angle 0
+# (BTK's two), 40 (moore2013, OpenSim's subject01) and 225 (gaitalytics, unfiltered) at most; for
+# the moment 110 (moore2013; synthetic people of 0.3 to 6.5 W/kg) and 37 (BTK's motion3).
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 6.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg

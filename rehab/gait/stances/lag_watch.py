@@ -23,10 +23,10 @@ from rehab.gait.signals.filters import (
 )
 
 # A foot that has left the floor stops plantarflexing: from when to when the ankle brakes hardest,
-# after terminal contact. Medians of eight people and five systems [ms]: moore2013 49, 53;
-# gaitalytics -2 (treadmill), 4 to 10 (overground); BTK's two 5 to 22 and -2; OpenSim's two 22
-# to 35; an HBM subject 14. The margins, 18 and 22 ms, are for people who are not among them.
-# Outside, a stride is marked as unusual and stays valid: nothing proves that nobody walks so.
+# after terminal contact. Of seven or eight people and five systems [ms]: moore2013 49 to 61;
+# gaitalytics -2 to 13 (treadmill), 4 to 10 (overground); BTK's two -2 to 22; OpenSim's two 27 to
+# 35; an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside,
+# a stride is marked as unusual and stays valid: nothing proves that nobody walks so.
 BRAKING_S = (-0.02, 0.075)
 BRAKING_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.1, 0.2)
@@ -45,7 +45,8 @@ MOMENT_LAG_S = (-0.03, 0.03)
 # strides or a tighter limit lose up to a tenth of some walks. Who scatters more may drift more.
 STRIDES, OWN_STRIDES = 5, 7
 DRIFT_MAX_S = 0.02  # a steady walker's own drifts by 10 ms in a minute (moore2013)
-DRIFT_SCATTERS, DRIFT_MOST_S = 3.0, 0.06  # mean deviations of a person's own first strides; at most
+DRIFT_SCATTERS = 3.0  # mean deviations of a person's own first strides …
+DRIFT_MOST_S = 0.06  # … up to here
 # A clock that runs away is seen earlier by the slope of the lag over the newest strides: five times
 # its own error, by what strides scatter, which few strides tell less of than 4 ms known before.
 SLOPE_STRIDES, SLOPE_LEAST = 12, 5

@@ -165,9 +165,9 @@ def make_signals(
 ) -> SyntheticRecording:
     """Return the signals of a walk whose strides of one leg are given, as ``walk`` yields them.
 
-    A stride lasts until the next one's time; where that is beyond ``longest_s`` (a pause between
-    trials), it lasts 1.1 s. The other leg steps half a stride later. A stride with reasons loses
-    its force in mid-stance, one without a value its moment.
+    A stride lasts until the next one's time; where that is no stride time (pauses between trials),
+    it lasts 1.1 s: a time beyond ``longest_s`` is a pause. The other leg steps half a stride later.
+    A stride with reasons loses its force in mid-stance, one without a value its moment.
     """
     sensors = sensors or Sensors()
     rng = np.random.default_rng(seed)

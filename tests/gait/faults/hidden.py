@@ -40,7 +40,7 @@ HIDDEN = {
     3: Hidden(
         "people brake from 2 ms before to 61 ms after the foot has left, and strides of one "
         "scatter by 8 ms: an angle that is out of time from the first stride on is another "
-        "person's, and a moment within 30 ms; a drift is seen by what strides scatter",
+        "person's, as is a moment within 30 ms; a drift is seen by what strides scatter",
         "a synchronization pulse or heel drops; beyond what is known of people, strides are marked "
         "as unusual and their A2 as less sure; the moment's time from 12 ms on",
         ("angle +", "angle -", "moment +", "moment -", "drift of"),
