@@ -122,7 +122,7 @@ def paths_to_patient() -> dict[type[Model], str]:
 
 def policies_of(model: type[Model]) -> dict[str, FieldPolicy]:
     """Return a model's declared policies; the rows of a relation have that of the relation."""
-    owner = model._meta.auto_created
+    owner: Any = model._meta.auto_created
     if not owner:
         return getattr(model, "personal", {})
     declared: dict[str, FieldPolicy] = getattr(owner, "personal", {})

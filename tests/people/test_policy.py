@@ -76,14 +76,15 @@ def test_a_new_field_is_named_until_it_has_a_policy_and_is_erased_with_one(
     monkeypatch.setitem(Patient.personal, "height_cm", policy)
     assert check_personal_fields() == []
     assert "height_cm" in modelform_factory(Patient, fields=details(Patient)).base_fields
-    patient = Patient.everywhere.get(pk=world.patient.pk)
+    patient: Any = Patient.everywhere.get(pk=world.patient.pk)
     patient.height_cm = 171.5
     patient.save()
     assert describe(patient)["height_cm"] == 171.5
     change = HistoryEntry.everywhere.filter(model_name="Patient").first()
     assert change.changes == {"height_cm": [None, 171.5]}
     erase(patient, ErasureReason.ASKED, None, NOW)
-    assert Patient.everywhere.get(pk=patient.pk).height_cm is None
+    patient.refresh_from_db()
+    assert patient.height_cm is None
     assert "171.5" not in str(list(HistoryEntry.everywhere.values_list("changes")))
 
 
@@ -119,7 +120,7 @@ def plant(world: World) -> dict[str, str]:
     """Put a secret into each field that an erasure empties; return them as text, by field."""
     planted: dict[str, str] = {}
     for model, path in paths_to_patient().items():
-        rows = QuerySet(model).filter(**{path or "pk": world.patient.pk})
+        rows: QuerySet[Any] = QuerySet(model).filter(**{path or "pk": world.patient.pk})
         key = rows.values_list("pk", flat=True).order_by("pk").first()
         assert key is not None, f"The world has no {model.__name__} of its patient. Add one."
         values: dict[str, Any] = {}

@@ -77,7 +77,7 @@ class ErasureReason(models.TextChoices):
 
 
 def rename_erased(patient: Patient, _pseudonym: str) -> None:
-    """Give an erased patient a new pseudonym, which is the code as well."""
+    """Replace an erased patient's pseudonym and code by one new pseudonym."""
     patient.pseudonym = patient.code = generate_pseudonym()
 
 
