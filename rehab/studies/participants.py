@@ -22,7 +22,7 @@ OF_STUDY = retained("the study's result, under a code", shown=True, research=Tru
 
 
 def replace_codes(patient: Patient, _pseudonym: str) -> None:
-    """Give an erased participant other codes; the numbers of the studies stay right."""
+    """Replace an erased participant's codes; the numbers of the studies stay right."""
     for enrollment in patient.enrollments.exclude(code__startswith=ERASED_CODE):
         enrollment.code = f"{ERASED_CODE}{random_code(8)}"
         enrollment.save(update_fields=["code"])

@@ -1,19 +1,17 @@
 """Clinics, the people who work there, and the patients who walk."""
 
 from rehab.people.models.accounts import ScopedUserManager, ServerUserManager, User
-from rehab.people.models.clinics import LANGUAGES, Clinic, validate_time_zone
-from rehab.people.models.patients import (
+from rehab.people.models.choices import (
     SIDES,
     BoardsConsent,
     EndReason,
     ErasureReason,
-    Patient,
-    PatientErased,
     ScreenSide,
     ScreenText,
     Severity,
-    generate_pseudonym,
 )
+from rehab.people.models.clinics import LANGUAGES, Clinic, validate_time_zone
+from rehab.people.models.patients import Patient, PatientErased, generate_pseudonym
 
 __all__ = [
     "LANGUAGES",

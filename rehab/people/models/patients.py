@@ -10,14 +10,20 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
 from rehab.people.covariates import age_band, months_since
+from rehab.people.models.choices import (
+    SIDES,
+    BoardsConsent,
+    EndReason,
+    ErasureReason,
+    ScreenSide,
+    ScreenText,
+    Severity,
+)
 from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.policy import Covariate, erased, erased_by, personal_fields, retained
 from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
-from rehab.training.steps import Side
-
-SIDES = [(Side.LEFT.value, _("Left")), (Side.RIGHT.value, _("Right"))]
 
 
 def generate_pseudonym() -> str:
@@ -25,59 +31,8 @@ def generate_pseudonym() -> str:
     return "P-" + random_code(8)
 
 
-class ScreenSide(models.TextChoices):
-    """Where the thermometer stands on the patient's page; for neglect and visual field loss."""
-
-    RIGHT = "right", _("on the right (usual)")
-    LEFT = "left", _("on the left")
-    CENTER = "center", _("all of it in the middle, smaller")
-
-
-class ScreenText(models.TextChoices):
-    """The size of text on the patient's page."""
-
-    NORMAL = "normal", _("normal")
-    LARGE = "large", _("large")
-    LARGEST = "largest", _("largest")
-
-
-class Severity(models.TextChoices):
-    """How severe the impairment of gait is, as the clinic judges it."""
-
-    MILD = "mild", _("mild")
-    MODERATE = "moderate", _("moderate")
-    SEVERE = "severe", _("severe")
-
-
-class BoardsConsent(models.TextChoices):
-    """Which leaderboards a patient has agreed to stand on; each includes those before it."""
-
-    OWN = "own", _("None: sees own sessions only")
-    TOTAL = "total", _("Counts in totals, stands in no row")
-    CLINIC = "clinic", _("Boards of this clinic")
-    ACROSS = "across", _("Boards of this clinic and across clinics")
-
-
-class EndReason(models.TextChoices):
-    """Why a patient's program has ended."""
-
-    DONE = "done", _("The program is complete")
-    WISH = "wish", _("The patient wishes to stop")
-    HEALTH = "health", _("Health")
-    MOVED = "moved", _("Goes on elsewhere")
-    OTHER = "other", _("Another reason")
-
-
-class ErasureReason(models.TextChoices):
-    """Why all that leads to a patient was erased."""
-
-    ASKED = "asked", _("The patient asks for it")
-    MISTAKE = "mistake", _("Was entered by mistake")
-    RETENTION = "retention", _("Kept long enough")
-
-
 def rename_erased(patient: Patient, _pseudonym: str) -> None:
-    """Give an erased patient a new pseudonym, which is the code as well."""
+    """Replace an erased patient's pseudonym and code by one new pseudonym."""
     patient.pseudonym = patient.code = generate_pseudonym()
 
 
