@@ -36,6 +36,8 @@ def read_fields(message: Any, kind: type[Fields]) -> Fields:
         return msgspec.convert(message, kind)
     except (msgspec.ValidationError, OverflowError) as problem:
         raise BadFrame(_cure(str(problem), kind)) from None
+    except UnicodeError:  # msgspec reads no half of a surrogate pair
+        raise BadFrame("Texts hold no half of a surrogate pair. Leave it out.") from None
 
 
 def _cure(problem: str, kind: type[msgspec.Struct]) -> str:
