@@ -13,6 +13,7 @@ from rehab.boards.models import Leaderboard
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic, Patient
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ChangeKind
 from tests.support.boards import board_of, figures_of
 from tests.support.callers import change
@@ -53,3 +54,19 @@ async def test_a_session_that_ends_waits_for_nobody_and_is_on_the_board(place, b
         release.set()
         if somebody.ident is not None:
             await asyncio.to_thread(somebody.join)
+
+
+async def test_trouble_with_boards_loses_no_step(place, begun, monkeypatch, caplog):
+    def fail(*_: object) -> None:
+        raise ValueError("no board today")
+
+    monkeypatch.setattr("rehab.boards.signals.record_changes", fail)
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0, 4.0)
+    await change(session, ChangeKind.FINISH)
+    ended = await TrainingSession.everywhere.aget(pk=session.pk)
+    assert (ended.state, ended.last_number) == ("finished", 2)
+    assert await ended.metrics.filter(slug="steps", value=2).aexists()
+    assert "no board today" in caplog.text
