@@ -39,7 +39,7 @@ INCIDENT = text("at", "reason", "recording")
 MESSAGE = text("number", "kind", "words", "confetti", "emblem", "points", "score", "streak")
 SESSION = text(
     *("created_at", "started_at", "ended_at", "state", "changed_to", "excluded", "trained_side"),
-    *("goal", "simulated", "device"),
+    *("goal", "simulated"),
 )
 FIGURES = {slug: 1000.5 + place for place, slug in enumerate(METRICS)}
 PLAN = Row(
@@ -57,7 +57,8 @@ PATIENT = Row(
 WALKED: Any = Row(
     pk=41, patient=PATIENT, to_plan=lambda: PLAN, began_at=datetime(2030, 8, 1, tzinfo=UTC),
     valence="binary", measure=Row(slug="knee", unit="deg"), active_s=593.0, legacy_id=5,
-    protocol=Row(name="Long"), belt_speed_m_s=0.7, weight_support_percent=23.0,
+    protocol=Row(name="Long"),
+    walking=Row(device="<device>", belt_speed_m_s=0.7, weight_support_percent=23.0),
     metrics=Row(all=lambda: [Row(slug=slug, value=value) for slug, value in FIGURES.items()]),
     **SESSION,
 )  # fmt: skip
@@ -85,7 +86,8 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
             "schedule": "faded", "schedule_steps": 9, "schedule_band": 0.11,
             "goal_follows": "suggest", "close_part": 0.12, "imported": True, "source": "<source>",
             "age_band": "60-69", "months_since_stroke": 17, "severity": "mild",
-            "paretic_side": "right", "belt_speed": 0.7, "weight_support": 23.0,
+            "paretic_side": "right", "device": "<device>", "belt_speed": 0.7,
+            "weight_support": 23.0,
         },
     ),
     "steps.csv": (

@@ -124,7 +124,7 @@ def test_today_lists_open_sessions_first_and_yesterdays_not_at_all(world, rosa):
     ago(rosa, "positive", strides(1, 1), NOW - timedelta(hours=3), end=ChangeKind.ABORT)
     lines = sessions_today(world.people[Role.PT], world.clinic, NOW)
     told = [(line.session.pk, line.state, line.hit_rate) for line in lines]
-    assert [state for _, state, _ in told] == ["Running", "Paused", "Finished", "Aborted"]
+    assert [state for _, state, _ in told] == ["Running", "Paused", "Finished", "Ended early"]
     assert [key for key, _, _ in told[:3]] == [runs.pk, left.pk, done.pk]
     assert told[2][2] == "75\N{NO-BREAK SPACE}%"
     assert [line.time for line in lines][:3] == ["08:00", "Sep 14, 10:00", "09:00"]

@@ -141,7 +141,7 @@ def test_a_session_without_a_stride_has_a_page(world, patient, walked):
     session = walk(patient, "explicit", walked, end=ChangeKind.ABORT)
     words = read(world, session)
     assert ("No strides recorded." in words) == (not walked)
-    assert "Aborted" in words
+    assert "Ended early" in words
 
 
 def test_the_chart_shows_every_stride_once(world, patient):
