@@ -45,9 +45,9 @@ FIGURES = {slug: 1000.5 + place for place, slug in enumerate(METRICS)}
 PLAN = Row(
     target=Row(hit_rate=0.61, duration_s=602),
     activation_threshold=0.83,
-    cue_timing=Row(rule=Row(value="streaks"), window_s=6.4, count=7, rest_s=8.5),
-    schedule=Row(kind=Row(value="faded"), interval=9, band=0.11),
-    adaptation=Row(mode=Row(value="suggest")),
+    cue_timing=Row(rule="streaks", window_s=6.4, count=7, rest_s=8.5),
+    schedule=Row(kind="faded", interval=9, band=0.11),
+    adaptation=Row(mode="suggest"),
     close_steps=Row(part=0.12),
 )
 PATIENT = Row(
