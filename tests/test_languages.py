@@ -36,9 +36,9 @@ ALIKE_IN = {
     "de": "arm code codes design feedback hedges minus monitor name normal passkey patient pause "
     "person phase plan plus sensor start tablet tablets training",
     "fr": "code correction corrections date description migrations minutes moment normal options "
-    "pages participant participants patient patients pause performance phase phases plan plus point "
-    "points position questionnaire questionnaires questions robot signature source type variation "
-    "version",
+    "pages participant participants patient patients pause performance phase phases plan plus "
+    "point points position questionnaire questionnaires questions robot signature source type "
+    "variation version",
 }
 
 
