@@ -78,6 +78,13 @@ def test_a_kobuki_s_own_feelers():
         assert hazard not in stage.base.read().sensors.hazards
 
 
+def test_a_bump_that_ended_before_it_was_read_is_read_once(stage):
+    stage.tell(BUMPER.name, {"data": True})
+    stage.tell(BUMPER.name, {"data": False})
+    assert "bump" in stage.base.read().sensors.hazards
+    assert "bump" not in stage.base.read().sensors.hazards
+
+
 def test_odometry_that_jumps_stops_it(stage):
     stage.begin_moving()
     stage.robot.x_m += 2.0
