@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from rehab.exports.research.bids import dataset_files
 from rehab.exports.session_table import SessionRow
 from rehab.exports.step_tables import StepRow
 from rehab.exports.table import WHOSE, Type
@@ -138,6 +139,14 @@ def test_every_table_begins_with_whose_it_is():
     assert [(column.name, column.get(WALKED)) for column in WHOSE] == [
         *(("session", 41), ("patient", "P-1"))
     ]
+
+
+def test_a_stroke_in_the_month_of_the_session_is_not_missing_in_motion_data():
+    people = [{"participant_id": "sub-1", "months_since_stroke": 0, "severity": ""}]
+    text_of = dict(dataset_files(people, "1"))["participants.tsv"]
+    header, row = (line.split("\t") for line in text_of.splitlines())
+    cells = dict(zip(header, row, strict=True))
+    assert (cells["months_since_stroke"], cells["severity"]) == ("0", "n/a")
 
 
 def test_the_codebook_explains_every_column():

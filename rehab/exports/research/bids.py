@@ -116,7 +116,7 @@ class EventSink:
 
 
 def _format(value: Any) -> str:
-    if value is None:
+    if value is None or value == "":
         return MISSING
     return str(int(value)) if isinstance(value, bool) else str(value)
 
@@ -147,8 +147,8 @@ def dataset_files(
     yield "participants.json", _json(about)
     lines = ["\t".join(["participant_id", *about])]
     for row in participants:
-        cells = [row["participant_id"], *(row.get(name) or MISSING for name in about)]
-        lines.append("\t".join(map(str, cells)))
+        cells = [row["participant_id"], *(_format(row.get(name)) for name in about)]
+        lines.append("\t".join(cells))
     yield "participants.tsv", "\n".join(lines) + "\n"
     events = {
         "onset": {"Description": "Seconds from the first stride that was received."},
