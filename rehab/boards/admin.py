@@ -76,14 +76,8 @@ class LeaderboardAdmin(PreviewAdmin):
             _("Who and what"),
             {
                 "fields": (
-                    "name",
-                    "among",
-                    "group",
-                    "metric",
-                    "aggregation",
-                    "mean_of",
-                    "types",
-                    "valences",
+                    *("name", "among", "group", "metric", "aggregation", "mean_of"),
+                    *("types", "valences"),
                 )
             },
         ),
@@ -91,10 +85,8 @@ class LeaderboardAdmin(PreviewAdmin):
             _("Which sessions"),
             {
                 "fields": (
-                    "period",
-                    ("period_from", "period_to"),
-                    ("min_valid_strides", "min_minutes"),
-                    "include_simulated",
+                    *("period", ("period_from", "period_to")),
+                    *(("min_valid_strides", "min_minutes"), "include_simulated"),
                 )
             },
         ),
@@ -102,14 +94,8 @@ class LeaderboardAdmin(PreviewAdmin):
             _("How it is shown"),
             {
                 "fields": (
-                    "occasion",
-                    "display",
-                    "top_n",
-                    "total_goal",
-                    "names",
-                    "show_ranks",
-                    "min_participants",
-                    "active",
+                    *("occasion", "display", "top_n", "total_goal", "names"),
+                    *("show_ranks", "min_participants", "active"),
                 )
             },
         ),
