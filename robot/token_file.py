@@ -6,6 +6,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from robot.atomic_file import write_atomically
+
 
 class TokenFile:
     """A file that only its owner can read; ``notify`` is called with lines for a person."""
@@ -20,25 +22,9 @@ class TokenFile:
         return os.access(self._path, os.W_OK) and os.access(self._path.parent, os.W_OK)
 
     def keep(self, token: str) -> bool:
-        """Store a token in place of the old one; return whether the disk has it.
-
-        After a power cut there is the old one or the new one, whole.
-        """
-        new = self._path.with_name(f"{self._path.name}.new")
+        """Store a token in place of the old one; return whether the disk has it."""
         try:
-            new.unlink(missing_ok=True)
-            file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(file, "w", encoding="ascii") as text:
-                text.write(f"{token}\n")
-                text.flush()
-                os.fsync(text.fileno())
-            new.replace(self._path)
-            if os.name == "posix":
-                folder = os.open(self._path.parent, os.O_RDONLY)
-                try:
-                    os.fsync(folder)
-                finally:
-                    os.close(folder)
+            write_atomically(self._path, f"{token}\n".encode("ascii"))
         except OSError as problem:
             self._notify(
                 f"The server gave a new token, which {self._path} cannot take "

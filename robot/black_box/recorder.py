@@ -7,7 +7,6 @@ the last seconds: they are written every half second, but the disk is not told t
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -16,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from robot.atomic_file import write_atomically
 from robot.black_box.ring import Ring
 from robot.wire.incident import Record, pack, read_lines, to_lines
 
@@ -147,12 +147,7 @@ class BlackBox:
         from_s, until_s = keeping.at_s - BEFORE_S, keeping.at_s + AFTER_S
         kept: list[Record] = [one for one in recorded if from_s <= one["at_s"] <= until_s]
         path = self.folder / f"incident-{keeping.at:%Y%m%dT%H%M%S%fZ}-{keeping.reason}.jsonl"
-        unfinished = path.with_suffix(".new")
-        with unfinished.open("w", encoding="utf-8") as file:
-            file.write(to_lines(kept))
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
+        write_atomically(path, to_lines(kept).encode(), mode=0o644)
         for old in sorted(self.folder.glob("incident-*.jsonl"))[:-KEPT_FILES]:
             old.unlink()
         return kept
