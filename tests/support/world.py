@@ -57,7 +57,7 @@ NOW = START  # the moment at which a test begins
 RECORDED = [
     {"at_s": 10.0, "tick": [0.2, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0]},
     {"at_s": 10.5, "tick": [0.2, 0.0, 0.1, 0.0, 0.0, 0.2, 0.0], "hazards": ["bump"]},
-    {"at_s": 10.5, "kept": "bump", "is_first": True},
+    {"at_s": 10.5, "retained": "bump", "is_first": True},
     {"at_s": 10.7, "tick": [0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.0]},
 ]
 
