@@ -137,7 +137,8 @@ async def test_robots_hear_heartbeats_in_parts_one_after_the_other(live_path, mo
     heard: list[tuple[int, str]] = []
 
     def make_robot(number: int) -> SimpleNamespace:
-        return SimpleNamespace(queue_text=lambda text: heard.append((number, text)))
+        outbox = SimpleNamespace(queue_text=lambda text: heard.append((number, text)))
+        return SimpleNamespace(outbox=outbox)
 
     robots = range(21, 21 + 7 * routines.PARTS)
     for number in range(1, robots.stop):
