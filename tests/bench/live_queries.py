@@ -73,7 +73,7 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     found = loading.load_together(keys[:1])[keys[0]]
     assert isinstance(found, loading.LoadedSession), found
     aggregate = found.aggregate
-    yield "load one", lambda: loading.load(keys[1])
+    yield "load one", lambda: loading.load_together([keys[1]])
     yield "load fifty", lambda: loading.load_together(keys[2:52])
 
     def job(rows: Any, summary: Any = None) -> Job:

@@ -28,7 +28,7 @@ class CorrectionForm(forms.Form):
     """The new values of a session, and the reason.
 
     The page sends each field with its initial value: only fields that differ from it are changed,
-    and none is where somebody else has corrected the session meanwhile.
+    and none is where another user has corrected the session meanwhile.
     """
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(
