@@ -86,7 +86,7 @@ MIDDLEWARE = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.web.language.LanguageMiddleware",
-    "rehab.people.web.local_time.LocalTimeMiddleware",
+    "rehab.people.web.language.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "rehab.people.sign_in.lockout.LockoutMiddleware",
 ]

@@ -57,11 +57,13 @@ def for_roles(
     """
 
     def declare(view: ViewT) -> ViewT:
-        view.access = frozenset(roles)  # type: ignore[attr-defined]
-        view.tablets = tablets  # type: ignore[attr-defined]
-        view.enrolling = enrolling  # type: ignore[attr-defined]
-        view.patients = patients  # type: ignore[attr-defined]
-        view.exports = exports  # type: ignore[attr-defined]
+        vars(view).update(
+            access=frozenset(roles),
+            tablets=tablets,
+            enrolling=enrolling,
+            patients=patients,
+            exports=exports,
+        )
         return view
 
     return declare

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from django.db.models import ProtectedError
 from django.test import Client
 from django.urls import reverse
 
@@ -24,6 +25,16 @@ pytestmark = pytest.mark.django_db
 
 def last_of(row) -> HistoryEntry:
     return HistoryEntry.everywhere.filter(model_name=type(row).__name__, object_id=row.pk).first()
+
+
+def test_an_account_that_has_changed_something_is_never_deleted(world):
+    """The digest of what it did names it: accounts are switched off instead."""
+    newcomer = User.everywhere.create_user("new", role=Role.PT, clinic=world.clinic)
+    HistoryEntry.everywhere.create(
+        clinic=world.clinic, model_name="Patient", object_id=1, kind="added", by=newcomer
+    )
+    with pytest.raises(ProtectedError):
+        newcomer.delete()
 
 
 @pytest.mark.parametrize("model", TRACKED, ids=lambda model: model.__name__)

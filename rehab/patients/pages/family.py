@@ -22,7 +22,7 @@ from rehab.patients.family import (
     find_link,
     give_link,
     note_opening,
-    why_not,
+    refusal_reason,
 )
 from rehab.patients.pages.records import get_patient
 from rehab.patients.visits import next_visit
@@ -110,7 +110,7 @@ def _render_links(request: HttpRequest, patient: Patient, **given: str) -> HttpR
     context = {
         "patient": patient,
         "links": [(link, link.is_over(now)) for link in rows.select_related("created_by")[:20]],
-        "why_not": why_not(patient),
+        "refusal_reason": refusal_reason(patient),
         "weeks": WEEKS,
         **given,
     }

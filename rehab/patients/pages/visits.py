@@ -17,7 +17,7 @@ from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, plan_visit, suggested
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.people.web.row_keys import read_key
+from rehab.people.row_values import read_key
 from rehab.sessions.formatting import clinic_time
 
 MAX_AHEAD = timedelta(days=366)

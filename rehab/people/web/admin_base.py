@@ -20,10 +20,9 @@ from rehab.people.access import user_of
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
-from rehab.people.row_values import read_values, save_changes
+from rehab.people.row_values import read_key, read_values, save_changes
 from rehab.people.scope import ScopedModel, visible_rows
 from rehab.people.web.row_forms import ClinicForm
-from rehab.people.web.row_keys import read_key
 
 AS_READ = "values of a row as they were read"
 

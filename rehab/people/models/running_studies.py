@@ -1,4 +1,4 @@
-"""Whose sessions an account must not see, since it would learn what a study hides from it."""
+"""Patients of running studies, and whose sessions these hide from an account."""
 
 from __future__ import annotations
 
