@@ -140,9 +140,3 @@ def test_nobody_plans_for_another_clinic(world):
     answer = world.pt.post(f"/patients/{birch.patient.pk}/visits/", {"in": "1"})
     assert answer.status_code == 404
     assert Visit.everywhere.count() == before
-
-
-def test_going_back_asks_the_server_anew(world):
-    """An old list would offer a start that has happened."""
-    for page in ("/start/", f"/patients/{world.patient.pk}/"):
-        assert "no-store" in world.pt.get(page).headers["Cache-Control"]

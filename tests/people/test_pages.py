@@ -82,14 +82,6 @@ def test_a_code_that_is_taken_is_refused_in_words(world):
     assert "already exists" in page.content.decode()
 
 
-def test_a_form_refuses_a_station_of_another_clinic(world):
-    birch = build_world("birch")
-    form = {"station": birch.rows[Station].pk, "kind": "source", "name": "Stray"}
-    page = world.lead.post("/admin/rehab/device/add/", form)
-    assert "Select a valid choice" in page.content.decode()
-    assert not Device.everywhere.filter(name="Stray").exists()
-
-
 def test_a_new_devices_token_is_shown_once_and_opens_until_revoked(world):
     client = world.lead
     form = {"station": world.rows[Station].pk, "kind": "source", "name": "Treadmill"}

@@ -24,9 +24,8 @@ from rehab.patients.family import (
     note_opening,
     refusal_reason,
 )
-from rehab.patients.pages.records import get_patient
 from rehab.patients.visits import next_visit
-from rehab.people.access import for_roles, public, user_of
+from rehab.people.access import for_roles, get_patient, public, user_of
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.rate_limits import TokenBuckets

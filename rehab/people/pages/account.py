@@ -53,8 +53,7 @@ def confirm_reset(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     confirmed = resets.confirm_request(user, read_key(request.POST.get("which", "")), now)
     if confirmed is not None:
-        address = client_address(request)
-        record_security_change(Act.RESET, user, confirmed.account, address, now)
+        record_security_change(Act.RESET, request, confirmed.account, now)
         message = _("%(host)s may now reset %(account)s, once within an hour.")
         names = {"host": confirmed.asked_by, "account": confirmed.account}
         messages.success(request, message % names)

@@ -6,13 +6,13 @@ from typing import Any
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import get_object_or_404, redirect, render
+from django.shortcuts import redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
-from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.access import clinic_of, for_roles, get_patient, user_of
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (
     active_consents,
@@ -50,8 +50,7 @@ LEVELS = {
 def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Show a patient's consents; a POST records the answer to one of them."""
     user = user_of(request)
-    patients = Patient.objects.visible_to(user).select_related("clinic")
-    patient = get_object_or_404(patients, pk=patient_id)
+    patient = get_patient(user, patient_id)
     if request.method == "POST" and patient.erased_at is None:
         purpose, answer = request.POST.get("purpose"), request.POST.get("answer", "")
         if purpose == Purpose.BOARDS and answer in BoardsConsent.values:
