@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,7 @@ from django.core.checks import CheckMessage, run_checks
 from django.core.management import get_commands
 
 from garry_site import settings as own_settings
-from tests.support.servers import ROOT, clean_environment
+from tests.support.servers import run_python, try_python
 
 HOSTED = {
     "GARRY_HOSTED": "1",
@@ -25,16 +23,7 @@ HOSTED = {
 
 def check(tmp_path: Path, *arguments: str, **variables: str) -> tuple[int, str]:
     """Run `manage.py check` as an operator would, with nothing but these variables."""
-    clean = clean_environment(tmp_path, 8000)
-    del clean["GARRY_PORT"]
-    result = subprocess.run(
-        [sys.executable, "manage.py", "check", *arguments],
-        cwd=ROOT,
-        env=clean | variables,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    result = try_python(tmp_path, "manage.py", "check", *arguments, **variables)
     return result.returncode, result.stdout + result.stderr
 
 
@@ -96,14 +85,7 @@ def test_no_server_command_starts_a_hosted_server_that_strangers_could_enter(
     tmp_path, server, fault
 ):
     variables, said = UNSAFE[fault]
-    started = subprocess.run(
-        [sys.executable, *SERVERS[server]],
-        cwd=ROOT,
-        env=clean_environment(tmp_path, 8000) | HOSTED | variables,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    started = try_python(tmp_path, *SERVERS[server], **HOSTED | variables)
     assert started.returncode != 0
     assert said in started.stderr
 
@@ -170,17 +152,7 @@ with connection.cursor() as cursor:
 
 def look_at_sqlite(folder: Path) -> str:
     """Open the database of a data folder in a process of its own; return what it says."""
-    environment = clean_environment(folder, 8000)
-    done = subprocess.run(
-        [sys.executable, "-c", LOOK_AT_SQLITE],
-        cwd=ROOT,
-        env=environment | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},
-        capture_output=True,
-        text=True,
-        umask=0o022,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return run_python(folder, "-c", LOOK_AT_SQLITE, umask=0o022)
 
 
 @pytest.mark.server
