@@ -180,7 +180,7 @@ PROXIES = number(
 # --- languages, time, files ---------------------------------------------------------------------
 
 LANGUAGE_CODE = "en"  # of programs and commands, and of browsers that know none of these
-# Where nobody who grew up with a language has read it yet, its name says so.
+# A language that no native speaker has reviewed says so in its name.
 LANGUAGES = [
     ("en", "English"),
     ("es", "Español"),

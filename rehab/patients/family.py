@@ -146,7 +146,7 @@ def find_link(token: str, now: datetime) -> FamilyLink | None:
     hashed = hash_token(token)
     rows = FamilyLink.everywhere.select_related("patient__clinic")
     link = rows.filter(token_hash=hashed).first()
-    # A digest of 256 random bits: how long the database takes to find it tells nothing of it.
+    # A digest of 256 random bits: how long the database takes to find it reveals nothing.
     if link is None or not secrets.compare_digest(link.token_hash, hashed):
         return None
     return None if link.is_over(now) or refusal_reason(link.patient) else link

@@ -60,7 +60,7 @@ def end_patient_program(request: HttpRequest, patient_id: int) -> HttpResponse:
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
-    message = _("%(patient)s's program has ended. Give the summary along.")
+    message = _("%(patient)s's program has ended. Hand over the summary.")
     messages.success(request, message % {"patient": patient.nickname})
     return redirect("patient", patient_id=patient.pk)
 

@@ -128,7 +128,7 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         """Return whether this person may reset how an account signs in; where not, say why."""
         user = user_of(request)
         if account.pk == user.pk:
-            messages.error(request, gettext("Your own you change on the page Your account."))
+            messages.error(request, gettext("Change your own on the page Your account."))
             return False
         if resets.may_reset(user, account, timezone.now()):
             return True

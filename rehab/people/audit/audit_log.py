@@ -69,7 +69,7 @@ class Act(models.TextChoices):
     ROBOT_TRIAL = "robot_trial", _("Tried a gesture on the robot")
 
 
-# What an account's own page of sign-ins tells.
+# What an account's own page of sign-ins lists.
 SIGN_IN_ACTS = (
     *(Act.SIGN_IN, Act.SIGN_IN_FAILED, Act.LOCK_OUT, Act.SIGN_INS_ENDED, Act.PASSWORD),
     *(Act.FACTOR_ADDED, Act.FACTOR_REMOVED, Act.RECOVERY_CODES, Act.TOKEN_USE, Act.REFUSED),

@@ -33,7 +33,7 @@ class SealableModel(AppendOnlyModel):
     """A row of a log, with a digest of its values.
 
     The digest outlives the values: an erasure empties these and removes the salt, without which
-    nobody can try out what they were. `seals` chains the digests.
+    no one can guess what they were. `seals` chains the digests.
     """
 
     sealed_fields: ClassVar[tuple[str, ...]]

@@ -53,7 +53,7 @@ def first_password() -> str | None:
     """Return the first account's generated password; None once it has been changed.
 
     Creates clinic and account where there is no account yet. Until the password is changed it is
-    kept in a file that only the server's user can read.
+    stored in a file that only the server's user can read.
     """
     file: Path = settings.DATA_DIR / "first_password"
     if not User.everywhere.exists():
