@@ -12,7 +12,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Patient, User
-from rehab.people.web.row_keys import read_key
+from rehab.people.row_values import read_key
 from rehab.sessions.corrections import (
     CorrectedField,
     Values,
