@@ -68,7 +68,17 @@ class StatusReporter:
         self.on_report(report)
 
     def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
-        """Report that a gesture has started or ended."""
+        """Report that a gesture has started or ended.
+
+        Parameters
+        ----------
+        gesture
+            The gesture.
+        phase
+            ``started`` or ``ended``.
+        outcome
+            How it ended, as a code; empty at its start.
+        """
         report = {"kind": "gesture", "name": gesture.name, "phase": phase, "outcome": outcome}
         is_open = not self._base.abilities.closed_loop
         self.report(report | {"open_loop": True} if is_open else report)
