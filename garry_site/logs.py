@@ -59,5 +59,5 @@ class JsonFormatter(logging.Formatter):
             "request": request_id.get(),
             "traceback": self.formatException(record.exc_info) if record.exc_info else "",
         }
-        told = json.dumps({name: value for name, value in line.items() if value})
-        return SECRET_ADDRESS.sub(r"\1...", told)
+        text = json.dumps({name: value for name, value in line.items() if value})
+        return SECRET_ADDRESS.sub(r"\1...", text)

@@ -86,7 +86,7 @@ MIDDLEWARE = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.web.language.LanguageMiddleware",
-    "rehab.people.web.local_time.LocalTimeMiddleware",
+    "rehab.people.web.language.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "rehab.people.sign_in.lockout.LockoutMiddleware",
 ]
@@ -180,7 +180,7 @@ PROXIES = number(
 # --- languages, time, files ---------------------------------------------------------------------
 
 LANGUAGE_CODE = "en"  # of programs and commands, and of browsers that know none of these
-# Where nobody who grew up with a language has read it yet, its name says so.
+# A language that no native speaker has reviewed says so in its name.
 LANGUAGES = [
     ("en", "English"),
     ("es", "Español"),

@@ -75,7 +75,7 @@ def start_tracing() -> bool:
         )
         return False
     name = os.environ.get("OTEL_SERVICE_NAME", "garry")
-    # At the end nobody waits for a collector: what it has not taken by then is lost.
+    # The end does not wait for a collector: what it has not taken by then is lost.
     resource = Resource.create({"service.name": name})
     provider = TracerProvider(resource=resource, shutdown_on_exit=False)
     provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter()))

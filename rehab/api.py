@@ -129,7 +129,9 @@ def on_suspicious_operation(request: HttpRequest, problem: SuspiciousOperation) 
 def on_server_error(request: HttpRequest, problem: Exception) -> HttpResponse:
     """Log an error of ours, and answer without its details."""
     log.error("A call of the API failed: %s", request.path, exc_info=problem)
-    return problem_response(request, 500, "The server failed. Try again, or tell who runs it.")
+    return problem_response(
+        request, 500, "The server failed. Try again, or report it to its administrator."
+    )
 
 
 @public

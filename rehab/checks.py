@@ -151,39 +151,6 @@ def check_variables(**_: Any) -> list[CheckMessage]:
     ]
 
 
-@register()
-def check_durability(**_: Any) -> list[CheckMessage]:
-    """Check that SQLite writes each commit through to the disk."""
-    database = settings.DATABASES["default"]
-    if not database["ENGINE"].endswith("sqlite3"):
-        return []
-    command = database.get("OPTIONS", {}).get("init_command", "").replace(" ", "").lower()
-    if "synchronous=full" in command and "journal_mode=wal" in command:
-        return []
-    return [
-        Error(
-            "SQLite may lose acknowledged steps in a power cut.",
-            hint="Keep journal_mode=WAL and synchronous=FULL in the database's init_command.",
-            id="garry.E009",
-        )
-    ]
-
-
-@register()
-def check_application_order(**_: Any) -> list[CheckMessage]:
-    """Check that `rehab` comes before daphne, so that its commands take precedence."""
-    apps = settings.INSTALLED_APPS
-    if apps.index("rehab") < apps.index("daphne"):
-        return []
-    return [
-        Error(
-            "The application daphne is listed before rehab and replaces its commands.",
-            hint="List rehab first in INSTALLED_APPS.",
-            id="garry.E010",
-        )
-    ]
-
-
 @register(Tags.models)
 def check_personal_fields(**_: Any) -> list[CheckMessage]:
     """Check that each field about a patient says what becomes of it."""

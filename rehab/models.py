@@ -1,33 +1,22 @@
 """The models of all rooms, and the list of those with a change history."""
 
-from rehab.boards.changes import BoardChange
+from rehab.boards import changes, snapshots  # noqa: F401  (these register their models)
 from rehab.boards.models import Leaderboard
-from rehab.boards.snapshots import BoardSnapshot
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
-from rehab.patients.family import FamilyLink
-from rehab.patients.visits import Visit
-from rehab.people.audit.audit_log import AuditEntry
-from rehab.people.audit.history import HistoryEntry
-from rehab.people.audit.seals import LogSeal
-from rehab.people.consent.models import Consent, ConsentText
-from rehab.people.consent.tombstones import ImportTombstone
+from rehab.patients import family, visits  # noqa: F401
+from rehab.people.audit import seals  # noqa: F401
+from rehab.people.consent import tombstones  # noqa: F401
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.sign_in.attempts import SignInAttempts
-from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
-from rehab.people.sign_in.resets import ResetRequest
+from rehab.people.sign_in import attempts, resets  # noqa: F401
+from rehab.people.sign_in.factors import factors  # noqa: F401
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.incidents import RobotIncident
-from rehab.sessions.log import SessionEvent, SessionMetric, Step
-from rehab.sessions.models import TrainingSession
-from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
+from rehab.sessions import corrections, incidents, log, models  # noqa: F401
+from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
-from rehab.stations.models import Device, Pairing, PinAttempts, Station
-from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
-from rehab.studies.power_runs import PowerRun
+from rehab.stations.models import Device, Station
+from rehab.studies import participants, power_runs  # noqa: F401
 
 # People and settings. Sessions, consents and studies are logs themselves.
 TRACKED = (
@@ -48,55 +37,3 @@ TRACKED = (
     Questionnaire,
     Leaderboard,
 )
-
-__all__ = [
-    "TRACKED",
-    "Allocation",
-    "ApiToken",
-    "Arm",
-    "AuditEntry",
-    "Authenticator",
-    "BoardChange",
-    "BoardSnapshot",
-    "Clinic",
-    "ComposedGesture",
-    "Consent",
-    "ConsentText",
-    "Device",
-    "Enrollment",
-    "FamilyLink",
-    "FeedbackBand",
-    "FeedbackType",
-    "GestureStep",
-    "HistoryEntry",
-    "ImportTombstone",
-    "Leaderboard",
-    "LogSeal",
-    "MeasureDefinition",
-    "Pairing",
-    "Patient",
-    "PinAttempts",
-    "PowerRun",
-    "Preset",
-    "Protocol",
-    "ProtocolPhase",
-    "Questionnaire",
-    "QuestionnaireResponse",
-    "RecoveryCode",
-    "ResetRequest",
-    "RobotIncident",
-    "SessionCorrection",
-    "SessionEvent",
-    "SessionMetric",
-    "SignInAttempts",
-    "Station",
-    "Step",
-    "Study",
-    "StudyEvent",
-    "StudyMark",
-    "StudyVersion",
-    "StudyVisit",
-    "TrainingSession",
-    "User",
-    "Visit",
-]

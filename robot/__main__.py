@@ -21,14 +21,19 @@ import signal
 import sys
 import threading
 import time
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
 from robot import calibrate, doctor, play_gesture, replay
-from robot.base_options import add_base_arguments, make_base
+from robot.base_options import (
+    add_base_arguments,
+    make_base,
+    make_command_parser,
+    print_notice,
+)
 from robot.bases import BadOption, BaseLost
 from robot.bases.twin.__main__ import main as run_twin
 from robot.black_box.recorder import BlackBox
@@ -48,17 +53,21 @@ ROBOT_PATH = "/ws/robot/"
 
 BLACK_BOX = "~/.local/state/garry/black_box"
 
+# What follows `python -m robot`: its own arguments are those behind it.
+COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
+    "calibrate": calibrate.main,
+    "doctor": doctor.main,
+    "gesture": play_gesture.main,
+    "replay": replay.main,
+    "twin": run_twin,
+}
 DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def make_parser() -> ArgumentParser:
     """Return the command line's parser."""
-    parser = ArgumentParser(
-        prog="python -m robot",
-        description=__doc__,
-        epilog="The token may also be in the environment, as GARRY_ROBOT_TOKEN.",
-        formatter_class=RawDescriptionHelpFormatter,
-    )
+    parser = make_command_parser("", __doc__)
+    parser.epilog = "The token may also be in the environment, as GARRY_ROBOT_TOKEN."
     add_base_arguments(parser)
     parser.add_argument(
         "--original-topics",
@@ -71,7 +80,7 @@ def make_parser() -> ArgumentParser:
         "--black-box",
         default=os.environ.get("GARRY_ROBOT_BLACK_BOX", BLACK_BOX),
         metavar="FOLDER",
-        help="where to record the last minutes, and keep those around a stop; off for nowhere "
+        help="where to record the last minutes, and retain those around a stop; off for nowhere "
         "(default: GARRY_ROBOT_BLACK_BOX, or ~/.local/state/garry/black_box)",
     )
     add_connection_arguments(parser)
@@ -83,11 +92,6 @@ def find_black_box(named: str, own: str) -> Path | None:
     if named in ("", "off"):
         return None
     return Path(named).expanduser() / sha256(own.encode()).hexdigest()[:12]
-
-
-def print_notice(text: str) -> None:
-    """Print a line to standard error."""
-    print(text, file=sys.stderr, flush=True)
 
 
 async def wait_for_end(is_child: bool) -> None:
@@ -152,7 +156,7 @@ def run(options: Namespace) -> int:
             )
         make_worker = partial(
             Worker,
-            partial(Link, url, token, keep_token=find_token_store(options, print_notice)),
+            partial(Link, url, token, store_token=find_token_store(options, print_notice)),
             base,
             originals=originals,
             black_box=box,
@@ -175,16 +179,8 @@ def run(options: Namespace) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command of the command line, and return the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words[:1] == ["doctor"]:
-        return doctor.main(words[1:])
-    if words[:1] == ["calibrate"]:
-        return calibrate.main(words[1:])
-    if words[:1] == ["gesture"]:
-        return play_gesture.main(words[1:])
-    if words[:1] == ["replay"]:
-        return replay.main(words[1:])
-    if words[:1] == ["twin"]:
-        return run_twin(words[1:])
+    if words and words[0] in COMMANDS:
+        return COMMANDS[words[0]](words[1:])
     options = make_parser().parse_args(words)
     try:
         return run(options)

@@ -2,11 +2,65 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+import sys
+import time
+from argparse import (
+    ArgumentParser,
+    ArgumentTypeError,
+    Namespace,
+    RawDescriptionHelpFormatter,
+)
 from collections.abc import Callable, Collection
+from typing import TextIO
 
 from robot.bases import BASES, MobileBase
 from robot.ros.bridge import find_bridge, is_address
+
+
+class VirtualClock:
+    """A clock that only ``sleep`` advances."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        """Return the time [s]."""
+        return self.now_s
+
+    def sleep(self, span_s: float) -> None:
+        """Advance the clock by a span [s]."""
+        self.now_s += span_s
+
+
+def clock_of(base: str) -> tuple[Callable[[], float], Callable[[float], None]]:
+    """Return the clock [s] that a base runs by, and how to wait by it [s].
+
+    It is the computer's, or a virtual one for a base that does not run in real time.
+    """
+    if BASES[base].abilities.real_time:
+        return time.monotonic, time.sleep
+    clock = VirtualClock()
+    return clock.monotonic, clock.sleep
+
+
+def make_command_parser(name: str, description: str | None) -> ArgumentParser:
+    """Return the parser of `python -m robot NAME`, without arguments yet."""
+    return ArgumentParser(
+        prog=f"python -m robot {name}".rstrip(),
+        description=description,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+
+
+def print_line(text: str, file: TextIO) -> None:
+    """Print a line, unless it is empty."""
+    if text:
+        print(text, file=file, flush=True)
+
+
+def print_notice(text: str) -> None:
+    """Print a line to standard error, unless it is empty."""
+    print_line(text, sys.stderr)
 
 
 def add_base_arguments(parser: ArgumentParser, names: Collection[str] = BASES) -> None:

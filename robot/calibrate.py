@@ -11,12 +11,16 @@ from __future__ import annotations
 
 import math
 import sys
-import time
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
-from robot.base_options import add_base_arguments, make_base
+from robot.base_options import (
+    add_base_arguments,
+    clock_of,
+    make_base,
+    make_command_parser,
+    print_line,
+    print_notice,
+)
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.behavior.performer import Performer, control_loop
 from robot.calibration import BadCalibration, store_calibration
@@ -24,7 +28,6 @@ from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.limits import TICK_S
 from robot.motion.player import DONE
 from robot.motion.response import Response
-from robot.play_gesture import VirtualClock
 
 REST_S = 4.0
 TIMES = 2
@@ -46,28 +49,17 @@ class NotMeasured(RuntimeError):
     """A base that could not be measured; the message says why."""
 
 
-@dataclass
-class TurnsByWheels:
-    """How far the wheels say that it turned, for each turn by the gyro."""
-
-    products: float = 0.0
-    squares: float = 0.0
-
-    def add(self, heading_rad: float, slip_rad: float) -> None:
-        """Add a heading by the gyro, and what the wheels say more [rad]."""
-        self.products += heading_rad * (heading_rad + slip_rad)
-        self.squares += heading_rad**2
-
-    @property
-    def scale(self) -> float:
-        """The slope of a line through the origin."""
-        return self.products / self.squares
-
-
 def measure(
     base: MobileBase, monotonic: Callable[[], float], sleep: Callable[[float], object]
 ) -> Response:
     """Return how an open base answers; a real one is armed by this.
+
+    Parameters
+    ----------
+    base
+        The base; it needs odometry.
+    monotonic, sleep
+        The clock [s] that it runs by, and how to wait by it.
 
     Raises
     ------
@@ -77,7 +69,8 @@ def measure(
         Where it does not answer any more.
     """
     base.calibrate(Response())
-    performer, turns = Performer(base), TurnsByWheels()
+    performer = Performer(base)
+    by_both, by_gyro = 0.0, 0.0  # headings by the gyro times those by the wheels, and by themselves
     for _ in range(round(REST_S / TICK_S)):
         base.stop()
         base.read()
@@ -90,7 +83,9 @@ def measure(
             performer, monotonic, lambda: not performer.body.player.is_busy
         ):
             there = performer.body.state
-            turns.add(there.pose.heading_rad, there.sensors.slip_rad)
+            heading_rad = there.pose.heading_rad
+            by_both += heading_rad * (heading_rad + there.sensors.slip_rad)
+            by_gyro += heading_rad**2
             sleep(pause_s)
         if performer.body.player.outcome != DONE:
             raise NotMeasured(f"It did not get there: {performer.body.player.outcome}.")
@@ -101,7 +96,7 @@ def measure(
     return Response(
         dead_time_s=round(delay_s - lag_s, 4),
         lag_s=lag_s,
-        wheel_scale=round(turns.scale, 4),
+        wheel_scale=round(by_both / by_gyro, 4),  # the slope of a line through the origin
         gyro_bias_rad_s=round(base.read().sensors.drift_rad_s, 6),
     )
 
@@ -118,30 +113,24 @@ def format_result(response: Response) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure the base of the command line, and return the exit status."""
-    parser = ArgumentParser(
-        prog="python -m robot calibrate",
-        description=__doc__,
-        formatter_class=RawDescriptionHelpFormatter,
-    )
+    parser = make_command_parser("calibrate", __doc__)
     able = sorted(
         name for name, base in BASES.items() if base.abilities.moves and base.abilities.closed_loop
     )
     add_base_arguments(parser, able)
     options = parser.parse_args(arguments)
-    clock = VirtualClock()
-    is_real = BASES[options.base].abilities.real_time
-    monotonic, sleep = (time.monotonic, time.sleep) if is_real else (clock.monotonic, clock.sleep)
+    monotonic, sleep = clock_of(options.base)
     try:
         with make_base(options, monotonic) as base:
             response = measure(base, monotonic, sleep)
             path = store_calibration(base, response)
     except (BaseLost, BadCalibration, NotMeasured) as problem:
-        sys.stderr.write(f"{problem}\n")
+        print_notice(str(problem))
         return 1
     except BadOption as problem:
-        sys.stderr.write(f"{problem}\n")
+        print_notice(str(problem))
         return 2
     except KeyboardInterrupt:
         return 130
-    sys.stdout.write(f"{format_result(response)}\nStored in {path}.\n")
+    print_line(f"{format_result(response)}\nStored in {path}.", sys.stdout)
     return 0

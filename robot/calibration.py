@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from robot.atomic_file import write_atomically
 from robot.bases import MobileBase
 from robot.motion.response import Response
 
@@ -46,9 +47,7 @@ def store_calibration(base: MobileBase, response: Response) -> Path:
     path = calibration_file()
     measured = _read(path) | {base.identity: asdict(response)}
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(".new")
-    unfinished.write_text(json.dumps(measured, indent=1) + "\n", "utf-8")
-    unfinished.replace(path)
+    write_atomically(path, f"{json.dumps(measured, indent=1)}\n".encode(), mode=0o644)
     return path
 
 

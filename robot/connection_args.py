@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import urlsplit, urlunsplit
 
-from robot.token_file import TokenFile
+from robot.atomic_file import write_atomically
 
 
 class BadConnectionArgs(ValueError):
@@ -79,20 +79,45 @@ def add_connection_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
 def find_token_store(
     options: Namespace, notify: Callable[[str], None]
 ) -> Callable[[str], bool] | None:
-    """Return what stores the next token in the command line's file; None where there is none.
+    """Return what stores the next token in the command line's file, if there is one.
 
-    Nor is there one where the file cannot be written, of which ``notify`` tells.
+    Parameters
+    ----------
+    options
+        The command line, with the arguments of ``add_connection_arguments``.
+    notify
+        Called with lines for people, such as that the file cannot be written.
+
+    Returns
+    -------
+    Callable or None
+        Stores a token, for its owner alone, and returns whether the disk has it. None where there
+        is no file, or it cannot be written.
     """
     if options.token_file is None:
         return None
-    file = TokenFile(options.token_file, notify)
-    if file.is_writable:
-        return file.keep
-    notify(
-        f"The token in {options.token_file} stays as it is, and expires 90 days after the server "
-        "has last replaced it: this account cannot write the file or its folder. Let it write both."
-    )
-    return None
+    path = options.token_file.resolve()  # not a link to it
+    if not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK)):
+        notify(
+            f"The token in {options.token_file} stays as it is, and expires 90 days after the "
+            "server has last replaced it: this account cannot write the file or its folder. Let it "
+            "write both."
+        )
+        return None
+
+    def store(token: str) -> bool:
+        try:
+            write_atomically(path, f"{token}\n".encode("ascii"))
+        except OSError as problem:
+            notify(
+                f"The server gave a new token, which cannot be written to {path} "
+                f"({problem.strerror}): the old one stays in use. Let this account write the file "
+                "and its folder, and make room."
+            )
+            return False
+        return True
+
+    return store
 
 
 def find_token(options: Namespace, variable: str, whose: str) -> str:

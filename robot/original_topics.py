@@ -49,7 +49,7 @@ FEEDBACK_TYPES = {
 WITH_GOOD_STEP = ("positive", "binary")
 
 FRESH_S = 1.0  # an event that could not be sent for this long is dropped
-KEPT = 8
+MAX_EVENTS = 8
 LATE_S = 2.0  # a message without an echo by then has not arrived
 NUMBER_MAX = 1e6
 FALSE_EVERY_S = 0.5  # a new subscriber, or one that ROS has not connected yet, misses some
@@ -65,36 +65,36 @@ class OriginalTopicClient:
     ----------
     names
         Which of ``TOPICS`` to publish on.
+
+    Attributes
+    ----------
+    is_allowed
+        Whether anything that moves a robot is published.
     """
 
     def __init__(self, names: Collection[str]) -> None:
         self._topics = [TOPICS[name] for name in names]
         self._valence = ""
         self._published = ""  # the feedback type, on this connection
-        self._events: deque[tuple[float, Topic, Mapping[str, Any]]] = deque(maxlen=KEPT)
+        self._events: deque[tuple[float, Topic, Mapping[str, Any]]] = deque(maxlen=MAX_EVENTS)
         self._unconfirmed: dict[str, float] = {}  # topic: since when its echo is missing
-        self._is_open = self._is_allowed = False
+        self._is_open = self.is_allowed = False
         self._falses = FIRST_FALSES  # so many are still to come on this connection
         self._false_s = -math.inf  # the last one
         self._true_until_s = math.inf
 
-    @property
-    def is_allowed(self) -> bool:
-        """Whether anything that moves a robot is published."""
-        return self._is_allowed
-
     def allow(self, is_allowed: bool) -> None:
         """Allow ``True`` and data where our own robot may act; else take back what was said."""
-        if self._is_allowed and not is_allowed:
+        if self.is_allowed and not is_allowed:
             self._take_back()
-        self._is_allowed = is_allowed
+        self.is_allowed = is_allowed
 
     def handle_message(self, message: Mapping[str, Any], now_s: float) -> None:
         """Handle a message of the server; a step without finite numbers is not published."""
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
-            case {"type": "step"} if self._is_allowed:
+            case {"type": "step"} if self.is_allowed:
                 with suppress(BadFrame):
                     a2, goal = (
                         read_number(message, name, -NUMBER_MAX, NUMBER_MAX)
@@ -104,7 +104,7 @@ class OriginalTopicClient:
 
     def publish_decision(self, above: bool, window_s: float, now_s: float) -> None:
         """Publish a decision: whether the window, of a length [s], was above."""
-        if self._valence in WITH_GOOD_STEP and self._is_allowed:
+        if self._valence in WITH_GOOD_STEP and self.is_allowed:
             self._add(now_s, GOOD_STEP, {"data": above})
             self._falses = 0
             self._true_until_s = now_s + HOLDS_WINDOWS * window_s if above else math.inf
@@ -125,7 +125,7 @@ class OriginalTopicClient:
             yield self._publish(FEEDBACK_TYPE, {"data": feedback_type}, now_s)
         if now_s > self._true_until_s:
             self._take_back()
-        is_false_due = self._falses > 0 or not self._is_allowed
+        is_false_due = self._falses > 0 or not self.is_allowed
         if GOOD_STEP in self._topics and is_false_due and now_s - self._false_s >= FALSE_EVERY_S:
             self._false_s, self._falses = now_s, max(self._falses - 1, 0)
             yield self._publish(GOOD_STEP, {"data": False}, now_s)

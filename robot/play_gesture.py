@@ -11,14 +11,19 @@ from __future__ import annotations
 import json
 import signal
 import sys
-import time
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
-from typing import Any, TextIO
+from typing import Any
 
-from robot.base_options import add_base_arguments, make_base
+from robot.base_options import (
+    add_base_arguments,
+    clock_of,
+    make_base,
+    make_command_parser,
+    print_line,
+    print_notice,
+)
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.behavior.performer import Performer, control_loop
 from robot.behavior.safety import BASE_SILENT, BASE_SILENT_S
@@ -30,7 +35,7 @@ from robot.motion.player import DONE
 from robot.motion.pose import HOME
 
 REST_S = 0.3  # until wheels, odometry and true pose have come to rest
-LOST_S = 60.0  # a base that was lost is waited for so long; somebody has switched it off by then
+LOST_S = 60.0  # a base that was lost is waited for so long; a person has switched it off by then
 ENDINGS = ("SIGTERM", "SIGHUP", "SIGBREAK", "SIGINT")  # those that this system has
 
 
@@ -69,21 +74,6 @@ def wait_for_stop(
         base.stop()
         sleep(TICK_S)
     return True
-
-
-class VirtualClock:
-    """A clock that only ``sleep`` advances."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def monotonic(self) -> float:
-        """Return the time [s]."""
-        return self.now_s
-
-    def sleep(self, span_s: float) -> None:
-        """Advance the clock by a span [s]."""
-        self.now_s += span_s
 
 
 def play_gesture(
@@ -154,20 +144,14 @@ def format_result(played: dict[str, Any]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play the gesture of the command line, and return the exit status."""
-    parser = ArgumentParser(
-        prog="python -m robot gesture",
-        description=__doc__,
-        formatter_class=RawDescriptionHelpFormatter,
-    )
+    parser = make_command_parser("gesture", __doc__)
     parser.add_argument("name", choices=sorted(GESTURES | ORIGINALS))
     moving = sorted(name for name, base in BASES.items() if base.abilities.moves)
     add_base_arguments(parser, moving)
     parser.add_argument("--times", type=int, default=1, metavar="N", help="so often, in a row")
     parser.add_argument("--json", action="store_true", help="print a JSON line each")
     options = parser.parse_args(arguments)
-    clock = VirtualClock()
-    is_real = BASES[options.base].abilities.real_time
-    monotonic, sleep = (time.monotonic, time.sleep) if is_real else (clock.monotonic, clock.sleep)
+    monotonic, sleep = clock_of(options.base)
     outcome = DONE
     try:
         base = make_base(options, monotonic)
@@ -179,30 +163,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print_line(text, sys.stdout)
                 outcome = played["outcome"]
                 if outcome != DONE:
-                    print_line(base.problem, sys.stderr)
+                    print_notice(base.problem)
                     break
             if outcome == BASE_SILENT and played["began"]:
-                print_line(
-                    "It may be moving: switch it off. Waiting for it, to stop it.", sys.stderr
-                )
+                print_notice("It may be moving: switch it off. Waiting for it, to stop it.")
                 if wait_for_stop(base, monotonic, sleep):
-                    print_line("It answers again, and was stopped.", sys.stderr)
+                    print_notice("It answers again, and was stopped.")
     except BaseLost as problem:
-        print_line(str(problem), sys.stderr)
+        print_notice(str(problem))
         return 1
     except (BadCalibration, BadOption) as problem:
-        print_line(str(problem), sys.stderr)
+        print_notice(str(problem))
         return 2
     except Ended as end:
         return 128 + int(end.args[0])
     return 0 if outcome == DONE else 1
-
-
-def print_line(text: str, file: TextIO) -> None:
-    """Print a line, unless it is empty."""
-    if text:
-        print(text, file=file, flush=True)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

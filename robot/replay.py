@@ -9,18 +9,22 @@ from __future__ import annotations
 
 import math
 import sys
-import time
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from robot.base_options import add_base_arguments, make_base
+from robot.base_options import (
+    add_base_arguments,
+    clock_of,
+    make_base,
+    make_command_parser,
+    print_line,
+    print_notice,
+)
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.motion.limits import TICK_S
 from robot.motion.pose import Pose, wrap
 from robot.motion.twist import Twist
-from robot.play_gesture import VirtualClock, print_line
 from robot.wire.incident import TICK, read_lines
 
 SETTLE_S = 0.3  # of a base that was just opened
@@ -51,7 +55,17 @@ def replay(
     monotonic: Callable[[], float],
     sleep: Callable[[float], object],
 ) -> Iterator[Compared]:
-    """Yield where a base is at each tick, while it gets the orders at their times."""
+    """Yield where a base is at each tick, while it gets the orders at their times.
+
+    Parameters
+    ----------
+    ticks
+        Times [s], orders and poses, as of ``read_ticks``.
+    base
+        An open simulated base.
+    monotonic, sleep
+        The clock [s] that it runs by, and how to wait by it.
+    """
     until_s = monotonic() + SETTLE_S
     while monotonic() < until_s:
         base.stop()
@@ -71,11 +85,7 @@ def replay(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Replay the file of the command line, and return the exit status."""
-    parser = ArgumentParser(
-        prog="python -m robot replay",
-        description=__doc__,
-        formatter_class=RawDescriptionHelpFormatter,
-    )
+    parser = make_command_parser("replay", __doc__)
     parser.add_argument("file", type=Path)
     simulated = [n for n, one in BASES.items() if one.abilities.simulated and one.abilities.moves]
     add_base_arguments(parser, sorted(simulated))
@@ -83,24 +93,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         ticks = read_ticks(options.file.read_text("utf-8"))
     except (OSError, ValueError) as problem:
-        print_line(f"{options.file} cannot be read: {problem}", sys.stderr)
+        print_notice(f"{options.file} cannot be read: {problem}")
         return 2
     if not ticks:
-        print_line(f"{options.file} has no ticks. Take a file of a black box.", sys.stderr)
+        print_notice(f"{options.file} has no ticks. Take a file of a black box.")
         return 2
-    clock = VirtualClock()
-    is_real = BASES[options.base].abilities.real_time
-    monotonic, sleep = (time.monotonic, time.sleep) if is_real else (clock.monotonic, clock.sleep)
+    monotonic, sleep = clock_of(options.base)
     try:
         with make_base(options, monotonic) as base:
-            told_s = -math.inf
+            printed_s = -math.inf
             for compared in replay(ticks, base, monotonic, sleep):
-                if compared.at_s - told_s >= 1.0:
-                    told_s = compared.at_s
+                if compared.at_s - printed_s >= 1.0:
+                    printed_s = compared.at_s
                     print_line(format_compared(compared), sys.stdout)
             print_line(format_compared(compared), sys.stdout)
     except (BadOption, BaseLost) as problem:
-        print_line(str(problem), sys.stderr)
+        print_notice(str(problem))
         return 2
     return 0
 
@@ -108,16 +116,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def format_compared(compared: Compared) -> str:
     """Return a line for people."""
 
-    def told(pose: Pose) -> str:
+    def describe(pose: Pose) -> str:
         turned_deg = math.degrees(wrap(pose.heading_rad))
         return f"{1000 * pose.x_m:5.0f} mm {1000 * pose.y_m:5.0f} mm {turned_deg:6.1f}°"
 
     apart_mm = 1000 * compared.recorded.distance_m(compared.replayed)
     return (
-        f"{compared.at_s:6.2f} s   recorded {told(compared.recorded)}   "
-        f"replayed {told(compared.replayed)}   apart {apart_mm:.0f} mm"
+        f"{compared.at_s:6.2f} s   recorded {describe(compared.recorded)}   "
+        f"replayed {describe(compared.replayed)}   apart {apart_mm:.0f} mm"
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

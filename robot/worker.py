@@ -168,7 +168,7 @@ class Worker:
             await self._send_incidents()
 
     async def _send_incidents(self) -> None:
-        """Send what was kept, each to the session that it is of; the others stay on this disk."""
+        """Send each incident to the session that it is of; the others stay on this disk."""
         incidents = self._black_box.incidents if self._black_box is not None else deque[Incident]()
         while incidents and self.performer.is_linked:
             incident = incidents[0]

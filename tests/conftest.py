@@ -257,6 +257,18 @@ def world(_amber: Callable[[], World], db: None) -> World:
     return _amber()
 
 
+@pytest.fixture
+def pt(world: World) -> Any:
+    """A browser in which the clinic's therapist is signed in."""
+    return world.pt
+
+
+@pytest.fixture
+def patient(world: World) -> Any:
+    """Rosa, a patient of the clinic who has not walked yet."""
+    return world.add_patient(code="B-1")
+
+
 @pytest.fixture(scope="session")
 def shared_chromium() -> Any:
     from tests.support.browsers import SharedChromium

@@ -19,11 +19,11 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.people.access import user_of
 from rehab.people.models import BoardsConsent, Patient
-from rehab.people.models.blinding import hidden_patients
+from rehab.people.models.running_studies import hidden_patients
 from rehab.people.roles import Role
+from rehab.people.row_values import read_key
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.people.web.row_forms import ClinicForm
-from rehab.people.web.row_keys import read_key
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 from rehab.training.valences import VALENCES
@@ -76,14 +76,8 @@ class LeaderboardAdmin(PreviewAdmin):
             _("Who and what"),
             {
                 "fields": (
-                    "name",
-                    "among",
-                    "group",
-                    "metric",
-                    "aggregation",
-                    "mean_of",
-                    "types",
-                    "valences",
+                    *("name", "among", "group", "metric", "aggregation", "mean_of"),
+                    *("types", "valences"),
                 )
             },
         ),
@@ -91,10 +85,8 @@ class LeaderboardAdmin(PreviewAdmin):
             _("Which sessions"),
             {
                 "fields": (
-                    "period",
-                    ("period_from", "period_to"),
-                    ("min_valid_strides", "min_minutes"),
-                    "include_simulated",
+                    *("period", ("period_from", "period_to")),
+                    *(("min_valid_strides", "min_minutes"), "include_simulated"),
                 )
             },
         ),
@@ -102,14 +94,8 @@ class LeaderboardAdmin(PreviewAdmin):
             _("How it is shown"),
             {
                 "fields": (
-                    "occasion",
-                    "display",
-                    "top_n",
-                    "total_goal",
-                    "names",
-                    "show_ranks",
-                    "min_participants",
-                    "active",
+                    *("occasion", "display", "top_n", "total_goal", "names"),
+                    *("show_ranks", "min_participants", "active"),
                 )
             },
         ),

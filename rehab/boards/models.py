@@ -29,20 +29,12 @@ from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 
 # How rows are shown, and when. All other fields decide what a board's rows are.
+# What `display` changes about eligibility is in `accepted_levels`.
 DISPLAY_FIELDS = frozenset(
-    {
-        "id",
-        "name",
-        "active",
-        "display",  # what it changes about eligibility is in `accepted_levels`
-        "top_n",
-        "total_goal",
-        "show_ranks",
-        "ties",
-        "names",
-        "min_participants",
-        "occasion",
-    }
+    (
+        *("id", "name", "active", "display", "top_n", "total_goal", "show_ranks", "ties", "names"),
+        *("min_participants", "occasion"),
+    )
 )
 
 

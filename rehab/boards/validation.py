@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import date
-from typing import Any, Protocol
+from typing import Any
 
 from django.utils.formats import date_format
 from django.utils.translation import gettext as _
@@ -29,36 +29,15 @@ COUNTING_METRICS = frozenset({"attended", "target_met"})
 FIRST_DAY, LAST_DAY = date(1970, 1, 1), date(2199, 12, 31)
 
 
-class BoardSettings(Protocol):
-    """The fields of a leaderboard that can contradict each other."""
-
-    among: str
-    types: str
-    valences: Any
-    metric: str
-    tie_breaker: str
-    aggregation: str
-    display: str
-    names: str
-    occasion: str
-    period_from: date | None
-    period_to: date | None
-    frozen_on: date | None
-
-    @property
-    def is_own(self) -> bool:
-        """Whether the board compares a patient's own sessions only."""
-
-
-def find_invalid_settings(board: BoardSettings) -> Iterator[tuple[str, str]]:
-    """Yield the fields whose settings are refused, each with what to do about it."""
+def find_invalid_settings(board: Any) -> Iterator[tuple[str, str]]:
+    """Yield the fields of a `Leaderboard` that are refused, each with what to do about it."""
     yield from _check_valences(board)
     yield from _check_days(board)
     yield from _check_rows(board)
     yield from _check_display(board)
 
 
-def _check_valences(board: BoardSettings) -> Iterator[tuple[str, str]]:
+def _check_valences(board: Any) -> Iterator[tuple[str, str]]:
     chosen = board.valences
     if not isinstance(chosen, list) or not all(slug in VALENCES for slug in chosen):
         yield (
@@ -86,7 +65,7 @@ def _check_valences(board: BoardSettings) -> Iterator[tuple[str, str]]:
             yield field, _("Explicit feedback has no points. Choose the steps at the goal.")
 
 
-def _check_days(board: BoardSettings) -> Iterator[tuple[str, str]]:
+def _check_days(board: Any) -> Iterator[tuple[str, str]]:
     for field in ("period_from", "period_to", "frozen_on"):
         day = getattr(board, field)
         if isinstance(day, date) and not FIRST_DAY <= day <= LAST_DAY:
@@ -100,7 +79,7 @@ def _check_days(board: BoardSettings) -> Iterator[tuple[str, str]]:
             )
 
 
-def _check_rows(board: BoardSettings) -> Iterator[tuple[str, str]]:
+def _check_rows(board: Any) -> Iterator[tuple[str, str]]:
     if board.is_own:
         if board.aggregation != Aggregation.EACH:
             yield (
@@ -123,7 +102,7 @@ def _check_rows(board: BoardSettings) -> Iterator[tuple[str, str]]:
         yield "aggregation", _("A total adds up what all have reached. Choose the sum.")
 
 
-def _check_display(board: BoardSettings) -> Iterator[tuple[str, str]]:
+def _check_display(board: Any) -> Iterator[tuple[str, str]]:
     if board.among == Participants.ACROSS and board.names != NameStyle.PSEUDONYM:
         yield "names", _("Across clinics there are animal names only.")
     if board.occasion == Occasion.WAITING:

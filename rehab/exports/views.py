@@ -17,8 +17,7 @@ from rehab.exports.archive import ZipResponse
 from rehab.exports.forms import ResearchExportForm
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.exports.research.package import Package, discard_old
-from rehab.patients.pages.records import get_patient
-from rehab.people.access import for_roles, user_of
+from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Patient, User

@@ -1,17 +1,17 @@
 """Strides with A2 from raw signals, while somebody walks. Pure: no Django, no clock.
 
-``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` and
-``measure_both_legs`` whole recordings with the same code. The comments of thresholds name their
+``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` a whole
+recording with the same code. The comments of thresholds name their
 sources.
 """
 
 from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector
 from rehab.gait.contacts.gyroscope_strides import GyroscopeStride, GyroscopeStrideDetector
-from rehab.gait.offline import measure_both_legs, measure_strides
+from rehab.gait.offline import make_detector, measure_strides
 from rehab.gait.online import StrideDetector
 from rehab.gait.selfcheck.checks import Finding, SignalCheck, check_signals
 from rehab.gait.signals.samples import LegSamples
-from rehab.gait.stances.kinetics import compute_ankle_moment, compute_ankle_velocity
+from rehab.gait.stances.kinetics import compute_ankle_moment
 from rehab.gait.strides import Flag, GaitInputError, RejectionReason, Stride
 from rehab.gait.two_legs import TwoLegDetector
 
@@ -32,7 +32,6 @@ __all__ = [
     "TwoLegDetector",
     "check_signals",
     "compute_ankle_moment",
-    "compute_ankle_velocity",
-    "measure_both_legs",
+    "make_detector",
     "measure_strides",
 ]

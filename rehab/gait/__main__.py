@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from rehab.gait.contacts.gyroscope_strides import measure_gyroscope
-from rehab.gait.offline import measure_both_legs, measure_strides
+from rehab.gait.offline import measure_strides
 from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
 from rehab.gait.recordings.limits import limit_resources
@@ -94,29 +94,15 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
     time, legs, frames = read_signals(path, options.columns)
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
-    if len(legs) == 2:
-        strides = measure_both_legs(
-            time,
-            legs["left"],
-            legs["right"],
-            rate_hz=rate_hz,
-            mass_kg=mass_kg,
-            look_ahead_s=options.look_ahead,
-            is_overground=options.overground,
-            frame=frames,
-        )
-    else:
-        ((side, leg),) = legs.items()
-        strides = measure_strides(
-            time,
-            *leg,
-            rate_hz=rate_hz,
-            mass_kg=mass_kg,
-            look_ahead_s=options.look_ahead,
-            is_overground=options.overground,
-            side=side,
-            frame=frames,
-        )
+    strides = measure_strides(
+        time,
+        legs,
+        rate_hz=rate_hz,
+        mass_kg=mass_kg,
+        look_ahead_s=options.look_ahead,
+        is_overground=options.overground,
+        frame=frames,
+    )
     check = check_signals(
         time, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
     )

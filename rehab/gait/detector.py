@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
-from rehab.gait.contacts.patience import Patience
+from rehab.gait.contacts.chunk_wait import ChunkWait
 from rehab.gait.one_leg import KEEP_S, LONGEST_CHUNK_S, LegDetector
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import FrameClock, read_frames
-from rehab.gait.signals.samples import FORCE
-from rehab.gait.stances.kinetics import CUTOFF_HZ
+from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, LegSamples
 from rehab.gait.strides import Stride
 
 LONGEST_WAIT_S = 0.3  # of samples for others
@@ -32,30 +31,14 @@ class Detector:
     are put back to when they were taken, and lost ones are found (``signals.clock``).
 
     Small chunks wait for others while no step can have ended in them, so that no valid stride waits
-    (``contacts.patience``).
+    (``contacts.chunk_wait``).
 
     Parameters
     ----------
-    rate_hz
-        Nominal rate of the samples, 50-5000 Hz. Times are measured by the samples' own times.
-    mass_kg
-        Body mass of the walker, 10-300 kg.
-    look_ahead_s
-        How long to wait after terminal contact, 0-0.2 s. 50 ms reduce the error of A2 from 1.0 to
-        0.14 % (moore2013; the plain zero-phase filter has 1.8 and 0.5 %:
-        docs/reference/gait.md#filters).
-    cutoff_hz
-        Cut-off of the zero-phase low-pass on moment and angle.
-    contact_n, release_n
-        Force above the plate's zero at which a contact is certain, and at which both of its ends
-        are timed [N].
-    is_velocity
-        Whether ankle velocities [rad/s] are fed instead of angles (gyroscopes).
-    is_overground
-        Whether people walk over the plates, a step or two at a time, and not on a treadmill: then
-        a stride needs no neighbors, and a foot has to bear its plate whole.
+    rate_hz, mass_kg, settings
+        As in ``DetectorSettings``.
     sides
-        The legs' names in each stride.
+        The legs' names in each stride, in the order in which their channels are fed.
 
     Raises
     ------
@@ -68,25 +51,15 @@ class Detector:
         rate_hz: float,
         mass_kg: float,
         *,
-        look_ahead_s: float = 0.0,
-        cutoff_hz: float = CUTOFF_HZ,
-        contact_n: float = CONTACT_N,
-        release_n: float = RELEASE_N,
-        is_velocity: bool = False,
-        is_overground: bool = False,
         sides: Sequence[str | None],
+        **settings: Any,
     ) -> None:
-        settings = DetectorSettings(
-            rate_hz=rate_hz,
-            mass_kg=mass_kg,
-            look_ahead_s=look_ahead_s,
-            cutoff_hz=cutoff_hz,
-            contact_n=contact_n,
-            release_n=release_n,
-            is_velocity=is_velocity,
-            is_overground=is_overground,
-        )
-        self._is_overground = is_overground
+        checked = DetectorSettings(rate_hz=rate_hz, mass_kg=mass_kg, **settings)
+        self._is_overground = checked.is_overground
+        self._sides = sides
+        # Of what is fed, in messages.
+        marks = [f"{side} " for side in sides] if len(sides) > 1 else [""]
+        self._names = ("t_s", *(mark + name for mark in marks for name in CHANNEL_NAMES))
         self._clock: SampleClock | FrameClock = SampleClock()
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=len(sides))
         self._layout = self._samples.layout
@@ -94,13 +67,38 @@ class Detector:
         self._rows = 0  # of the samples that wait
         self._numbers: list[Floats] = []  # and their frame numbers, where these are used
         self._longest_wait = int(LONGEST_WAIT_S * rate_hz)
-        self._patience = 0  # how many samples may wait
+        self._most_waiting = 0  # how many samples may wait
         # Both feet's forces, and for which of these samples may wait.
-        self._feet: list[tuple[Floats, float, float, Patience]] = []
+        self._feet: list[tuple[Floats, float, float, ChunkWait]] = []
         self._legs = [
-            LegDetector(buffer, settings, side)
+            LegDetector(buffer, checked, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
         ]
+
+    def feed_legs(
+        self,
+        t_s: ArrayLike,
+        legs: Mapping[str, LegSamples],
+        *,
+        frame: ArrayLike | None = None,
+    ) -> list[Stride]:
+        """Add the next samples of each leg that is measured; return the strides they complete.
+
+        Parameters
+        ----------
+        t_s, frame
+            As in ``StrideDetector.feed``.
+        legs
+            The channels of each leg by its side.
+
+        Raises
+        ------
+        GaitInputError
+            For channels of different lengths.
+        """
+        return self._feed(
+            (t_s, *chain.from_iterable(legs[side or ""] for side in self._sides)), frame
+        )
 
     def finish(self) -> list[Stride]:
         """Return the strides that still wait for samples.
@@ -114,26 +112,21 @@ class Detector:
         """Why frame numbers are ignored, with the cure; empty where they are used, or not fed."""
         return self._clock.problem if isinstance(self._clock, FrameClock) else ""
 
-    def _feed(
-        self,
-        names: Sequence[str],
-        channels: Sequence[Any],
-        frame: ArrayLike | None = None,
-    ) -> list[Stride]:
-        """Add samples of the named channels, the first of which is the time."""
+    def _feed(self, channels: Sequence[Any], frame: ArrayLike | None = None) -> list[Stride]:
+        """Add samples: their times, then the channels of each leg."""
         strides: list[Stride] = []
         count = self._write(channels) if frame is None else 0
         if not count:
-            strides, count = self._read(names, channels, frame)
+            strides, count = self._read(channels, frame)
             if not count:
                 return strides
         samples = self._samples
         newest = samples.filled - 1
         waiting = samples.waiting
-        if waiting <= self._patience:
-            for force, least_n, most_n, patience in self._feet:
+        if waiting <= self._most_waiting:
+            for force, least_n, most_n, wait in self._feet:
                 goes_on = least_n <= force.item(newest) <= most_n
-                if not (goes_on or patience.lasts(waiting, force[newest + 1 - count : newest + 1])):
+                if not (goes_on or wait.lasts(waiting, force[newest + 1 - count : newest + 1])):
                     break
             else:
                 return strides
@@ -153,11 +146,9 @@ class Detector:
             return 0
         return count
 
-    def _read(
-        self, names: Sequence[str], channels: Sequence[Any], frame: ArrayLike | None
-    ) -> tuple[list[Stride], int]:
+    def _read(self, channels: Sequence[Any], frame: ArrayLike | None) -> tuple[list[Stride], int]:
         """Read any samples; return strides that end, and how many samples wait now."""
-        table = self._layout.read(names, channels)
+        table = self._layout.read(self._names, channels)
         count = table.shape[1]
         numbers = None if frame is None else read_frames(frame, count)
         if not count:
@@ -184,7 +175,7 @@ class Detector:
         Samples that the clock holds back go before it, with NaN where they have no values.
         """
         strides, held = self._look(), self._clock.finish()
-        self._patience = 0
+        self._most_waiting = 0
         if held is not None:
             widen = self._layout.widen
             table = np.concatenate((widen(held), widen(table)), axis=1)
@@ -200,7 +191,7 @@ class Detector:
         if not is_first and not np.isfinite(numbers).all():
             return []
         strides = self._settle()
-        self._clock, self._patience = FrameClock(), 0
+        self._clock, self._most_waiting = FrameClock(), 0
         return strides
 
     def _settle(self) -> list[Stride]:
@@ -222,7 +213,7 @@ class Detector:
             return self._place(samples.take(self._rows))
         samples.accept()
         strides = self._detect(start, samples.end)
-        self._find_patience()
+        self._find_wait()
         return strides
 
     def _place(self, table: Floats) -> list[Stride]:
@@ -233,19 +224,19 @@ class Detector:
             strides = self._advance(*clock.add(table, row, numbers))
         else:
             strides = self._advance(*clock.add(table, row))
-        self._find_patience()
+        self._find_wait()
         return strides
 
-    def _find_patience(self) -> None:
+    def _find_wait(self) -> None:
         """Find how many samples may wait, and for which force under each foot."""
         is_busy = self._clock.is_holding
         self._feet = []
         for leg in self._legs:
             is_busy = is_busy or bool(leg.pending)
-            patience = leg.contacts.find_patience(self._samples.end)
+            wait = leg.contacts.find_wait(self._samples.end)
             force = leg.buffer.rows[FORCE]
-            self._feet.append((force, patience.least_n, patience.most_n, patience))
-        self._patience = 0 if is_busy else self._longest_wait
+            self._feet.append((force, wait.least_n, wait.most_n, wait))
+        self._most_waiting = 0 if is_busy else self._longest_wait
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+from typing import Any
+
 from numpy.typing import ArrayLike
 
 from rehab.gait.online import StrideDetector
@@ -10,89 +13,60 @@ from rehab.gait.strides import Stride
 from rehab.gait.two_legs import TwoLegDetector
 
 
+def make_detector(
+    sides: Collection[str], rate_hz: float, mass_kg: float, **settings: Any
+) -> StrideDetector | TwoLegDetector:
+    """Return the detector of one leg or of both.
+
+    Parameters
+    ----------
+    sides
+        "left", "right" or both.
+    rate_hz, mass_kg, settings
+        As in ``DetectorSettings``.
+
+    Raises
+    ------
+    GaitInputError
+        For settings that nothing can be measured with.
+    """
+    if len(sides) == 2:
+        return TwoLegDetector(rate_hz, mass_kg, **settings)
+    (side,) = sides
+    return StrideDetector(rate_hz, mass_kg, side=side, **settings)
+
+
 def measure_strides(
     t_s: ArrayLike,
-    force_n: ArrayLike,
-    moment_nm: ArrayLike,
-    angle_rad: ArrayLike,
-    forward_n: ArrayLike | None = None,
-    position_m: ArrayLike | None = None,
+    legs: Mapping[str, LegSamples],
     *,
     rate_hz: float,
     mass_kg: float,
     look_ahead_s: float = 0.05,
-    is_velocity: bool = False,
-    is_overground: bool = False,
-    side: str | None = None,
     frame: ArrayLike | None = None,
+    **settings: Any,
 ) -> list[Stride]:
-    """Return the strides of one leg of a recording.
+    """Return the strides of a recording of one leg or of both, in the order of their completion.
 
     Parameters
     ----------
-    t_s, force_n, moment_nm, angle_rad, forward_n, position_m
-        Channels of shape (n,), as in ``StrideDetector.feed``.
-    rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground, side
-        As in ``StrideDetector``.
+    t_s
+        Times [s], shape (n,).
+    legs
+        The channels of each leg by its side ("left", "right"), shape (n,).
+    rate_hz, mass_kg, look_ahead_s, settings
+        As in ``DetectorSettings``.
     frame
         The samples' numbers, as in ``StrideDetector.feed``.
 
     Returns
     -------
-    All strides in order of time, the last one invalid where the record cuts it off.
+    The last stride of a leg is invalid where the record cuts it off.
 
     Raises
     ------
     GaitInputError
         For settings or channels that nothing can be measured from.
     """
-    detector = StrideDetector(
-        rate_hz,
-        mass_kg,
-        look_ahead_s=look_ahead_s,
-        is_velocity=is_velocity,
-        is_overground=is_overground,
-        side=side,
-    )
-    found = detector.feed(t_s, force_n, moment_nm, angle_rad, forward_n, position_m, frame=frame)
-    return found + detector.finish()
-
-
-def measure_both_legs(
-    t_s: ArrayLike,
-    left: LegSamples,
-    right: LegSamples,
-    *,
-    rate_hz: float,
-    mass_kg: float,
-    look_ahead_s: float = 0.05,
-    is_velocity: bool = False,
-    is_overground: bool = False,
-    frame: ArrayLike | None = None,
-) -> list[Stride]:
-    """Return the strides of both legs of a recording.
-
-    Parameters
-    ----------
-    t_s, left, right
-        Times [s], shape (n,), and the channels of each leg, as in ``TwoLegDetector.feed``.
-    rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground, frame
-        As in ``TwoLegDetector``.
-
-    Returns
-    -------
-    The strides of both legs in the order in which they were complete.
-
-    Raises
-    ------
-    GaitInputError
-        For settings or channels that nothing can be measured from.
-    """
-    detector = TwoLegDetector(
-        rate_hz,
-        mass_kg,
-        look_ahead_s=look_ahead_s,
-        is_velocity=is_velocity,
-        is_overground=is_overground,
-    )
-    return detector.feed(t_s, left, right, frame=frame) + detector.finish()
+    detector = make_detector(legs, rate_hz, mass_kg, look_ahead_s=look_ahead_s, **settings)
+    return detector.feed_legs(t_s, legs, frame=frame) + detector.finish()

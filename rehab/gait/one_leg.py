@@ -15,7 +15,7 @@ from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.samples import FORCE
 from rehab.gait.stances.analysis import Stance, StanceAnalyzer
 from rehab.gait.stances.plausibility import FULL_LOAD, STANCE_MAX_S, STANCE_MIN_S
-from rehab.gait.strides import Flag, RejectionReason, Stride
+from rehab.gait.strides import Flag, RejectionReason, Stride, read_figures
 
 GRAVITY_M_S2 = 9.81
 KEEP_S = 12.0  # the longest cycle, the longest stance after it, and the piece that they end in
@@ -111,7 +111,6 @@ class LegDetector:
             self.mass_kg,
             self.weight_n,
             settings.cutoff_hz,
-            settings.is_velocity,
         )
         self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
         self.pending: deque[Contact] = deque()
@@ -148,7 +147,7 @@ class LegDetector:
 
     def complete(self, stride: OneLegStride, other_leg: OtherLeg) -> Stride:
         """Return the whole stride, from its own leg's part and the other leg's."""
-        contact, stance, push_off = stride.contact, stride.stance, stride.stance.push_off
+        contact, stance = stride.contact, stride.stance
         reasons = stride.reasons + other_leg.reasons
         flags = [*stance.flags, *other_leg.flags]
         if abs(contact.offset_n) > OFFSET_N:
@@ -162,31 +161,13 @@ class LegDetector:
             number=self._number,
             initial_contact_s=begin_s,
             terminal_contact_s=end_s,
-            a2_w_kg=push_off.a2_w_kg if push_off else None,
-            a2_time_s=push_off.a2_time_s if push_off else None,
             valid=not reasons,
             reasons=tuple(reasons),
             flags=tuple(flags),
             stance_s=end_s - begin_s,
-            stride_s=stride.stride_s,
-            swing_s=stride.swing_s,
             force_peak_n_kg=contact.peak_n / self.mass_kg,
-            moment_peak_nm_kg=push_off.moment_peak_nm_kg if push_off else None,
-            a2_moment_nm_kg=push_off.a2_moment_nm_kg if push_off else None,
-            a2_velocity_rad_s=push_off.a2_velocity_rad_s if push_off else None,
-            propulsion_n_kg=stance.propulsion_n_kg,
-            position_m=stance.position_m,
-            offset_n=contact.offset_n,
-            late_s=stance.late_s,
-            lost_s=stance.lost_s,
-            a2_sd_w_kg=stance.a2_sd_w_kg,
             side=self.side,
-            step_s=other_leg.step_s,
-            step_length_m=other_leg.step_length_m,
-            step_symmetry=other_leg.step_symmetry,
-            first_double_support_s=other_leg.first_double_support_s,
-            second_double_support_s=other_leg.second_double_support_s,
-            weight_ratio=other_leg.weight_ratio,
+            **read_figures(contact, stance, stance.push_off, stride, other_leg),
         )
 
     def compute_mean_load(self, begin: int, end: int, offset_n: float) -> float:

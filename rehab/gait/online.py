@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from rehab.gait.detector import Detector
 from rehab.gait.one_leg import OneLegStride, OtherLeg
-from rehab.gait.signals.samples import CHANNEL_NAMES
 from rehab.gait.stances.plausibility import check_load, check_whole_foot
 from rehab.gait.strides import RejectionReason, Stride
 
@@ -65,8 +64,7 @@ class StrideDetector(Detector):
         GaitInputError
             For channels of different lengths.
         """
-        channels = (t_s, force_n, moment_nm, angle_rad, forward_n, position_m)
-        return self._feed(("t_s", *CHANNEL_NAMES), channels, frame)
+        return self._feed((t_s, force_n, moment_nm, angle_rad, forward_n, position_m), frame)
 
     def _detect(self, start: int, stop: int) -> list[Stride]:
         return [self._complete(stride) for stride in self._leg.advance(start, stop)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class GaitInputError(ValueError):
@@ -100,21 +100,21 @@ class Stride(NamedTuple):
     number: int
     initial_contact_s: float
     terminal_contact_s: float
-    a2_w_kg: float | None
-    a2_time_s: float | None
     valid: bool
     reasons: tuple[RejectionReason, ...]
     flags: tuple[Flag, ...]
     stance_s: float
-    stride_s: float | None
-    swing_s: float | None
-    force_peak_n_kg: float | None
-    moment_peak_nm_kg: float | None
-    a2_moment_nm_kg: float | None
-    a2_velocity_rad_s: float | None
-    propulsion_n_kg: float | None
-    position_m: float | None
-    offset_n: float
+    a2_w_kg: float | None = None
+    a2_time_s: float | None = None
+    stride_s: float | None = None
+    swing_s: float | None = None
+    force_peak_n_kg: float | None = None
+    moment_peak_nm_kg: float | None = None
+    a2_moment_nm_kg: float | None = None
+    a2_velocity_rad_s: float | None = None
+    propulsion_n_kg: float | None = None
+    position_m: float | None = None
+    offset_n: float = 0.0
     late_s: float = 0.0
     lost_s: float = 0.0
     a2_sd_w_kg: float | None = None
@@ -125,3 +125,16 @@ class Stride(NamedTuple):
     first_double_support_s: float | None = None
     second_double_support_s: float | None = None
     weight_ratio: float | None = None
+
+
+# What is judged of a whole stride, and not copied from a part of it.
+_OWN_FIELDS = ("reasons", "flags")
+
+
+def read_figures(*parts: object) -> dict[str, Any]:
+    """Return the fields of a stride that its parts have under the same names; a part may be None.
+
+    A figure that is added to ``Stride`` and to the part that measures it is passed on.
+    """
+    names = [name for name in Stride._fields if name not in _OWN_FIELDS]
+    return {name: getattr(part, name) for part in parts for name in names if hasattr(part, name)}

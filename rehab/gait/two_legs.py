@@ -19,8 +19,6 @@ from rehab.gait.stances.analysis import Stance
 from rehab.gait.stances.plausibility import check_whole_foot
 from rehab.gait.strides import Flag, RejectionReason, Stride
 
-CHUNK_NAMES = ("t_s", *(f"{side} {name}" for side in ("left", "right") for name in CHANNEL_NAMES))
-
 # Mean force of both plates over a cycle, by body weight (docs/reference/gait.md#bad-signals): a
 # handrail takes some of it, a harness up to half; nothing adds any, so that more means a wrong
 # mass, unit or plate.
@@ -73,7 +71,7 @@ class TwoLegDetector(Detector):
         """
         if not len(left) == len(right) == len(CHANNEL_NAMES):
             left, right = LegSamples(*left), LegSamples(*right)
-        return self._feed(CHUNK_NAMES, (t_s, *left, *right), frame)
+        return self._feed((t_s, *left, *right), frame)
 
     def _detect(self, start: int, stop: int) -> list[Stride]:
         left, right = self._left.advance(start, stop), self._right.advance(start, stop)

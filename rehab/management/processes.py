@@ -1,7 +1,7 @@
 """Several servers on one host, as children of one command.
 
 A server that ends is started again. SIGTERM ends all; SIGHUP restarts them one after the other,
-each once the one before it is ready: sessions are handed on, and nobody is paused.
+each once the one before it is ready: sessions are handed over, and none is paused.
 """
 
 from __future__ import annotations

@@ -110,8 +110,8 @@ def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
     before = months_before(now, clinic.retention_months)
     today = clinic_time(now, clinic).date()
     expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
-    kept = patients.annotate(last_here=last).filter(last_here__lt=before)
-    return kept.exclude(Exists(expected)).order_by("pk")
+    past = patients.annotate(last_here=last).filter(last_here__lt=before)
+    return past.exclude(Exists(expected)).order_by("pk")
 
 
 def delete_old_logs(clinic: Clinic, now: datetime) -> int:

@@ -19,7 +19,7 @@ from rehab.people.audit.audit_log import Act, build_entry, record, record_counte
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents, consent_withdrawn
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.models.blinding import hidden_patients, is_in_running_study
+from rehab.people.models.running_studies import hidden_patients, is_in_running_study
 from rehab.people.policy import deleted, personal_fields
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.sign_in.tokens import TOKEN_BYTES, hash_token
@@ -79,7 +79,7 @@ class FamilyLink(ClinicModel):
         return self.ended_at is not None or self.expires_at <= now
 
 
-def why_not(patient: Patient) -> str:
+def refusal_reason(patient: Patient) -> str:
     """Return why a patient's family sees nothing now; empty where it may."""
     if patient.erased_at is not None or patient.ended_at is not None:
         return str(_("The program has ended: the family sees nothing any more."))
@@ -98,7 +98,7 @@ def give_link(
     """Store a new link and return its token, which is shown once. Raises FamilyLinkRefused."""
     with transaction.atomic():
         patient.lock()
-        if reason := why_not(patient):
+        if reason := refusal_reason(patient):
             raise FamilyLinkRefused(reason)
         if hidden_patients(by).filter(pk=patient.pk).exists():
             raise FamilyLinkRefused(_("A study hides this patient's sessions from you."))
@@ -146,10 +146,10 @@ def find_link(token: str, now: datetime) -> FamilyLink | None:
     hashed = hash_token(token)
     rows = FamilyLink.everywhere.select_related("patient__clinic")
     link = rows.filter(token_hash=hashed).first()
-    # A digest of 256 random bits: how long the database takes to find it tells nothing of it.
+    # A digest of 256 random bits: how long the database takes to find it reveals nothing.
     if link is None or not secrets.compare_digest(link.token_hash, hashed):
         return None
-    return None if link.is_over(now) or why_not(link.patient) else link
+    return None if link.is_over(now) or refusal_reason(link.patient) else link
 
 
 def note_opening(link: FamilyLink, address: str, now: datetime) -> None:

@@ -12,11 +12,12 @@ from typing import Any, TypeVar
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
+from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from django.utils.cache import patch_cache_control
 
 from rehab.people.audit import access_log, history
-from rehab.people.models import Clinic, User
+from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in import flow
 
@@ -57,11 +58,13 @@ def for_roles(
     """
 
     def declare(view: ViewT) -> ViewT:
-        view.access = frozenset(roles)  # type: ignore[attr-defined]
-        view.tablets = tablets  # type: ignore[attr-defined]
-        view.enrolling = enrolling  # type: ignore[attr-defined]
-        view.patients = patients  # type: ignore[attr-defined]
-        view.exports = exports  # type: ignore[attr-defined]
+        vars(view).update(
+            access=frozenset(roles),
+            tablets=tablets,
+            enrolling=enrolling,
+            patients=patients,
+            exports=exports,
+        )
         return view
 
     return declare
@@ -89,6 +92,12 @@ def clinic_of(user: User) -> Clinic:
     if user.clinic is None:
         raise PermissionDenied
     return user.clinic
+
+
+def get_patient(user: User, patient_id: int) -> Patient:
+    """Return a patient that a user may see. Raises Http404 for any other."""
+    patients = Patient.objects.visible_to(user).select_related("clinic")
+    return get_object_or_404(patients, pk=patient_id)
 
 
 def _is_guarded(request: HttpRequest) -> bool:

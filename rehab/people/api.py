@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from datetime import date, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from django.core.exceptions import ValidationError
-from django.db import IntegrityError, transaction
+from django.core.validators import MaxValueValidator, MinValueValidator
+from django.db import IntegrityError, models, transaction
 from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.shortcuts import get_object_or_404
+from django.utils.translation import override
 from ninja import Field, Path, Query, Router, Schema, Status
+from pydantic import BeforeValidator, create_model
 
 from rehab.people.access import clinic_of, for_roles
-from rehab.people.models import LANGUAGES, Patient, Severity, User
+from rehab.people.models import LANGUAGES, Patient, User
+from rehab.people.policy import details
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
     Key,
@@ -30,7 +34,6 @@ from rehab.people.web.api_base import (
     paginate,
     responses,
 )
-from rehab.training.steps import Side
 
 router = Router(tags=["People"])
 
@@ -75,49 +78,80 @@ class PatientName(Schema):
         return patient.nickname if may_see_names(context) else None
 
 
-class PatientOut(PatientName):
+TYPES: dict[type[models.Field[Any, Any]], Any] = {
+    models.CharField: ShortText,
+    models.FloatField: float,
+    models.PositiveSmallIntegerField: StrictInt,
+    models.DateField: date,
+}
+
+
+def type_of_detail(column: Any) -> Any:
+    """Return the type of a field that people enter, as the model declares it."""
+    if column.choices:
+        return Literal[tuple(value for value, _ in column.choices)]
+    return TYPES[type(column)]
+
+
+def describe_input(name: str, *, is_new: bool = False) -> tuple[Any, Any]:
+    """Return type and bounds of a patient's field in requests; omitted, a field stays."""
+    column: Any = Patient._meta.get_field(name)
+    names = {MinValueValidator: "ge", MaxValueValidator: "le"}
+    bounds: dict[str, Any] = {
+        bound: validator.limit_value
+        for validator in column.validators
+        for kind, bound in names.items()
+        if isinstance(validator, kind)
+    }
+    if isinstance(column, models.DateField):
+        bounds["strict"] = False  # JSON has text
+    with override("en"):
+        about = str(column.help_text) or None
+    type_ = type_of_detail(column)
+    is_required = is_new and not column.blank
+    default = ... if is_required else None
+    return type_ | None if column.null else type_, Field(default, description=about, **bounds)
+
+
+def describe_output(name: str) -> tuple[Any, Any]:
+    """Return the type of a patient's field in responses: null where it is not set."""
+    type_ = type_of_detail(Patient._meta.get_field(name))
+    return Annotated[type_ | None, BeforeValidator(lambda value: value or None)], ...
+
+
+DETAILS = details(Patient)
+make_schema: Any = create_model
+OutputDetails: Any = make_schema(
+    "OutputDetails",
+    __base__=PatientName,
+    **{name: describe_output(name) for name in DETAILS if name not in PatientName.model_fields},
+)
+InputDetails: Any = make_schema(
+    "InputDetails", __base__=RequestBody, **{name: describe_input(name) for name in DETAILS}
+)
+NewDetails: Any = make_schema(
+    "NewDetails",
+    __base__=InputDetails,
+    **{name: describe_input(name, is_new=True) for name in DETAILS},
+)
+
+
+class PatientOut(OutputDetails):  # type: ignore[misc]
     """A patient."""
 
-    paretic_side: str | None
-    body_mass_kg: float | None
-    birth_year: int | None
-    stroke_month: date | None
-    severity: str | None
     language: str
     simulated: bool
     created_at: datetime
 
-    @staticmethod
-    def resolve_paretic_side(patient: Patient) -> str | None:
-        """Return the side; null where it is not set."""
-        return patient.paretic_side or None
 
-    @staticmethod
-    def resolve_severity(patient: Patient) -> str | None:
-        """Return the severity; null where it is not set."""
-        return patient.severity or None
-
-
-class PatientChanges(RequestBody):
+class PatientChanges(InputDetails):  # type: ignore[misc]
     """Changes of a patient; omitted fields stay."""
 
-    code: ShortText = optional(description="The clinic's own number, never a name.")
-    nickname: ShortText = optional(description="What the screens say, never a full name.")
-    paretic_side: Side = optional(strict=False)
-    body_mass_kg: float | None = Field(None, ge=10, le=300)
-    birth_year: StrictInt | None = Field(None, ge=1900, le=2100)
-    stroke_month: date | None = Field(
-        None, strict=False, description="Its first day: `2026-03-01`."
-    )
-    severity: Severity = optional(strict=False)
     language: Language = optional()
 
 
-class PatientIn(PatientChanges):
+class PatientIn(NewDetails, PatientChanges):  # type: ignore[misc]
     """A new patient."""
-
-    code: ShortText = Field(description="The clinic's own number, never a name.")
-    nickname: ShortText = Field(description="What the screens say, never a full name.")
 
 
 class PatientFilter(Paging):

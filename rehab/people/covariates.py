@@ -1,4 +1,4 @@
-"""What studies adjust by, of a person: told in bands and months, never as a date of birth."""
+"""What studies adjust by, of a person: in bands and months, never as a date of birth."""
 
 from __future__ import annotations
 

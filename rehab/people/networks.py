@@ -13,7 +13,7 @@ from django.core.exceptions import ValidationError
 from django.http import HttpRequest
 from django.utils.translation import gettext_lazy as _
 
-IPV6_PREFIX_LENGTH = 64  # of an IPv6 address only its network is kept
+IPV6_PREFIX_LENGTH = 64  # of an IPv6 address only its network is stored
 
 
 def validate_networks(text: str) -> None:

@@ -1,4 +1,4 @@
-"""Saving what was changed of a row, and nothing that others have changed since it was read."""
+"""Keys of rows as forms name them, and saving of what was changed of a row and nothing else."""
 
 from __future__ import annotations
 
@@ -25,3 +25,11 @@ def save_changes(row: Model, before: Values) -> None:
             field.name for field in fields if getattr(row, field.attname) != before[field.attname]
         ]
     )
+
+
+DIGITS_MAX = 18  # of a key that every database can hold; Python itself refuses some thousands
+
+
+def read_key(text: str) -> int:
+    """Return a row's key; 0, which no row has, for any other text."""
+    return int(text) if text.isdecimal() and len(text) <= DIGITS_MAX else 0

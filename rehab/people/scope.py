@@ -1,4 +1,4 @@
-"""Which rows an actor may see: the one place that keeps clinics apart.
+"""Which rows an actor may see: the one place that separates clinics.
 
 Every model declares how its rows belong to a clinic (`scope`) and has two managers: `objects`,
 which offers `visible_to(actor)` alone, and `everywhere`, for the server's own work (the session

@@ -9,12 +9,12 @@ from typing import Any
 import django
 from django.conf import settings
 from django.db import connection
-from django.db.migrations.executor import MigrationExecutor
 from django.db.models import Count, Q
 from django.utils.translation import gettext
 
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
+from rehab.people.sign_in.first_start import count_pending_migrations
 
 LOW_DISK = 2 * 2**30  # bytes; a year of a clinic's sessions takes about one GB
 
@@ -27,8 +27,7 @@ def server_status(user: User) -> dict[str, Any]:
     )
     accounts = User.objects.visible_to(user)
     free = shutil.disk_usage(settings.DATA_DIR).free if settings.DATA_DIR.exists() else None
-    executor = MigrationExecutor(connection)
-    pending = len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
+    pending = count_pending_migrations()
     alerts = [
         gettext("%(clinic)s has no lead. Give one of its accounts that role.") % {"clinic": clinic}
         for clinic in clinics

@@ -2,29 +2,19 @@
 
 from django.urls import path
 
-from rehab.people.pages import (
-    account,
-    confirm,
-    consent,
-    guide,
-    home,
-    language,
-    second_factor,
-    sign_in,
-    sign_ins,
-)
+from rehab.people.pages import account, confirm, consent, home, second_factor, sign_in
 
 urlpatterns = [
     path("", home.home, name="home"),
-    path("js/<str:language>/catalog.js", language.show_catalog, name="catalog"),
+    path("js/<str:language>/catalog.js", home.show_catalog, name="catalog"),
     path("sign-in/", sign_in.sign_in, name="sign-in"),
     path("sign-in/code/", sign_in.verify_second_factor, name="second-factor"),
     path("sign-out/", sign_in.sign_out, name="sign-out"),
-    path("help/", guide.show_help, name="help"),
+    path("help/", home.show_help, name="help"),
     path("account/", account.show_account, name="account"),
-    path("account/sign-ins/", sign_ins.show_sign_ins, name="own-sign-ins"),
-    path("account/sign-ins/end/", sign_ins.end_sign_ins, name="end-sign-ins"),
-    path("account/language/", language.choose_language, name="own-language"),
+    path("account/sign-ins/", account.show_sign_ins, name="own-sign-ins"),
+    path("account/sign-ins/end/", account.end_sign_ins, name="end-sign-ins"),
+    path("account/language/", account.choose_language, name="own-language"),
     path("account/confirm/", confirm.confirm, name="confirm"),
     path("account/resets/", account.confirm_reset, name="confirm-reset"),
     path("account/password/", account.change_password, name="own-password"),

@@ -61,13 +61,13 @@ FORM_NAMES = {option.api_name: option.name for option in OPTIONS.values() if opt
 
 
 def visible_sessions(user: User) -> QuerySet[TrainingSession]:
-    """Return the sessions that somebody may see, with what `SessionOut` needs."""
+    """Return the sessions that a user may see, with what `SessionOut` needs."""
     rows = TrainingSession.objects.visible_to(user).defer("plan")
     return with_metrics(user, rows).select_related("patient", "measure", "protocol", "station")
 
 
 def get_session(user: User, session_id: int) -> TrainingSession:
-    """Return a session that somebody may see. Raises Http404 for any other."""
+    """Return a session that a user may see. Raises Http404 for any other."""
     return get_object_or_404(visible_sessions(user), pk=session_id)
 
 

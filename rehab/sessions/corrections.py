@@ -197,7 +197,7 @@ def add_note(session: TrainingSession, line: str, by: User, now: datetime) -> st
 def _describe_conflict(
     session: TrainingSession, before: Values, expected: Values, reader: User
 ) -> str:
-    """Return a message with what was changed since somebody opened the form, and by whom."""
+    """Return a message with what was changed since the form was opened, and by whom."""
     corrections = describe_corrections(session, reader)
     found = []
     for field in (field for field in CorrectedField if before[field] != expected[field]):

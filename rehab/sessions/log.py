@@ -84,7 +84,7 @@ class Step(ScopedModel):
 
 
 class StepColumn(NamedTuple):
-    """What a field of `Step` means to whoever reads it in a file or from the API.
+    """What a field of `Step` means, for readers of files and of the API.
 
     ``exported_as``: its name in files, if that is another one. ``is_channel``: it is a channel of
     the motion data in BIDS, too.
@@ -149,9 +149,9 @@ class RuleEntry(StrEnum):
 
 
 class Remark(StrEnum):
-    """What a PT notes with one tap while somebody walks. It changes no score either.
+    """What a PT notes with one tap during a session. It changes no score either.
 
-    How badly somebody was hurt, and that it was no fall after all, are said of the last fall.
+    How badly the patient was hurt, and that it was no fall after all, refer to the last fall.
     """
 
     REST = "rest"
@@ -167,7 +167,7 @@ class Remark(StrEnum):
 
 
 class FallSeverity(models.IntegerChoices):
-    """How badly somebody was hurt by a fall: the levels of the National Database of Nursing
+    """How badly a patient was hurt by a fall: the levels of the National Database of Nursing
     Quality Indicators, short of death.
     """
 

@@ -43,7 +43,7 @@ class SessionScope(PatientScope):
     def device_filter(self, device: Any) -> Q:
         """Return the condition for a device, besides that of its station.
 
-        Sources and robots have no pages, and are told of an ended session that it has ended.
+        Sources and robots have no pages; the server answers them that an ended session has ended.
         """
         if device.kind != Device.Kind.TABLET:
             return Q()
@@ -140,7 +140,7 @@ class TrainingSession(ClinicModel):
         help_text=_("Arguments of the source that the server runs."),
     )
     plan = models.JSONField(_("plan"))
-    # How somebody walked (setup/walking.py); for analyses, and in no score.
+    # How the patient walked (setup/walking.py); for analyses, and in no score.
     device = models.CharField(_("device"), max_length=MAX_DEVICE_LETTERS, blank=True)
     belt_speed_m_s = models.FloatField(_("belt speed (m/s)"), null=True, blank=True)
     weight_support_percent = models.FloatField(_("body-weight support (%)"), null=True, blank=True)
@@ -219,7 +219,7 @@ class TrainingSession(ClinicModel):
 
     @property
     def walking(self) -> WalkingConditions:
-        """How somebody walked, as far as it was noted."""
+        """How the patient walked, as far as it was noted."""
         return WalkingConditions(self.device, self.belt_speed_m_s, self.weight_support_percent)
 
     @property

@@ -107,8 +107,9 @@ def find_instrument(slug: str, clinic_id: int, language: str) -> Instrument:
 class QuestionnaireResponse(ScopedModel):
     """A questionnaire of one session: as it was asked, and what was answered.
 
-    ``instrument`` keeps the words, so that later changes of a clinic's own questions change no
-    earlier answer. ``answers`` has one place for each question that was reached: null is skipped.
+    ``instrument`` has the words as they were asked, so that later changes of a clinic's own
+    questions change no earlier answer. ``answers`` has one place for each question that was
+    reached: null is skipped.
     """
 
     scope = SessionScope(

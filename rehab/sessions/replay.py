@@ -37,7 +37,7 @@ def fold_entries(
 
     Impossible entries (such as a second pause) are skipped with a warning: they had no effect when
     they were stored, and refusing the log would make the rest of the session unreadable. What comes
-    behind a hole is not folded: nobody knows what it was worth. That is logged as an error.
+    follows a hole is not folded, since its score cannot be known; that is logged as an error.
     """
     skipped: list[str] = []
     try:

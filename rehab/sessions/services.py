@@ -13,7 +13,7 @@ from django.utils.translation import gettext
 from rehab.feedback.clinic_valences import valences_of
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
-from rehab.people.models.blinding import hidden_patients
+from rehab.people.models.running_studies import hidden_patients
 from rehab.sessions.live import runtime
 from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession
@@ -128,7 +128,7 @@ def create_session(request: SessionRequest) -> TrainingSession:
 
 
 def _announce(session: TrainingSession) -> None:
-    """Tell the tablet and devices of the station."""
+    """Notify the tablet and devices of the station."""
     live = runtime.peek()
     if live is not None:
         live.loop.call_soon_threadsafe(live.announce, session.pk, session.station_id)
@@ -193,7 +193,7 @@ def _check_patient_may_train(patient: Patient) -> None:
 
 
 def _check_not_blinded(patient: Patient, by: User | None) -> None:
-    """Raise InvalidSetting where somebody would learn what a study hides."""
+    """Raise InvalidSetting where the account would learn what a study hides."""
     if by is not None and hidden_patients(by).filter(pk=patient.pk).exists():
         message = gettext(
             "You assess %(patient)s without knowing the study's arm. Ask a colleague who treats "

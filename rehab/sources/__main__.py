@@ -178,7 +178,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
 
     def make_client(feed: StridePlayback | LiveFeed) -> SourceClient:
         return SourceClient(
-            partial(Link, url, token, keep_token=find_token_store(options, print_status)),
+            partial(Link, url, token, store_token=find_token_store(options, print_status)),
             feed,
             session=options.session,
             stay=options.stay,

@@ -141,12 +141,11 @@ class KobukiBase(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
-        if self._client is None or self._client.is_dead:
-            raise BaseLost("The process that owns the port does not run: see its messages above.")
+        client = self._running_client()
         control = twist_to_control(WHEEL_LIMITS.clip(twist))
         if control != STOP:
             self._unordered.order_motion(self._monotonic())
-        self._client.order(encode_commands(control), self._extra_commands())
+        client.order(encode_commands(control), self._extra_commands())
         return control_to_twist(control)
 
     def stop(self) -> None:
@@ -156,8 +155,7 @@ class KobukiBase(MobileBase):
 
     def read(self) -> BaseState:
         """Return its state now. Raises BaseLost."""
-        if self._client is None or self._client.is_dead:
-            raise BaseLost("The process that owns the port does not run: see its messages above.")
+        self._running_client()
         now_s = self._monotonic()
         with self._lock:
             estimate, odometry = self._estimate, self._odometry
@@ -209,6 +207,11 @@ class KobukiBase(MobileBase):
         else:
             self._sound = encode_commands(Sound.at(note.frequency_hz, note.duration_s))
 
+    def _running_client(self) -> PortClient:
+        if self._client is None or self._client.is_dead:
+            raise BaseLost("The process that owns the port does not run: see its messages above.")
+        return self._client
+
     def _set_lights(self, lights: Output) -> None:
         self._lights, self._lit_s = lights, self._monotonic() - LIGHT_EVERY_S
 
@@ -221,7 +224,7 @@ class KobukiBase(MobileBase):
             extra += encode_commands(GpOutput(Output.POWER | self._lights))
         if self._filter.firmware is None and now_s - self._requested_s >= REQUEST_EVERY_S:
             self._requested_s = now_s
-            extra += encode_commands(RequestExtra(Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID))
+            extra += encode_commands(RequestExtra(Extra.FIRMWARE | Extra.UDID))
         return extra
 
     def _receive(self, received: ReceivedBytes) -> None:

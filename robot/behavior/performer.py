@@ -57,6 +57,10 @@ class Performer:
         The newest decision; None before there was one.
     body
         Its base with all that moves it and stops it.
+    session
+        The session of the last welcome; None for none.
+    is_linked
+        Whether the server has sent its welcome on this connection, which is not lost.
     bad_messages, last_bad_message
         How many messages broke the protocol, and what was wrong with the last one.
     """
@@ -73,8 +77,8 @@ class Performer:
         self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad_message = ""
-        self._session: int | None = None
-        self._is_welcome = False  # on this connection; nothing before it counts
+        self.session: int | None = None
+        self.is_linked = False  # nothing before the welcome counts
         self._is_running = False
         self._is_alone = False  # plays a gesture without a session
         self._heard_s = 0.0
@@ -87,23 +91,13 @@ class Performer:
         return self.body.status.reports
 
     @property
-    def session(self) -> int | None:
-        """The session of the last welcome."""
-        return self._session
-
-    @property
-    def is_linked(self) -> bool:
-        """Whether the server has sent its welcome on this connection, which is not lost."""
-        return self._is_welcome
-
-    @property
     def may_act(self) -> bool:
         """Whether a decision may move a robot, this one or another that acts on its decisions.
 
         A page of the PT has to be open for that, also where our own base is simulated.
         """
         return (
-            self._is_welcome
+            self.is_linked
             and self._is_running
             and not self._has_hung
             and self.body.safety.is_watched
@@ -130,7 +124,7 @@ class Performer:
 
     def disconnect(self, reason: str) -> None:
         """Stand still at once: the connection to the server is lost. A real base is disarmed."""
-        self._is_welcome = self._is_running = False
+        self.is_linked = self._is_running = False
         self.body.status.reset()
         self.body.safety.disconnect()
         self.body.halt(reason)
@@ -162,10 +156,10 @@ class Performer:
         """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
         self._has_hung, self._ticked_s = now_s - self._ticked_s > LAPSED_S, now_s
         # Without a session it does not move, and the server sends no heartbeat.
-        if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
+        if self.session is not None and self.is_linked and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
-        nobody_walks = self._is_welcome and not self._is_running
-        self._report(now_s, self.body.tick(now_s, may_be_driven=nobody_walks))
+        may_be_driven = self.is_linked and not self._is_running
+        self._report(now_s, self.body.tick(now_s, may_be_driven=may_be_driven))
 
     def _dispatch(self, message: Message, now_s: float) -> None:
         kind = message.get("type")
@@ -173,7 +167,7 @@ class Performer:
             self._handle_welcome(message)
         elif kind == "stop":  # whenever it comes, from whichever connection
             self._handle_stop()
-        elif not self._is_welcome:
+        elif not self.is_linked:
             return  # left over from a connection that was lost
         self._heard_s = now_s
         match kind:
@@ -206,7 +200,7 @@ class Performer:
             cue, state = Cue.read(message.get("cue")), message.get("state")
             if not isinstance(state, str) or not isinstance(message.get("stopped", False), bool):
                 raise BadFrame("A welcome says in which state the session is.")
-            if session != self._session:
+            if session != self.session:
                 self.decider = WindowDecider(cue)
                 self.reports.clear()
             self._set_cue(cue)
@@ -217,9 +211,9 @@ class Performer:
                 self._handle_stop()
         else:
             raise BadFrame('"session" is a number, or null.')
-        if session != self._session or not self._is_running:
+        if session != self.session or not self._is_running:
             self.body.player.stop(REPLACED)
-        self._session, self._is_welcome = session, True
+        self.session, self.is_linked = session, True
 
     def _set_cue(self, cue: Cue) -> None:
         """Use another cue, with the gestures that came with it."""
@@ -290,7 +284,7 @@ class Performer:
             return "performing", ""
         if self.body.is_away:
             return "away", AWAY
-        if self._session is None and not self._is_alone:
+        if self.session is None and not self._is_alone:
             return "idle", NO_SESSION
         return "idle", reason if self._is_running or self._is_alone else NOT_RUNNING
 
@@ -298,7 +292,7 @@ class Performer:
         """Show the state to people, and report it to the server."""
         state, player = self._state(there), self.body.player
         self.body.status.show(state, is_quiet=self.decider.cue.is_quiet)
-        if self._is_welcome:
+        if self.is_linked:
             counts = {"refused_arms": self.body.safety.refused_arms, **self.body.base.counters}
             self.body.status.report_status(
                 now_s,

@@ -1,1 +1,1 @@
-"""Records what a robot heard, ordered, did and said, so that a stop can be looked at later."""
+"""Records what a robot received, ordered, did and sent, so that a stop can be looked at later."""

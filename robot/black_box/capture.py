@@ -39,7 +39,7 @@ class Capture:
     def record_message(self, message: Message) -> None:
         """Record a message of the server that was handled just now."""
         if self._box is not None:
-            self._box.note(heard=message)
+            self._box.note(received=message)
             self._look_for_stop()
 
     def record_tick(self, now_s: float) -> None:
@@ -62,19 +62,19 @@ class Capture:
     def record_loss(self, reason: str) -> None:
         """Retain the recording: the base is lost."""
         if self._box is not None:
-            self._box.keep(reason, self._performer.session)
+            self._box.retain(reason, self._performer.session)
 
     def _look_for_stop(self) -> None:
         latch = self._performer.body.safety.latch
         if self._box is not None and latch and latch != self._latch:
-            self._box.keep(latch, self._performer.session)
+            self._box.retain(latch, self._performer.session)
         self._latch = latch
 
     def _record_report(self, report: Report) -> None:
         if self._box is not None:
-            self._box.note(said=report)
+            self._box.note(sent=report)
             if report.get("outcome") == NO_LINK:
-                self._box.keep(NO_LINK, self._performer.session)
+                self._box.retain(NO_LINK, self._performer.session)
 
     def _record_bytes(self, data: bytes) -> None:
         if self._box is not None and self._is_awake:

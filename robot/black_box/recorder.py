@@ -1,4 +1,4 @@
-"""The black box of a robot: the last minutes on its disk, kept where something stopped it.
+"""The black box of a robot: the last minutes on its disk, retained where something stopped it.
 
 Nothing here holds up the loop that drives the base: it appends to a list in memory, and a thread
 writes. Where the disk is too slow, the oldest records are dropped and counted. A power cut may lose
@@ -7,7 +7,6 @@ the last seconds: they are written every half second, but the disk is not told t
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -16,13 +15,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from robot.atomic_file import write_atomically
 from robot.black_box.ring import Ring
 from robot.wire.incident import Record, pack, read_lines, to_lines
 
 WAITING = 6_000  # records in memory: of a minute
 WRITE_EVERY_S = 0.5
 BEFORE_S, AFTER_S = 30.0, 5.0  # of an incident
-KEPT_FILES = 50  # the newest; some 0.6 MB each
+MAX_FILES = 50  # the newest; some 0.6 MB each
 TO_SEND = 4  # incidents that wait for the server
 
 CLOSED = "closed"
@@ -30,7 +30,7 @@ DIED = "worker_died"
 
 
 class Incident(NamedTuple):
-    """A kept recording: why, in which session, when by our clock [s], its records as one text."""
+    """A retained recording: why, in which session, when by our clock [s], and its text."""
 
     reason: str
     session: int | None
@@ -38,8 +38,8 @@ class Incident(NamedTuple):
     recording: str
 
 
-class _Keeping(NamedTuple):
-    """What is to be kept once its last seconds are recorded."""
+class _Retention(NamedTuple):
+    """What is to be retained once its last seconds are recorded."""
 
     reason: str
     session: int | None
@@ -81,19 +81,19 @@ class BlackBox:
         self._monotonic, self._now = monotonic, now
         self._ring = Ring(folder)
         self._waiting: deque[Record] = deque()
-        self._told_lost = 0
-        self._keeping: _Keeping | None = None
+        self._reported_lost = 0
+        self._retention: _Retention | None = None
         self._is_closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="black box", daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin to record. What a run before it left without closing is kept."""
+        """Begin to record. What a run before it left without closing is retained."""
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         """Write the rest, for a second at most, where the disk answers."""
-        self.note(kept=CLOSED)
+        self.note(retained=CLOSED)
         self._is_closing.set()
         self._thread.join(1.0)
 
@@ -104,28 +104,28 @@ class BlackBox:
             self.lost += 1
         self._waiting.append({"at_s": round(self._monotonic(), 3), **what})
 
-    def keep(self, reason: str, session: int | None) -> None:
-        """Keep the recording around now; within that of an earlier reason only note this one."""
-        is_first = self._keeping is None
-        self.note(kept=reason, is_first=is_first)
+    def retain(self, reason: str, session: int | None) -> None:
+        """Retain the recording around now; within that of an earlier reason, only note this one."""
+        is_first = self._retention is None
+        self.note(retained=reason, is_first=is_first)
         if is_first:
-            self._keeping = _Keeping(reason, session, self._now(), self._monotonic())
+            self._retention = _Retention(reason, session, self._now(), self._monotonic())
 
     def begin(self) -> None:
-        """Make the folder, and keep what a worker that died has left. Raises OSError."""
+        """Make the folder, and retain what a worker that died has left. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
         left = read_lines(self._ring.begin())
-        if left and left[-1].get("kept") != CLOSED:
-            self._store(_Keeping(DIED, None, self._now(), left[-1]["at_s"]), left)
+        if left and left[-1].get("retained") != CLOSED:
+            self._store(_Retention(DIED, None, self._now(), left[-1]["at_s"]), left)
 
     def write(self) -> None:
         """Write what waits, and an incident that is over. Raises OSError."""
         records: list[Record] = []
-        if self.lost > self._told_lost:
+        if self.lost > self._reported_lost:
             records.append(
-                {"at_s": round(self._monotonic(), 3), "lost": self.lost - self._told_lost}
+                {"at_s": round(self._monotonic(), 3), "lost": self.lost - self._reported_lost}
             )
-            self._told_lost = self.lost
+            self._reported_lost = self.lost
         while self._waiting:
             records.append(self._waiting.popleft())
         try:
@@ -133,29 +133,24 @@ class BlackBox:
         except OSError:
             self.lost += len(records)
             raise
-        keeping = self._keeping
-        if keeping is not None and (
-            self._is_closing.is_set() or self._monotonic() - keeping.at_s >= AFTER_S
+        retention = self._retention
+        if retention is not None and (
+            self._is_closing.is_set() or self._monotonic() - retention.at_s >= AFTER_S
         ):
-            self._keeping = None
-            kept = self._store(keeping, read_lines(self._ring.read()))
-            incident = Incident(keeping.reason, keeping.session, keeping.at_s, pack(kept))
+            self._retention = None
+            stored = self._store(retention, read_lines(self._ring.read()))
+            incident = Incident(retention.reason, retention.session, retention.at_s, pack(stored))
             self.incidents.append(incident)
 
-    def _store(self, keeping: _Keeping, recorded: list[dict[str, Any]]) -> list[Record]:
+    def _store(self, retention: _Retention, recorded: list[dict[str, Any]]) -> list[Record]:
         """Write the file of an incident, and return its records; remove the oldest files."""
-        from_s, until_s = keeping.at_s - BEFORE_S, keeping.at_s + AFTER_S
-        kept: list[Record] = [one for one in recorded if from_s <= one["at_s"] <= until_s]
-        path = self.folder / f"incident-{keeping.at:%Y%m%dT%H%M%S%fZ}-{keeping.reason}.jsonl"
-        unfinished = path.with_suffix(".new")
-        with unfinished.open("w", encoding="utf-8") as file:
-            file.write(to_lines(kept))
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-        for old in sorted(self.folder.glob("incident-*.jsonl"))[:-KEPT_FILES]:
+        from_s, until_s = retention.at_s - BEFORE_S, retention.at_s + AFTER_S
+        records: list[Record] = [one for one in recorded if from_s <= one["at_s"] <= until_s]
+        path = self.folder / f"incident-{retention.at:%Y%m%dT%H%M%S%fZ}-{retention.reason}.jsonl"
+        write_atomically(path, to_lines(records).encode(), mode=0o644)
+        for old in sorted(self.folder.glob("incident-*.jsonl"))[:-MAX_FILES]:
             old.unlink()
-        return kept
+        return records
 
     def _run(self) -> None:
         has_begun = is_over = False

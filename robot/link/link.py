@@ -55,7 +55,7 @@ class Link:
     on_lost
         Called with a reason and the pause before the next attempt [s], each time a connection is
         lost or cannot be made. A robot stops here.
-    keep_token
+    store_token
         Stores another token that the server gives in place of this one, in a thread of its own, and
         returns whether the disk has it; None where there is no place for one.
     timing, jitter, sleep
@@ -72,7 +72,7 @@ class Link:
         greet: Callable[[], Message],
         *,
         on_lost: Callable[[str, float], None] = _ignore_loss,
-        keep_token: Callable[[str], bool] | None = None,
+        store_token: Callable[[str], bool] | None = None,
         timing: Timing = TIMING,
         jitter: Callable[[], float] = random.random,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
@@ -81,7 +81,7 @@ class Link:
         self._token = token
         self._greet = greet
         self._on_lost = on_lost
-        self._keep_token = keep_token
+        self._store_token = store_token
         self._timing = timing
         self._sleep = sleep
         self._back_off = BackOff(timing, jitter)
@@ -197,7 +197,7 @@ class Link:
         self._error, self._was_heard = "", False
         # A server that refuses us may have closed already; iterating then reads its reason.
         with suppress(ConnectionClosed):
-            greeting = self._greet() | ({"rotates": True} if self._keep_token else {})
+            greeting = self._greet() | ({"rotates": True} if self._store_token else {})
             await socket.send(json.dumps(greeting, allow_nan=False))
         if self._is_closed:
             await socket.close()
@@ -228,9 +228,9 @@ class Link:
     async def _replace_token(self, message: Message) -> None:
         """Store the token that the server gives, and only then say it back."""
         token = message.get("token")
-        if self._keep_token is None or not isinstance(token, str) or not token.isascii():
+        if self._store_token is None or not isinstance(token, str) or not token.isascii():
             return
-        if await asyncio.to_thread(self._keep_token, token):
+        if await asyncio.to_thread(self._store_token, token):
             self._token = token
             await self.send({"type": "token", "token": token})
 

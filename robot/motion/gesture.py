@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
 from robot.motion.limits import DEFAULT_LIMITS, Limits
@@ -199,15 +199,7 @@ def needed_time_s(segments: Sequence[Segment], limits: Limits, hold_s: float) ->
 
 def check_waypoint(number: int, waypoint: Waypoint) -> None:
     """Check a waypoint by itself, whatever comes before it. Raises BadWaypoint."""
-    numbers = (
-        waypoint.x_m,
-        waypoint.y_m,
-        waypoint.heading_rad,
-        waypoint.within_s,
-        waypoint.pace,
-        waypoint.hold_s,
-    )
-    if not all(map(math.isfinite, numbers)):
+    if not all(map(math.isfinite, astuple(waypoint))):
         raise BadWaypoint(number, NOT_FINITE)
     away_m = waypoint.pose.distance_m(HOME)
     if away_m > REACH_M:

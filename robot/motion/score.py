@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from robot.motion.gesture_errors import BadGesture
+from robot.wire.frames import to_number
 
 MAX_ENTRIES = 64  # of lights, and of notes
 SCORE_MAX_S = 17.0  # a gesture's longest, and its announcement
@@ -178,9 +178,8 @@ def _read_note(number: int, entry: Mapping[str, Any]) -> Note:
 def _number(
     entry: Mapping[str, Any], name: str, kind: str, number: int, low: float, high: float
 ) -> float:
-    value = entry.get(name)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value) or not low <= value <= high:  # type: ignore[arg-type, operator]
+    value = to_number(entry.get(name), low, high)
+    if value is None:
         raise BadGesture(
             "{kind} {number}: {name} is a number from {low:g} to {high:g}.",
             kind=kind,
@@ -189,4 +188,4 @@ def _number(
             low=low,
             high=high,
         )
-    return float(value)  # type: ignore[arg-type]
+    return value

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import threading
 from collections import Counter
 from dataclasses import dataclass
 
 from robot.motion.limits import ORDER_HOLDS_S
+from robot.wire.frames import to_number
 
 MAX_AHEAD_S = 0.05  # an order from further in the future is refused
 MAX_FRAME_BYTES = 64  # a Kobuki's buffer for commands [bytes] (docs/reference/kobuki.md#framing)
@@ -32,15 +32,15 @@ class Order:
         """Return the order of a line. Raises BadOrder."""
         try:
             fields = json.loads(line)
-            number, sent_s = fields["number"], fields["sent_s"]
+            number, sent_s = fields["number"], to_number(fields["sent_s"])
             frame, once = bytes.fromhex(fields["frame"]), bytes.fromhex(fields.get("once", ""))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise BadOrder("An order is a JSON object with number, sent_s and frame.") from None
-        if type(number) is not int or type(sent_s) not in (int, float):
-            raise BadOrder('"number" is a whole number, "sent_s" a number.')
-        if not math.isfinite(sent_s) or not 0 < len(frame) <= MAX_FRAME_BYTES >= len(once):
-            raise BadOrder(f"Numbers are finite, frames have up to {MAX_FRAME_BYTES} bytes.")
-        return cls(number, float(sent_s), frame, once)
+        if type(number) is not int or sent_s is None:
+            raise BadOrder('"number" is a whole number, "sent_s" a finite one.')
+        if not 0 < len(frame) <= MAX_FRAME_BYTES >= len(once):
+            raise BadOrder(f"Frames have up to {MAX_FRAME_BYTES} bytes.")
+        return cls(number, sent_s, frame, once)
 
 
 class Setpoint:

@@ -15,6 +15,7 @@ from typing import Any
 from robot.motion.pose import Pose
 from robot.motion.twist import Twist
 from robot.ros.frames import BadRosFrame
+from robot.wire.frames import to_number
 
 TWIST = "geometry_msgs/Twist"
 TWIST_STAMPED = "geometry_msgs/TwistStamped"
@@ -113,8 +114,7 @@ def read_flag(message: Message, name: str) -> bool:
 def _number(message: Any, most: float, *path: str) -> float:
     for name in path:
         message = message.get(name) if isinstance(message, dict) else None
-    if isinstance(message, bool) or not isinstance(message, (int, float)):
-        raise BadRosFrame(f"{'.'.join(path)} is a number.")
-    if not abs(message) <= most:
-        raise BadRosFrame(f"{'.'.join(path)} is not within ±{most:g}.")
-    return float(message)
+    number = to_number(message, -most, most)
+    if number is None:
+        raise BadRosFrame(f"{'.'.join(path)} is a number within ±{most:g}.")
+    return number

@@ -80,18 +80,32 @@ def read_whole(message: Mapping[str, Any], name: str, *, low: int, high: int = 2
     return value
 
 
+def to_number(value: Any, low: float = -math.inf, high: float = math.inf) -> float | None:
+    """Return a value as a finite number within bounds; None for anything else.
+
+    Parameters
+    ----------
+    value
+        Any JSON value; true and false are no numbers.
+    low, high
+        The least and the largest number, included.
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) and low <= number <= high else None
+
+
 def read_number(
     message: Mapping[str, Any], name: str, low: float = -math.inf, high: float = math.inf
 ) -> float:
     """Return a finite number of a message, within bounds. Raises BadFrame."""
-    value = message.get(name)
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        if math.isfinite(number) and low <= number <= high:
-            return number
+    number = to_number(message.get(name), low, high)
+    if number is not None:
+        return number
     if math.isinf(low) and math.isinf(high):
         raise BadFrame(f'"{name}" is a finite number.')
     raise BadFrame(f'"{name}" is a number from {low:g} to {high:g}.')

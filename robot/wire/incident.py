@@ -5,12 +5,12 @@ robot's clock [s], and one of:
 
 ``tick``
     What was ordered and how it moved, by ``TICK``; with ``hazards`` where the base felt any.
-``heard``, ``said``
+``received``, ``sent``
     A message of the server, a report to it.
 ``bytes``
     What a Kobuki sent, in hexadecimal; only in the robot's own file.
-``kept``
-    A reason to keep the recording; ``is_first`` where it is not within an earlier one's.
+``retained``
+    Why the recording is retained; ``is_first`` where it is not within an earlier one's.
 ``lost``
     How many records before this one were dropped, because the disk was too slow.
 

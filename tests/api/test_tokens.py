@@ -37,7 +37,7 @@ def issued(answer: Any) -> str:
 
 
 def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(world):
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     answer = client.post("/admin/rehab/apitoken/add/", filled(role="researcher"))
     token = issued(answer)
     assert token not in str(answer.cookies)
@@ -57,7 +57,7 @@ def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(w
 
 
 def test_a_token_carries_no_role_that_its_account_lacks(world):
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     token = ApiToken(clinic=world.clinic, user=world.people[Role.RESEARCHER], role="pt")
     with pytest.raises(ValidationError, match="choose that role, or one below"):
         token.clean()
@@ -67,7 +67,7 @@ def test_a_token_carries_no_role_that_its_account_lacks(world):
 
 
 def test_a_lead_makes_no_token_that_speaks_for_another_person(world):
-    client, pt = client_of(world, Role.LEAD), world.people[Role.PT]
+    client, pt = world.lead, world.people[Role.PT]
     client.post("/admin/rehab/apitoken/add/", filled(role="pt", user=pt.pk))
     assert ApiToken.everywhere.get(name="Export").user == world.people[Role.LEAD]
     others = world.rows[ApiToken]
@@ -82,7 +82,7 @@ def test_a_lead_makes_no_token_that_speaks_for_another_person(world):
 
 
 def test_a_renewed_token_is_shown_once_and_in_no_cookie(world):
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     client.post("/admin/rehab/apitoken/add/", filled())
     row = ApiToken.everywhere.get(name="Export")
     chosen = {"action": "renew_tokens", "_selected_action": row.pk}
@@ -94,7 +94,7 @@ def test_a_renewed_token_is_shown_once_and_in_no_cookie(world):
 
 
 def test_a_token_ends_after_ninety_days_and_never_later_than_a_year(world):
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     program = Program(issued(client.post("/admin/rehab/apitoken/add/", filled())))
     row = ApiToken.everywhere.get(name="Export")
     assert timedelta(days=89) < row.expires_at - NOW < timedelta(days=91)

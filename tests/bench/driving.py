@@ -97,22 +97,9 @@ def allow_many_files() -> None:
 @contextmanager
 def relay() -> Iterator[tuple[int, int]]:
     """Run a bare relay, which stores nothing; give its port and process."""
-    with _run_program("tests/bench/relay.py") as running:
-        yield running
-
-
-@contextmanager
-def stock_channels(redis: str) -> Iterator[tuple[int, int]]:
-    """Run the same on stock Channels with the Redis layer; give its port and process."""
-    with _run_program("tests/bench/stock_channels.py", redis) as running:
-        yield running
-
-
-@contextmanager
-def _run_program(program: str, *arguments: str) -> Iterator[tuple[int, int]]:
     port = free_port()
     process = subprocess.Popen(
-        [sys.executable, program, str(port), *arguments],
+        [sys.executable, "tests/bench/relay.py", str(port)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         text=True,

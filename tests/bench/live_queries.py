@@ -9,6 +9,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from tests.bench.own_database import copy_rows, set_up
+
 WALKED = 1800  # steps a session: half an hour
 EVENTS = 60  # a session
 OPEN = 100  # sessions that run
@@ -39,34 +41,12 @@ def fill(rows: int) -> list[int]:
                 store(aggregate, [aggregate.log_event(Remark.HANDRAIL, None, at, {})])
     TrainingSession.everywhere.filter(pk=key).update(last_number=WALKED, **aggregate.summary())
     count = max(OPEN, rows // WALKED)
-    if connection.vendor == "sqlite":
-        numbers = f"(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < {count}) SELECT i FROM n)"  # noqa: E501, S608
-    else:
-        numbers = f"generate_series(1, {count})"
-
-    def copy(model: Any, which: str, changed: dict[str, str]) -> None:
-        columns = [f.column for f in model._meta.concrete_fields]
-        columns = [column for column in columns if column != "id" or "id" in changed]
-        chosen = ", ".join(changed.get(column, f"t.{column}") for column in columns)
-        table = model._meta.db_table
-        with connection.cursor() as cursor:
-            cursor.execute(
-                f"INSERT INTO {table} ({', '.join(columns)}) SELECT {chosen} "  # noqa: S608
-                f"FROM {numbers} AS n(i), {table} AS t WHERE {which}"
-                if connection.vendor != "sqlite"
-                else f"INSERT INTO {table} ({', '.join(columns)}) SELECT {chosen} "  # noqa: S608
-                f"FROM {numbers} AS n, {table} AS t WHERE {which}"
-            )
-
     new = {"session_id": f"{BASE} + i"}
     state = f"CASE WHEN i <= {OPEN} THEN 'running' ELSE 'finished' END"
-    copy(
-        TrainingSession,
-        f"t.id = {key}",
-        {"id": f"{BASE} + i", "state": state, "station_id": "NULL", "owner": "''"},
-    )
-    copy(Step, f"t.session_id = {key}", new)
-    copy(SessionEvent, f"t.session_id = {key}", new)
+    sessions = {"id": f"{BASE} + i", "state": state, "station_id": "NULL", "owner": "''"}
+    copy_rows(TrainingSession, count, f"t.id = {key}", sessions)
+    for model in (Step, SessionEvent):
+        copy_rows(model, count, f"t.session_id = {key}", new)
     with connection.cursor() as cursor:
         cursor.execute("ANALYZE")
     return [BASE + index for index in range(1, OPEN + 1)]
@@ -93,7 +73,7 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     found = loading.load_together(keys[:1])[keys[0]]
     assert isinstance(found, loading.LoadedSession), found
     aggregate = found.aggregate
-    yield "load one", lambda: loading.load(keys[1])
+    yield "load one", lambda: loading.load_together([keys[1]])
     yield "load fifty", lambda: loading.load_together(keys[2:52])
 
     def job(rows: Any, summary: Any = None) -> Job:
@@ -168,15 +148,6 @@ def _find_scans(sql: str) -> list[str]:
     return [line for line in plan if (match := re.search(pattern, line)) and match[1] in GROWING]
 
 
-def main(rows: int) -> None:
-    """Measure with so many rows."""
-    import django
-    from django.core.management import call_command
-
-    django.setup()
-    call_command("migrate", verbosity=0)
-    print(json.dumps(measure(rows)))
-
-
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    set_up()
+    print(json.dumps(measure(int(sys.argv[1]))))

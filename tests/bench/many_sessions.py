@@ -11,6 +11,8 @@ import time
 from itertools import chain
 from typing import Any
 
+from tests.bench.own_database import copy_rows, set_up
+
 COMMITS = 300
 LOOKS = 200  # of other patients each
 TRIES = 5  # of each: the best is what it takes, the others also wait for what else runs here
@@ -35,39 +37,24 @@ def fill(count: int, patients: int) -> None:
     )
     walked = walk(first, "positive", strides(2, 1))
     TrainingSession.everywhere.filter(pk=walked.pk).update(plan={})
-    if connection.vendor == "sqlite":
-        numbers = (
-            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < {0}) SELECT"
-        )
-        source = "n"
-    else:
-        numbers, source = "SELECT", "generate_series(1, {0}) AS n(i)"
     # Hit rates of every whole percent, most of them around the middle.
     rate = "(i % 211 * 79 % 211 + i / 211 % 199 * 104 % 199) / 410.0"
     at = {"sqlite": "datetime('2026-11-21', '-' || (i % 1000000) || ' seconds')"}.get(
         connection.vendor, "timestamptz '2026-11-21' - (i % 1000000) * interval '1 second'"
     )
 
-    def copy(model, rows: int, which: str, changed: dict[str, str]) -> None:
-        columns = [f.column for f in model._meta.concrete_fields if f.column != "id"]
-        chosen = ", ".join(changed.get(column, f"t.{column}") for column in columns)
-        table = model._meta.db_table
-        with connection.cursor() as cursor:
-            cursor.execute(
-                f"INSERT INTO {table} (id, {', '.join(columns)}) {numbers.format(rows)} "
-                f"{changed['id']}, {chosen} FROM {table} t, {source.format(rows)} WHERE {which}"
-            )
-
     new = {"id": "900000000 + i"}
     text = "CAST(i AS varchar(12))"
-    copy(
+    copy_rows(
         Patient,
         patients,
         f"t.id = {first.pk}",
         new | {"code": text, "pseudonym": text, "alias": text, "nickname": text},
     )
-    copy(Consent, patients, f"t.patient_id = {first.pk}", new | {"patient_id": "900000000 + i"})
-    copy(
+    copy_rows(
+        Consent, patients, f"t.patient_id = {first.pk}", new | {"patient_id": "900000000 + i"}
+    )
+    copy_rows(
         TrainingSession,
         count,
         f"t.id = {walked.pk}",
@@ -75,7 +62,7 @@ def fill(count: int, patients: int) -> None:
     )
     values = {"hit_rate": rate, "steps": "100 + i % 400", "active_minutes": "10 + i % 20"}
     for number, (slug, value) in enumerate(values.items(), start=1):
-        copy(
+        copy_rows(
             TrainingSession.metrics.rel.related_model,
             count,
             f"t.session_id = {walked.pk} AND t.slug = '{slug}'",
@@ -199,15 +186,6 @@ def walk_beside_a_first_look(board: Any) -> dict[str, float]:
     return found
 
 
-def main(count: int, patients: int) -> None:
-    """Measure with so many sessions of so many patients."""
-    import django
-    from django.core.management import call_command
-
-    django.setup()
-    call_command("migrate", verbosity=0)
-    print(json.dumps(measure(count, patients)))
-
-
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    set_up()
+    print(json.dumps(measure(*map(int, sys.argv[1:]))))

@@ -7,15 +7,14 @@ import resource
 import sys
 import time
 from pathlib import Path
-from typing import Any
+
+from tests.bench.own_database import copy_rows, set_up
 
 STRIDES_EACH = 2_000  # of a session: half an hour of walking with both legs
 
 
 def fill(sessions: int) -> None:
     """Walk one session by the real rules, and copy it in the database itself."""
-    from django.db import connection
-
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.log import SessionEvent, Step
     from rehab.sessions.models import TrainingSession
@@ -27,24 +26,10 @@ def fill(sessions: int) -> None:
     )
     walked = walk(patient, "positive", strides(STRIDES_EACH // 2, STRIDES_EACH // 2))
 
-    def copy(model: Any, key: str, changed: dict[str, str]) -> None:
-        columns = [f.column for f in model._meta.concrete_fields if f.column != "id"]
-        chosen = ", ".join(changed.get(column, f"t.{column}") for column in columns)
-        table = model._meta.db_table
-        with connection.cursor() as cursor:
-            cursor.execute(
-                f"INSERT INTO {table} (id, {', '.join(columns)}) WITH RECURSIVE n(i) AS "  # noqa: S608
-                f"(SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < {sessions - 1}) "
-                f"SELECT {changed['id']}, {chosen} FROM {table} t, n WHERE t.{key} = {walked.pk}"
-            )
-
-    copy(TrainingSession, "id", {"id": "900000 + i"})
+    copy_rows(TrainingSession, sessions - 1, f"t.id = {walked.pk}", {"id": "900000 + i"})
     for model in (Step, SessionEvent):
-        copy(
-            model,
-            "session_id",
-            {"id": "1000000 + i * 100000 + t.id", "session_id": "900000 + i"},
-        )
+        new = {"id": "1000000 + i * 100000 + t.id", "session_id": "900000 + i"}
+        copy_rows(model, sessions - 1, f"t.session_id = {walked.pk}", new)
 
 
 def own_memory_mb() -> float:
@@ -89,9 +74,5 @@ def measure(sessions: int, folder: Path) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    import django
-    from django.core.management import call_command
-
-    django.setup()
-    call_command("migrate", verbosity=0)
+    set_up()
     print(json.dumps(measure(int(sys.argv[1]), Path(sys.argv[2]))))

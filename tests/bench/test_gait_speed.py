@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import time
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -185,37 +181,3 @@ def test_intake_speed(recording, chunk):
         f"\ngait with intake, both legs at 1 kHz, chunks of {chunk}: {seconds * 10_000:.0f} ms of "
         f"CPU for ten minutes, {seconds / len(chunks) * 1e6:.0f} µs a chunk"
     )
-
-
-@pytest.mark.parametrize("every", [10, 1])
-def test_against_peers(recording, tmp_path, every):
-    """One minute at 100 Hz and at 1 kHz. Peers find events; ours also measures A2 and checks it."""
-    python = os.environ.get("GARRY_PEERS")
-    if not python:
-        pytest.skip(
-            "GARRY_PEERS names no Python with gaitkit and kineticstoolkit: python -m venv peers && "
-            "peers/bin/pip install gaitkit kineticstoolkit, then GARRY_PEERS=peers/bin/python"
-        )
-    part = slice(0, 60 * RATE_HZ, every)
-    time_s = recording.t_s[part]
-    legs = [
-        np.array([leg.force_n[part], leg.moment_nm[part], leg.angle_rad[part]])
-        for leg in (recording.left, recording.right)
-    ]
-    ours = []
-    for _ in range(REPEATS):
-        detector = TwoLegDetector(RATE_HZ / every, MASS_KG)
-        began = time.perf_counter()
-        for first in range(0, len(time_s), CHUNK):
-            chunk = slice(first, first + CHUNK)
-            detector.feed(time_s[chunk], list(legs[0][:, chunk]), list(legs[1][:, chunk]))
-        ours.append(time.perf_counter() - began)
-    path = tmp_path / "signal.npz"
-    np.savez(path, t_s=time_s, left_n=legs[0][0], right_n=legs[1][0])
-    command = [python, str(Path(__file__).with_name("gait_peers.py")), str(path)]
-    run = subprocess.run(command, capture_output=True, text=True, check=True)
-    seconds = median(ours)
-    print(f"\ngait, one minute of both legs at {RATE_HZ // every} Hz: {seconds * 1000:.0f} ms")
-    for name, result in json.loads(run.stdout).items():
-        told = result if isinstance(result, str) else f"{result[0] / seconds:.0f} × as long"
-        print(f"  {name}: {told}")

@@ -1,6 +1,6 @@
 """Hosted servers on one PostgreSQL and one Redis, each session with tablet, monitor and robot.
 
-Beside a relay, and stock Channels with the Redis layer. Every page of a session comes to one
+Beside a relay. Every page of a session comes to one
 server, as nginx sends a clinic's name to one. The soak takes GARRY_TEST_SOAK_MINUTES (2; the aim is
 said for 60), beside a probe of the disk and the processor: a twelfth in which the machine made
 everybody wait tells nothing of the servers.
@@ -21,7 +21,7 @@ from typing import Any
 
 import pytest
 
-from tests.bench.driving import BUSY_MS, allow_many_files, drive, relay, stock_channels
+from tests.bench.driving import BUSY_MS, allow_many_files, drive, relay
 from tests.bench.waiting import watch_machine
 from tests.support.hosted import find_missing, run_postgres, run_redis
 from tests.support.pair import Message, Pair
@@ -83,9 +83,7 @@ def test_step_to_screen(tmp_path: Path, database_and_redis: tuple[str, str], cou
     rows.write_text(json.dumps([{"session": number} for number in range(count)]))
     with relay() as (port, pid):
         floor = drive("relay", port, pid, rows, VIEWERS)
-    with stock_channels(database_and_redis[1]) as (port, pid):
-        stock = drive("relay", port, pid, rows, VIEWERS)
-    seen, disk_ms = {"relay": floor, "stock Channels, Redis": stock}, 0.0
+    seen, disk_ms = {"relay": floor}, 0.0
     for processes in PROCESSES:
         folder = tmp_path / str(processes)
         folder.mkdir()

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from tests.support.axe import check, go_dark
-from tests.support.browsers import SIZES
+from tests.support.browsers import SIZES, signed_in
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -103,11 +103,8 @@ def places(server: Server, walks: list[Walk]) -> dict[str, str]:
 
 @pytest.fixture
 def context(browser: Browser, server: Server, walks: list[Walk]) -> Iterator[BrowserContext]:
-    made = browser.new_context(base_url=server.url, reduced_motion="reduce")
-    made.add_cookies([{"name": "sessionid", "value": walks[0].cookie, "url": server.url}])
-    made.set_default_timeout(40_000)
-    yield made
-    made.close()
+    with signed_in(browser, server, walks[0], reduced_motion="reduce") as made:
+        yield made
 
 
 def open_page(context: BrowserContext, path: str, size: str) -> Page:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
+from tests.support.browsers import Visit
 from tests.support.servers import Server
 from tests.support.walk_seed import make_walks
 
@@ -35,15 +36,12 @@ def protocol(server: Server) -> str:
 
 
 @pytest.fixture
-def page(browser: Browser, server: Server, protocol: str) -> Iterator[Page]:
+def page(visit: Visit, server: Server, protocol: str) -> Iterator[Page]:
     (walk,) = make_walks(server, {})
-    context = browser.new_context(base_url=server.url, color_scheme="light")
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    made = context.new_page()
+    made = visit("about:blank", walk, color_scheme="light")
     complaints: list[str] = []
     made.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
     yield made
-    context.close()
     assert complaints == []
 
 

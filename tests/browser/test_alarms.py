@@ -7,15 +7,15 @@ import re
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
+from tests.support.browsers import Visit, signed_in
 from tests.support.servers import Server
-from tests.support.walk_seed import Feet, Walk, feet_of, make_walks
+from tests.support.walk_seed import Feet, Walk, feet_of, hear, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
@@ -35,21 +35,6 @@ SILENT_4_S = """() => document.querySelector("[data-alarm=source]")
   ?.textContent.includes("The sensor is silent for 4 s.")"""
 
 
-@contextmanager
-def dialed_in(server: Server, path: str, token: str) -> Iterator[ClientConnection]:
-    """Connect a robot or a tablet."""
-    url = f"ws://127.0.0.1:{server.port}{path}"
-    with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as socket:
-        yield socket
-
-
-@contextmanager
-def robot_of(server: Server, walk: Walk) -> Iterator[ClientConnection]:
-    with dialed_in(server, "/ws/robot/", walk.robot) as robot:
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
-        yield robot
-
-
 @pytest.fixture
 def walk(server: Server) -> Walk:
     return make_walks(server, {"phases": [{"kind": "training"}]})[0]
@@ -57,14 +42,12 @@ def walk(server: Server) -> Walk:
 
 @pytest.fixture
 def monitor(server: Server, browser: Browser, walk: Walk) -> Iterator[Page]:
-    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    context.add_init_script(f"({LISTEN})()")
-    page = context.new_page()
-    page.goto(f"/sessions/{walk.session}/monitor/")
-    expect(page.locator("[data-main]")).to_have_attribute("value", "start")
-    yield page
-    context.close()
+    with signed_in(browser, server, walk, reduced_motion="reduce") as context:
+        context.add_init_script(f"({LISTEN})()")
+        page = context.new_page()
+        page.goto(walk.monitor_path)
+        expect(page.locator("[data-main]")).to_have_attribute("value", "start")
+        yield page
 
 
 def begin(monitor: Page, feet: Feet) -> None:
@@ -84,11 +67,6 @@ def noted(server: Server, walk: Walk) -> list[tuple[str, float | None]]:
     return [tuple(row) for row in rows if row[0] != "start"]
 
 
-def hear_stop(robot: ClientConnection) -> None:
-    while json.loads(robot.recv(10))["type"] != "stop":
-        pass
-
-
 @pytest.mark.essential
 def test_a_fall_stops_the_robot_pauses_and_is_noted_before_anything_is_asked(
     server: Server, monitor: Page, walk: Walk
@@ -96,7 +74,7 @@ def test_a_fall_stops_the_robot_pauses_and_is_noted_before_anything_is_asked(
     with feet_of(server, walk) as feet, robot_of(server, walk) as robot:
         begin(monitor, feet)
         monitor.click("[data-fall]")
-        hear_stop(robot)
+        hear(robot, "stop")
         expect(monitor.locator("[data-show=fall]")).to_contain_text("Noted.")
         expect(monitor.locator("[data-main]")).to_have_attribute("value", "resume")
         assert noted(server, walk) == [("robot_stop", None), ("pause", None), ("fall", None)]
@@ -119,7 +97,7 @@ def test_a_fall_is_at_the_robot_within_a_tenth_of_a_second(
         begin(monitor, feet)
         for _ in range(5):
             monitor.click("[data-fall]")
-            hear_stop(robot)
+            hear(robot, "stop")
             heard_s = time.time()
             took_s.append(heard_s - monitor.evaluate("tapped_at") / 1000)
             expect(monitor.locator("[data-show=fall]")).to_contain_text("Noted.")
@@ -135,7 +113,7 @@ def test_undo_withdraws_the_note_alone(server: Server, monitor: Page, walk: Walk
     with feet_of(server, walk) as feet, robot_of(server, walk) as robot:
         begin(monitor, feet)
         monitor.click("[data-fall]")
-        hear_stop(robot)
+        hear(robot, "stop")
         undo = monitor.locator("[data-withdraw]")
         expect(undo).to_have_text("It was no fall (10 s)")
         monitor.clock.fast_forward(3_000)
@@ -191,9 +169,10 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
     expect(readiness).to_contain_text("! No sensor")
     expect(readiness).to_contain_text("– No robot")
     expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no tablet")
-    path = f"/ws/session/{walk.session}/patient/"
+    url = f"ws://127.0.0.1:{server.port}/ws/session/{walk.session}/patient/"
+    tablet = {"Authorization": f"Bearer {walk.tablet}"}
     with feet_of(server, walk) as feet, robot_of(server, walk):
-        with dialed_in(server, path, walk.tablet):
+        with connect(url, additional_headers=tablet):
             expect(readiness).to_have_text("✓ Tablet shows Rosa✓ Sensor✓ Robot")
             expect(monitor.locator(".mirror h2")).to_have_text("Rosa sees now")
             monitor.click("[data-robot=stop]")
@@ -211,11 +190,9 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
     expect(monitor.locator("[data-alarm=robot]")).to_contain_text("The robot is lost")
 
 
-def unheard_page(browser: Browser, server: Server, walk: Walk, path: str) -> Page:
+def unheard_page(visit: Visit, walk: Walk) -> Page:
     """Return a page whose stop is answered as where the session's own server is silent."""
-    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
+    page = visit("about:blank", walk, reduced_motion="reduce")
 
     def pass_on(socket: WebSocketRoute) -> None:
         server_side = socket.connect_to_server()
@@ -232,20 +209,19 @@ def unheard_page(browser: Browser, server: Server, walk: Walk, path: str) -> Pag
 
     page.clock.install()
     page.route_web_socket(re.compile("/ws/session/"), pass_on)
-    page.goto(path)
+    page.goto(walk.monitor_path)
     return page
 
 
 def test_a_stop_that_the_sessions_server_does_not_hear_is_told_at_once(
-    server: Server, browser: Browser, walk: Walk
+    server: Server, visit: Visit, walk: Walk
 ) -> None:
     """On a page at another server; it says what to do, and no time has to pass for that."""
     with robot_of(server, walk):
-        page = unheard_page(browser, server, walk, f"/sessions/{walk.session}/monitor/")
+        page = unheard_page(visit, walk)
         expect(page.locator("[data-presence=robot]")).to_contain_text("✓")  # it is connected
         page.clock.pause_at(datetime.now(UTC) + timedelta(seconds=5))
         page.locator("[data-robot=stop]:visible").first.click()
         told = page.get_by_text("No answer. If the robot moves, use its own switch.").first
         expect(told).to_be_visible()
         expect(page.locator("[data-robot=stop].asked")).to_have_count(0)
-        page.context.close()

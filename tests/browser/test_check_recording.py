@@ -7,11 +7,11 @@ import re
 import sqlite3
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.gait.c3d import write_c3d
 from tests.gait.walks import make_walk
-from tests.support.browsers import SIZES
+from tests.support.browsers import Visit
 from tests.support.servers import Server
 from tests.support.walk_seed import make_walks
 
@@ -27,24 +27,15 @@ def walk():
 
 
 @pytest.fixture
-def page(server: Server, browser: Browser):
+def page(server: Server, visit: Visit) -> Page:
     (ready,) = make_walks(server, {})
     with sqlite3.connect(server.folder / "garry.sqlite3") as database:
         database.execute("UPDATE rehab_patient SET body_mass_kg = ?", (MASS_KG,))
         database.execute("UPDATE rehab_trainingsession SET state = 'finished'")
-    width, height = SIZES["laptop"]
-    context = browser.new_context(
-        base_url=server.url, viewport={"width": width, "height": height}, has_touch=True
-    )
-    context.set_default_timeout(60_000)
-    context.add_cookies([{"name": "sessionid", "value": ready.cookie, "url": server.url}])
-    page = context.new_page()
-    yield page
-    context.close()
+    return visit("/recordings/check/", ready, "laptop", has_touch=True)
 
 
 def upload(page: Page, path) -> None:
-    page.goto("/recordings/check/")
     page.set_input_files("#file", path)
     page.fill("#mass", str(MASS_KG))
     page.click("text=Check the file")

@@ -10,9 +10,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from rehab.training.valences import VALENCES
-from tests.support.browsers import SIZES
+from tests.support.browsers import SIZES, signed_in
 from tests.support.servers import Server
-from tests.support.walk_seed import feet_of, make_walks
+from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 
@@ -24,20 +24,16 @@ def run(server: Server, script: str) -> list[str]:
 
 @contextmanager
 def page_with(
-    browser: Browser, server: Server, size: str = "tablet-portrait", **cookies: str
+    browser: Browser,
+    server: Server,
+    walk: Walk,
+    size: str = "tablet-portrait",
+    *,
+    alone: bool = False,
 ) -> Iterator[Page]:
-    """Open a page with these cookies whose complaints fail the test."""
-    width, height = SIZES[size]
-    context = browser.new_context(
-        base_url=server.url, viewport={"width": width, "height": height}, has_touch=True
-    )
-    context.add_cookies(
-        [{"name": name, "value": value, "url": server.url} for name, value in cookies.items()]
-    )
-    context.set_default_timeout(40_000)
-    page = context.new_page()
-    yield page
-    context.close()
+    """Open a page of the PT's, or of the paired tablet alone."""
+    with signed_in(browser, server, walk, size, alone=alone, has_touch=True) as context:
+        yield context.new_page()
 
 
 # --- today --------------------------------------------------------------------------------------
@@ -65,7 +61,7 @@ print(TrainingSession.everywhere.filter(patient__nickname="Amara").count())
 def test_from_today_to_walking_in_three_taps(server: Server, browser: Browser) -> None:
     (walk,) = make_walks(server, {})
     run(server, EXPECTED)
-    with page_with(browser, server, sessionid=walk.cookie) as page:
+    with page_with(browser, server, walk) as page:
         page.goto("/start/")
         page.tap(".today >> text=Amara")
         page.dblclick(".huge")  # a tap that trembles is one tap
@@ -105,7 +101,7 @@ PinAttempts.everywhere.all().delete()
 
 def test_nobody_leaves_a_tablet_without_the_pin(server: Server, browser: Browser) -> None:
     (walk,) = make_walks(server, {"pin": "4711"})
-    with page_with(browser, server, garry_tablet=walk.tablet) as page:
+    with page_with(browser, server, walk, alone=True) as page:
         page.goto("/tablet/")
         page.wait_for_selector("body.alone[data-look=ready]")
         dialog, wrong = page.locator("dialog.leave"), page.locator("dialog .wrong")
@@ -122,10 +118,7 @@ def test_nobody_leaves_a_tablet_without_the_pin(server: Server, browser: Browser
         expect(dialog).to_be_visible()
         page.tap("text=Stay here")
         assert page.url.endswith(walk.path)
-        run(
-            server,
-            "from rehab.stations.models import PinAttempts as T; T.everywhere.all().delete()",
-        )
+        run(server, FORGET)
         page.tap("button.out")
         page.fill("[name=pin]", "4711")
         page.tap("dialog >> text='Leave'")
@@ -229,7 +222,7 @@ def test_words_of_every_size_stay_in_their_place(
     assert max(len(words.split()) for words in bands) <= 6
     screen = {"screen_still": True, "screen_sounds": True}
     (walk,) = make_walks(server, {"screen": screen, "name": "Bartholomäus"})
-    with page_with(browser, server, size, sessionid=walk.cookie) as page:
+    with page_with(browser, server, walk, size) as page:
         page.emulate_media(reduced_motion="reduce")
         page.goto(walk.path)
         page.wait_for_selector("body[data-look=ready]")
@@ -270,8 +263,8 @@ def tab_to(page: Page, selector: str) -> None:
 def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
     (walk,) = make_walks(server, {"name": "Keyla"})
     with (
-        page_with(browser, server, "laptop", sessionid=walk.cookie) as patient,
-        page_with(browser, server, "laptop", sessionid=walk.cookie) as pt,
+        page_with(browser, server, walk, "laptop") as patient,
+        page_with(browser, server, walk, "laptop") as pt,
         feet_of(server, walk) as feet,
     ):
         patient.goto("/start/")
@@ -346,7 +339,7 @@ print(session.pk, walk(long, "explicit", []).pk)
 def test_a_report_is_one_page_of_paper(server: Server, browser: Browser) -> None:
     (walk,) = make_walks(server, {})
     for session, fewest in zip(run(server, LONG_DAY), (1400, 0), strict=True):
-        with page_with(browser, server, "laptop", sessionid=walk.cookie) as page:
+        with page_with(browser, server, walk, "laptop") as page:
             answer = page.goto(f"/sessions/{session}/report/")
             assert answer is not None
             assert answer.ok, page.inner_text("body")

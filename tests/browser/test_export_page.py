@@ -5,9 +5,8 @@ from __future__ import annotations
 import zipfile
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.support.browsers import SIZES, picture, sign_in
+from tests.support.browsers import Visit, picture
 from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
@@ -24,16 +23,9 @@ for day in range(3):
 """
 
 
-def test_an_export_is_prepared_left_gone_on_with_and_fetched(server: Server, browser: Browser):
+def test_an_export_is_prepared_left_gone_on_with_and_fetched(server: Server, visit: Visit):
     server.run_shell(WALKED)
-    width, height = SIZES["laptop"]
-    context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
-    context.set_default_timeout(40_000)
-    page = context.new_page()
-    page.goto("/start/")
-    sign_in(page, server.password)
-    page.wait_for_url("**/start/")
-    page.goto("/export/")
+    page = visit("/export/", size="laptop")
     if "confirm" in page.url:
         page.fill("input[type=password]", server.password)
         page.click("main [type=submit], main button")
@@ -56,4 +48,3 @@ def test_an_export_is_prepared_left_gone_on_with_and_fetched(server: Server, bro
     page.click("[name=discard]")
     page.wait_for_selector("button:has-text('Prepare')")
     assert not list((server.folder / "exports").iterdir())
-    context.close()

@@ -8,18 +8,13 @@ import pytest
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
-from tests.support.browsers import sign_in
 from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
 
 
-def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, browser):
-    context = browser.new_context(base_url=server.url, viewport={"width": 390, "height": 844})
-    page = context.new_page()
-    page.goto("/start/")
-    sign_in(page, server.password)
-    page.wait_for_url("**/start/")
+def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, browser, visit):
+    page = visit("/start/", size="phone")
     first = page.get_by_text("First steps, one by one")
     expect(first).to_be_in_viewport(ratio=1)  # on a phone, too
     first.click()

@@ -8,9 +8,9 @@ import json
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.support.browsers import picture, sign_in
+from tests.support.browsers import Visit, picture
 from tests.support.layout import set_screen, too_small
 from tests.support.servers import Server
 
@@ -63,15 +63,8 @@ def rows(page: Page) -> dict[str, list[str]]:
     return found
 
 
-def test_sessions_are_compared_and_taken_along(
-    server: Server, browser: Browser, sessions: dict[str, int]
-) -> None:
-    context = browser.new_context(base_url=server.url, accept_downloads=True)
-    page = context.new_page()
-    set_screen(page, "laptop")
-    page.goto("/start/")
-    sign_in(page, server.password)
-    page.wait_for_url("**/start/")
+def test_sessions_are_compared_and_taken_along(visit: Visit, sessions: dict[str, int]) -> None:
+    page = visit("/start/", size="laptop")
     page.click("text=Insight")
 
     # Weeks first, the newest on top; each of one or two patients, whose means have the interval.
@@ -124,4 +117,3 @@ def test_sessions_are_compared_and_taken_along(
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert too_small(page, ".insight .chips a, .insight .btn", 44) == []
         picture(page, f"insight-{screen}")
-    context.close()

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
+from tests.support.browsers import Visit
 from tests.support.layout import boxes
 from tests.support.servers import Server
 from tests.support.walk_seed import Feet, feet_of, make_walks
@@ -29,19 +30,13 @@ MEANS = """async () =>
 
 
 @pytest.fixture
-def walking(server: Server, browser: Browser) -> Iterator[tuple[Page, Feet]]:
+def walking(server: Server, visit: Visit) -> Iterator[tuple[Page, Feet]]:
     (walk,) = make_walks(server, {"phases": PHASES, "goal_percent": 100})
-    context = browser.new_context(
-        base_url=server.url, reduced_motion="reduce", viewport={"width": 1440, "height": 900}
-    )
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto(f"/sessions/{walk.session}/monitor/")
+    page = visit(walk.monitor_path, walk, "laptop", reduced_motion="reduce")
     with feet_of(server, walk) as feet:
         page.click("[data-main]")
         feet.hear("start")
         yield page, feet
-    context.close()
 
 
 def at_stride(page: Page, number: int) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from websockets.sync.client import connect
 
 from tests.support.axe import check, go_dark
+from tests.support.browsers import signed_in
 from tests.support.layout import (
     CORNERS,
     LANGUAGES,
@@ -22,7 +21,7 @@ from tests.support.layout import (
     too_small,
 )
 from tests.support.servers import Server
-from tests.support.walk_seed import feet_of, make_walks
+from tests.support.walk_seed import feet_of, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
@@ -40,20 +39,16 @@ PHASES = [
 def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) -> Iterator[Page]:
     """The page of a session that runs, with a robot, a goal that was changed and a note."""
     (walk,) = make_walks(server, {"name": "Rosalinda", "phases": PHASES})
-    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto("/account/")
-    page.select_option("#language", request.param)
-    page.click("form[action*=language] button")
-    page.goto(f"/sessions/{walk.session}/monitor/")
-    url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
     with (
+        signed_in(browser, server, walk, reduced_motion="reduce") as context,
         feet_of(server, walk) as feet,
-        # Nobody reads what this robot is told: all of it is kept, or its socket would be closed.
-        connect(url, additional_headers={"Authorization": header}, max_queue=None) as robot,
+        robot_of(server, walk),
     ):
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        page = context.new_page()
+        page.goto("/account/")
+        page.select_option("#language", request.param)
+        page.click("form[action*=language] button")
+        page.goto(walk.monitor_path)
         page.wait_for_selector(".readiness li")
         for screen in CORNERS:
             set_screen(page, screen)
@@ -67,7 +62,6 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
         feet.walk(1.1)
         expect(page.locator("[data-show=number]")).to_contain_text("9")
         yield page
-    context.close()
 
 
 def safety_is_within_reach(page: Page) -> None:

@@ -4,19 +4,17 @@ in their places, and nothing is cut.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Browser, Page
-from websockets.sync.client import connect
+from playwright.sync_api import Page
 
 from tests.support.axe import check
+from tests.support.browsers import Visit
 from tests.support.extent import EVERYTHING
 from tests.support.layout import COMPLAIN, DRAWN, LANGUAGES, TOO_WIDE, TURN, set_screen
 from tests.support.servers import Server
-from tests.support.walk_seed import Walk, feet_of, make_walks
+from tests.support.walk_seed import feet_of, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
@@ -70,19 +68,6 @@ LOOK = f"""async ([texts, buttons, words]) => {{
 }}"""
 
 
-@contextmanager
-def page_of(browser: Browser, server: Server, walk: Walk, *, alone: bool) -> Iterator[Page]:
-    """Open the page on a paired tablet, or where a therapist is signed in."""
-    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
-    name, value = ("garry_tablet", walk.tablet) if alone else ("sessionid", walk.cookie)
-    context.add_cookies([{"name": name, "value": value, "url": server.url}])
-    context.set_default_timeout(40_000)
-    page = context.new_page()
-    page.goto(walk.path)
-    yield page
-    context.close()
-
-
 def look_everywhere(page: Page, before: Callable[[], None] = lambda: None) -> None:
     """Check the page as it is now at every size, with all sizes of words."""
     look = page.get_attribute("body", "data-look")
@@ -99,17 +84,12 @@ def look_everywhere(page: Page, before: Callable[[], None] = lambda: None) -> No
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
-    server: Server, browser: Browser, language: str
+    server: Server, visit: Visit, language: str
 ) -> None:
     (walk,) = make_walks(server, {"name": "Rosalinda", "screen": {"language": language}})
-    url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
-    with (
-        page_of(browser, server, walk, alone=False) as page,
-        page_of(browser, server, walk, alone=True) as tablet,
-        feet_of(server, walk) as feet,
-        connect(url, additional_headers={"Authorization": header}, max_queue=None) as robot,
-    ):
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+    page = visit(walk.path, walk, reduced_motion="reduce")
+    tablet = visit(walk.path, walk, alone=True, reduced_motion="reduce")
+    with feet_of(server, walk) as feet, robot_of(server, walk):
         page.wait_for_selector(".robot:not([hidden])")
         look_everywhere(page)
         page.click("[data-change=start]")
@@ -135,13 +115,13 @@ def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
         look_everywhere(page)
 
 
-def test_words_are_as_large_on_a_wall_as_on_a_laptop(server: Server, browser: Browser) -> None:
+def test_words_are_as_large_on_a_wall_as_on_a_laptop(server: Server, visit: Visit) -> None:
     (walk,) = make_walks(server, {"screen": {"screen_text": "largest", "language": "es"}})
     fits = []
-    with page_of(browser, server, walk, alone=False) as page:
-        page.wait_for_selector("body[data-look=ready]")
-        for screen in ("low-laptop", "wall"):  # of one shape
-            set_screen(page, screen)
-            page.evaluate(DRAWN)
-            fits.append(page.get_attribute(".phrase", "data-fit"))
+    page = visit(walk.path, walk, reduced_motion="reduce")
+    page.wait_for_selector("body[data-look=ready]")
+    for screen in ("low-laptop", "wall"):  # of one shape
+        set_screen(page, screen)
+        page.evaluate(DRAWN)
+        fits.append(page.get_attribute(".phrase", "data-fit"))
     assert fits[0] == fits[1]

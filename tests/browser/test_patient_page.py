@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from contextlib import ExitStack
@@ -10,11 +9,11 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
-from websockets.sync.client import connect
 
-from tests.support.patient_page import DIGEST, PATIENCE_MS, open_page, signed_in, stored, until_step
+from tests.support.browsers import PATIENCE_MS, signed_in
+from tests.support.patient_page import DIGEST, open_page, stored, until_step
 from tests.support.servers import ROOT, Server
-from tests.support.walk_seed import Walk, feet_of, make_walks
+from tests.support.walk_seed import Walk, feet_of, hear, make_walks, robot_of
 from tests.support.wire import Wire
 
 pytestmark = pytest.mark.browser
@@ -215,7 +214,7 @@ def test_a_lost_network_loses_and_doubles_nothing(server, browser):
     (walk,) = make_walks(server, {})
     with (
         Wire(server.port) as wire,
-        signed_in(browser, server, walk, wire.port) as context,
+        signed_in(browser, server, walk, port=wire.port) as context,
         feet_of(server, walk) as feet,
     ):
         page = open_page(context, walk)
@@ -260,7 +259,7 @@ def test_a_lost_network_loses_and_doubles_nothing(server, browser):
 
 def test_a_page_that_is_signed_out_says_so_and_stops(server, browser):
     walk, _ = make_walks(server, {}, {})
-    with Wire(server.port) as wire, signed_in(browser, server, walk, wire.port) as context:
+    with Wire(server.port) as wire, signed_in(browser, server, walk, port=wire.port) as context:
         page = open_page(context, walk)
         looks(page, "ready")
         context.clear_cookies()
@@ -273,17 +272,13 @@ def test_a_page_that_is_signed_out_says_so_and_stops(server, browser):
 @pytest.mark.essential
 def test_the_robot_can_be_stopped_from_the_page(server, browser):
     (walk,) = make_walks(server, {})
-    header = {"Authorization": f"Bearer {walk.robot}"}
     with signed_in(browser, server, walk) as context:
         page = open_page(context, walk)
         looks(page, "ready")
         assert page.locator("button.robot").is_hidden()
-        url = f"ws://127.0.0.1:{server.port}/ws/robot/"
-        with connect(url, additional_headers=header) as robot:
-            robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        with robot_of(server, walk) as robot:
             page.click("text=Stop robot")
-            while json.loads(robot.recv(10))["type"] != "stop":
-                pass
+            hear(robot, "stop")
             expect(page.locator("button.robot")).to_have_text("Robot stopped")
             assert page.evaluate(TOO_SMALL) == []
         expect(page.locator("button.robot")).to_be_hidden()
@@ -291,14 +286,11 @@ def test_the_robot_can_be_stopped_from_the_page(server, browser):
 
 def test_a_stop_that_may_not_have_arrived_is_not_believed(server, browser):
     (walk,) = make_walks(server, {})
-    header = {"Authorization": f"Bearer {walk.robot}"}
-    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
     with (
         Wire(server.port) as wire,
-        signed_in(browser, server, walk, wire.port) as context,
-        connect(url, additional_headers=header) as robot,
+        signed_in(browser, server, walk, port=wire.port) as context,
+        robot_of(server, walk),
     ):
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
         page = open_page(context, walk)
         button = page.locator("button.robot")
         expect(button).to_have_text("Stop robot")

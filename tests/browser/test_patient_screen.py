@@ -8,7 +8,8 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Page
 
-from tests.support.browsers import SIZES
+from tests.support.browsers import signed_in
+from tests.support.patient_page import until_step
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -50,22 +51,13 @@ def page_of(
     browser: Browser, server: Server, walk: Walk, size: str = "tablet-portrait"
 ) -> Iterator[Page]:
     """Open a running session's page, with what it plays and moves on record."""
-    context = browser.new_context(base_url=server.url)
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    context.set_default_timeout(40_000)
-    page = context.new_page()
-    width, height = SIZES[size]
-    page.set_viewport_size({"width": width, "height": height})
-    page.add_init_script(f"({LISTEN})(); ({MOVES})();")
-    page.goto(walk.path)
-    page.click("text=Start")
-    page.wait_for_selector("body:not([data-look=ready])")
-    yield page
-    context.close()
-
-
-def until_step(page: Page, number: int) -> None:
-    page.wait_for_function("n => document.body.dataset.step == n", arg=number)
+    with signed_in(browser, server, walk, size) as context:
+        page = context.new_page()
+        page.add_init_script(f"({LISTEN})(); ({MOVES})();")
+        page.goto(walk.path)
+        page.click("text=Start")
+        page.wait_for_selector("body:not([data-look=ready])")
+        yield page
 
 
 @pytest.mark.parametrize("size", ["tablet-portrait", "tablet-landscape"])

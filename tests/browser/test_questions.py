@@ -7,16 +7,11 @@ import json
 import pytest
 from playwright.sync_api import Browser, expect
 
+from tests.support.axe import check
 from tests.support.browsers import SIZES, picture
-from tests.support.servers import ROOT, Server
+from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
-AXE = ROOT / "node_modules" / "axe-core" / "axe.min.js"
-RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]
-CHECK = """async (rules) => {
-  const { violations } = await axe.run(document, { runOnly: rules });
-  return violations.map(({ id, help }) => `${id}: ${help}`);
-}"""
 # A finger that is not steady needs some room; nothing may lie beyond the screen's sides.
 SMALLEST = """() => {
   const boxes = [...document.querySelectorAll(".scale label, footer > *")];
@@ -73,8 +68,7 @@ def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, bro
         assert fits["wide"], size
         assert fits["least"] >= 44, size
     page.set_viewport_size({"width": width, "height": height})
-    page.evaluate(AXE.read_text())
-    assert page.evaluate(CHECK, RULES) == []
+    check(page)
     assert page.evaluate(NOTHING_BELOW)
 
     page.click(".scale label:nth-child(4)")

@@ -6,11 +6,10 @@ import json
 
 import pytest
 from playwright.sync_api import Page, expect
-from websockets.sync.client import connect
 
 from robot.wire.incident import pack
 from tests.support.incidents import BUMPED
-from tests.support.walk_seed import feet_of, make_walks
+from tests.support.walk_seed import feet_of, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
@@ -25,16 +24,10 @@ def shown(page: Page) -> tuple[str, str, str]:
     return number, step, patient.locator(".key").inner_text()
 
 
-def test_room_is_played_again_from_its_log(server, browser):
+def test_room_is_played_again_from_its_log(server, visit):
     (walk,) = make_walks(server, {"valence": "positive"})
-    context = browser.new_context(base_url=server.url, viewport={"width": 1440, "height": 900})
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto(f"/sessions/{walk.session}/monitor/")
-    robot_url = f"ws://127.0.0.1:{server.port}/ws/robot/"
-    header = {"Authorization": f"Bearer {walk.robot}"}
-    with feet_of(server, walk) as feet, connect(robot_url, additional_headers=header) as robot:
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "kobuki"}))
+    page = visit(walk.monitor_path, walk, "laptop")
+    with feet_of(server, walk) as feet, robot_of(server, walk, "kobuki") as robot:
         page.click("[data-main]:not([disabled])")
         page.wait_for_selector("[data-main][value=pause]")
         feet.walk(1.1, 0.9)
@@ -101,4 +94,3 @@ def test_room_is_played_again_from_its_log(server, browser):
     page.click("[data-play]")
     patient.locator("body[data-step='5']").wait_for()
     page.wait_for_function("() => !replayPlayer.isPlaying")
-    context.close()

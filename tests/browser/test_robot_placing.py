@@ -10,12 +10,11 @@ from contextlib import contextmanager, suppress
 import pytest
 from playwright.sync_api import expect
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from tests.support.fake_ros import wait_until
 from tests.support.robot_reports import STATUS
 from tests.support.servers import Server
-from tests.support.walk_seed import Walk, make_walks
+from tests.support.walk_seed import Walk, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
@@ -23,9 +22,8 @@ REAL = STATUS | {"base": "kobuki", "state": "idle", "gesture": None, "simulated"
 
 
 @contextmanager
-def robot_of(server: Server, walk: Walk) -> Iterator[list[tuple[float, float]]]:
+def driven(server: Server, walk: Walk) -> Iterator[list[tuple[float, float]]]:
     """Give what a real robot that is armed hears of driving."""
-    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
     heard: list[tuple[float, float]] = []
 
     def listen() -> None:
@@ -35,8 +33,7 @@ def robot_of(server: Server, walk: Walk) -> Iterator[list[tuple[float, float]]]:
                 if message["type"] == "drive":
                     heard.append((message["ahead"], message["left"]))
 
-    with connect(url, additional_headers={"Authorization": f"Bearer {walk.robot}"}) as robot:
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "kobuki"}))
+    with robot_of(server, walk, "kobuki") as robot:
         thread = threading.Thread(target=listen)
         thread.start()
         robot.send(json.dumps({"type": "report", "report": REAL}))
@@ -45,14 +42,10 @@ def robot_of(server: Server, walk: Walk) -> Iterator[list[tuple[float, float]]]:
         thread.join()
 
 
-def test_it_drives_while_the_button_is_held_and_stands_when_it_is_let_go(server, browser):
+def test_it_drives_while_the_button_is_held_and_stands_when_it_is_let_go(server, visit):
     (walk,) = make_walks(server, {"valence": "positive"})
-    url = f"http://127.0.0.1:{server.port}"
-    context = browser.new_context(base_url=url, viewport={"width": 1440, "height": 900})
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": url}])
-    page = context.new_page()
-    with robot_of(server, walk) as heard:
-        page.goto(f"/sessions/{walk.session}/monitor/")
+    with driven(server, walk) as heard:
+        page = visit(walk.monitor_path, walk, "laptop")
         ahead, left = page.locator("[data-drive='1 0']"), page.locator("[data-drive='0 1']")
         expect(ahead).to_be_visible()
         ahead.hover()
@@ -73,4 +66,3 @@ def test_it_drives_while_the_button_is_held_and_stands_when_it_is_let_go(server,
         page.keyboard.up(" ")
         page.locator("[data-main]").click()
         expect(ahead).to_be_hidden()
-    context.close()

@@ -8,13 +8,13 @@ from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 from robot.wire.incident import pack, read_lines
-from tests.support.browsers import SIZES
+from tests.support.browsers import signed_in
 from tests.support.incidents import BUMPED
 from tests.support.servers import Server
-from tests.support.walk_seed import make_walks
+from tests.support.walk_seed import hear, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
@@ -62,18 +62,13 @@ def pose(x_m: float, y_m: float = 0.0, heading_rad: float = 0.0) -> dict[str, fl
 def monitor(browser: Browser, server: Server, size: str) -> Iterator[tuple[Page, ClientConnection]]:
     """Open the PT's page of a session, and dial in as its robot."""
     (walk,) = make_walks(server, {"valence": "positive"})
-    width, height = SIZES[size]
-    context = browser.new_context(
-        base_url=server.url, viewport={"width": width, "height": height}, reduced_motion="reduce"
-    )
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto(f"/sessions/{walk.session}/monitor/")
-    url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
-    with connect(url, additional_headers={"Authorization": header}) as robot:
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "kobuki"}))
+    with (
+        signed_in(browser, server, walk, size, reduced_motion="reduce") as context,
+        robot_of(server, walk, "kobuki") as robot,
+    ):
+        page = context.new_page()
+        page.goto(walk.monitor_path)
         yield page, robot
-    context.close()
 
 
 def report(robot: ClientConnection, **more: object) -> None:
@@ -145,18 +140,15 @@ def test_a_robot_away_from_home_says_so_and_is_let_go_on_by_a_person(server, bro
             "Carry it back, turned as it stood. Put it on its mark, nobody near it, then:"
         )
         page.get_by_role("button", name="Let it move").click()
-        while json.loads(robot.recv(10))["type"] != "arm":
-            pass
+        hear(robot, "arm")
         report(robot, state="idle", gesture=None, pose=pose(0.0))
         expect(page.locator("[data-show=robot-state]")).to_have_text("waiting")
 
 
-def test_a_composed_gesture_is_played_with_lights_and_sound(server, browser):
+def test_a_composed_gesture_is_played_with_lights_and_sound(server, visit):
     made = server.run_shell(SEED).strip()
     (walk,) = make_walks(server, {})
-    context = browser.new_context(base_url=server.url)
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
+    page = visit("about:blank", walk)
     page.add_init_script(LISTEN)
     page.goto(f"/admin/rehab/composedgesture/{made}/change/")
     scene, base = page.locator(".gesture-floor svg"), page.locator(".gesture-floor .robot-base")
@@ -208,7 +200,6 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, browser):
     expect(page.locator(".gesture-floor .words")).to_contain_text("up to 0.14 m from home")
     page.click("[name=_save]")
     expect(page.locator("#result_list")).to_contain_text("big-hello")
-    context.close()
 
 
 def test_a_robot_whose_battery_is_low_asks_to_be_charged(server, browser):

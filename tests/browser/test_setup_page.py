@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.support.browsers import Visit
 from tests.support.layout import CORNERS, SCREENS, TOO_WIDE, boxes, set_screen, too_small
 from tests.support.servers import Server
 from tests.support.walk_seed import make_walks
@@ -12,12 +13,9 @@ from tests.support.walk_seed import make_walks
 pytestmark = pytest.mark.browser
 
 
-def test_all_choices_can_be_read_and_tapped(server: Server, browser: Browser) -> None:
+def test_all_choices_can_be_read_and_tapped(server: Server, visit: Visit) -> None:
     (walk,) = make_walks(server, {"name": "Rosalinda"})
-    context = browser.new_context(base_url=server.url)
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto("/account/")
+    page = visit("/account/", walk)
     page.select_option("#language", "de")
     page.click("form[action*=language] button")
     page.goto("/patients/1/new/")
@@ -31,4 +29,3 @@ def test_all_choices_can_be_read_and_tapped(server: Server, browser: Browser) ->
         assert too_small(page, ".row-choice, .seg label, .go .btn, .pick select", 44) == []
         (go,) = boxes(page, ".set-up > .go")  # never below the screen's edge
         assert go["y"] + go["height"] <= SCREENS[screen][1] + 1
-    context.close()

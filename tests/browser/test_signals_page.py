@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
-import sqlite3
 import subprocess
 import sys
 
 import pytest
-from playwright.sync_api import Browser, ViewportSize, expect
+from playwright.sync_api import expect
 
-from tests.support.browsers import SIZES
+from tests.support.browsers import Visit
+from tests.support.patient_page import stored as stored_steps
 from tests.support.servers import ROOT, Server
 from tests.support.walk_seed import make_walks
 
@@ -21,32 +21,10 @@ pytestmark = pytest.mark.browser
 STRIDES = 24
 
 
-def steps_of(server: Server, session: int) -> list[sqlite3.Row]:
-    database = sqlite3.connect(server.folder / "garry.sqlite3")
-    database.row_factory = sqlite3.Row
-    try:
-        words = "SELECT * FROM rehab_step WHERE session_id = ?"
-        return database.execute(words, (session,)).fetchall()
-    finally:
-        database.close()
-
-
-def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Browser) -> None:
+def test_a_session_from_raw_signals_on_the_tablet(server: Server, visit: Visit) -> None:
     (walk,) = make_walks(server, {"valence": "explicit", "goal": 3.0})
-    width, height = SIZES["tablet-landscape"]
-    context = browser.new_context(
-        base_url=server.url, viewport={"width": width, "height": height}, has_touch=True
-    )
-    context.set_default_timeout(30_000)
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto(walk.path)
-    therapist = browser.new_context(
-        base_url=server.url, viewport=ViewportSize(width=1440, height=900)
-    )
-    therapist.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    monitor = therapist.new_page()
-    monitor.goto(f"{walk.path}monitor/")
+    page = visit(walk.path, walk, "tablet-landscape", has_touch=True)
+    monitor = visit(walk.monitor_path, walk, "laptop")
     command = f"-m rehab.sources synthetic --signals --speed 20 --strides {STRIDES} --seed 5"
     source = subprocess.Popen(
         [sys.executable, *command.split(), "--server", server.url],
@@ -67,12 +45,11 @@ def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Brows
     expect(page.locator("body")).to_contain_text(re.compile(r"in W/kg\s*\d\.\d\d\s*Step \d+"))
     text = page.locator("body").text_content() or ""
     value, number = re.search(r"in W/kg\s*(\d\.\d\d)\s*Step (\d+)", text).groups()
-    stored = {step["number"]: step for step in steps_of(server, walk.session)}
+    stored = {step["number"]: step for step in stored_steps(server, walk)}
     assert stored[int(number)]["side"] == "left"
     assert f"{stored[int(number)]['value']:.2f}" == value
     assert sum(bool(step["valid"]) for step in stored.values()) > STRIDES // 2
     assert 0.5 < json.loads(stored[int(number)]["extra"])["stance_s"] < 0.9
-    context.close()
     # The therapist sees what else was measured of the last stride.
     newest = stored[max(stored)]
     expect(monitor.locator("[data-show=number]")).to_have_text(f"no. {newest['number']}")
@@ -80,4 +57,3 @@ def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Brows
     measured = json.loads(newest["extra"])
     assert [line.split()[0] for line in extras] == list(measured)
     assert float(extras[0].split()[1]) == pytest.approx(next(iter(measured.values())), rel=0.01)
-    therapist.close()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import polib
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import BrowserContext, Page, expect
 
-from tests.support.browsers import go_on_to_scores
+from tests.support.browsers import Visit, go_on_to_scores
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -76,21 +76,13 @@ def language(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def therapist(
-    server: Server, browser: Browser, walk: Walk, language: str
-) -> Iterator[BrowserContext]:
+def therapist(visit: Visit, walk: Walk, language: str) -> BrowserContext:
     """A browser of the therapist's, whose own language is not what the account has chosen."""
-    context = browser.new_context(
-        base_url=server.url, locale="fi", viewport={"width": 1280, "height": 800}
-    )
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
-    page = context.new_page()
-    page.goto("/account/")
+    page = visit("/account/", walk, "tablet-landscape", locale="fi")
     page.select_option("#language", language)
     page.click("form[action*=language] button")
     expect(page.locator("html")).to_have_attribute("lang", language)
-    yield context
-    context.close()
+    return page.context
 
 
 def test_a_session_is_told_in_the_languages_of_who_reads_it(

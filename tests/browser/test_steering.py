@@ -8,19 +8,18 @@ import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from websockets.sync.client import connect
 
-from tests.support.browsers import SIZES
+from tests.support.browsers import signed_in
 from tests.support.servers import Server, serve
-from tests.support.walk_seed import Walk, feet_of, make_walks
+from tests.support.walk_seed import Walk, feet_of, hear, make_walks, robot_of
 from tests.support.wire import Wire
 
 pytestmark = pytest.mark.browser
 
-PATIENCE_MS = 30_000
 PHASES = [
     {"kind": "training", "name": "First", "strides": 12},
     {"kind": "training", "name": "Last"},
@@ -32,23 +31,15 @@ def pages(
     browser: Browser, server: Server, walk: Walk, path: str, port: int = 0
 ) -> Iterator[tuple[Page, Page]]:
     """Open the tablet's page and one of the PT's, through a port of a wire where there is one."""
-    url = f"http://127.0.0.1:{port or server.port}"
-    opened: list[Page] = []
-    for address, size in ((walk.path, "tablet-portrait"), (path, "laptop")):
-        width, height = SIZES[size]
-        context = browser.new_context(
-            base_url=url,
-            viewport={"width": width, "height": height},
-            reduced_motion="reduce",
-        )
-        context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": url}])
-        context.set_default_timeout(PATIENCE_MS)
-        page = context.new_page()
-        page.goto(address)
-        opened.append(page)
-    yield opened[0], opened[1]
-    for page in opened:
-        page.context.close()
+    options: dict[str, Any] = {"port": port, "reduced_motion": "reduce"}
+    with (
+        signed_in(browser, server, walk, "tablet-portrait", **options) as one,
+        signed_in(browser, server, walk, "laptop", **options) as other,
+    ):
+        tablet, pt = one.new_page(), other.new_page()
+        tablet.goto(walk.path)
+        pt.goto(path)
+        yield tablet, pt
 
 
 def at_step(tablet: Page, number: int) -> None:
@@ -64,7 +55,7 @@ def pressed(monitor: Page, control: str, value: str) -> None:
 
 def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(server, browser):
     (walk,) = make_walks(server, {"valence": "positive", "phases": PHASES})
-    where = f"/sessions/{walk.session}/monitor/"
+    where = walk.monitor_path
     with pages(browser, server, walk, where) as (tablet, monitor), feet_of(server, walk) as feet:
         words, emblem = tablet.locator(".words"), tablet.locator(".emblem svg")
         monitor.locator("[data-main]").click()
@@ -187,7 +178,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
 def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
     with serve(tmp_path) as server:
         (walk,) = make_walks(server, {"valence": "positive"})
-        where = f"/sessions/{walk.session}/monitor/"
+        where = walk.monitor_path
         with pages(browser, server, walk, where) as (_, monitor), feet_of(server, walk) as feet:
             monitor.locator("[data-main]").click()
             feet.hear("start")
@@ -205,7 +196,6 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
 def test_a_robot_that_waits_for_a_person_is_let_go_without_scrolling(server, browser):
     """It stands for a reason of its own, nobody has stopped it."""
     (walk,) = make_walks(server, {"valence": "positive"})
-    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
     status = {
         "kind": "status",
         "base": "kinematic",
@@ -215,10 +205,9 @@ def test_a_robot_that_waits_for_a_person_is_let_go_without_scrolling(server, bro
         "reason": "place_unknown",
     }
     with (
-        pages(browser, server, walk, f"/sessions/{walk.session}/monitor/") as opened,
-        connect(url, additional_headers={"Authorization": f"Bearer {walk.robot}"}) as robot,
+        pages(browser, server, walk, walk.monitor_path) as opened,
+        robot_of(server, walk, "kinematic") as robot,
     ):
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "kinematic"}))
         robot.send(json.dumps({"type": "report", "report": status}))
         monitor = opened[1]
         button = monitor.get_by_role("button", name="Let it move")
@@ -229,14 +218,11 @@ def test_a_robot_that_waits_for_a_person_is_let_go_without_scrolling(server, bro
 
 def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server, browser):
     (walk,) = make_walks(server, {"valence": "positive"})
-    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
-    header = {"Authorization": f"Bearer {walk.robot}"}
     with (
         Wire(server.port) as wire,
-        pages(browser, server, walk, f"/sessions/{walk.session}/monitor/", wire.port) as opened,
-        connect(url, additional_headers=header) as robot,
+        pages(browser, server, walk, walk.monitor_path, wire.port) as opened,
+        robot_of(server, walk) as robot,
     ):
-        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
         monitor = opened[1]
         stop = monitor.get_by_role("button", name="Stop robot")
         why, said = monitor.locator("[data-show=robot-why]"), monitor.locator(".said")
@@ -272,7 +258,6 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         expect(monitor.locator(".notice.link")).to_be_hidden()
         expect(why).to_have_text("")
         stop.click()
-        while json.loads(robot.recv(10))["type"] != "stop":
-            pass
+        hear(robot, "stop")
         expect(why).to_have_text("It stands: somebody stopped it.")
         expect(monitor.locator(".safety .stop")).to_have_text("Robot stopped")

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 from PIL import Image, ImageColor
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from rehab.people.sign_in.first_start import FIRST_CLINIC
 from rehab.studies.figures.canvas import COLORS
-from tests.support.browsers import SIZES, picture, sign_in
+from tests.support.browsers import Visit, picture
 from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
@@ -31,17 +31,10 @@ def tell(server: Server) -> list[Any]:
     return told
 
 
-def test_figures_are_given_out_as_svg_and_png_on_the_record(server: Server, browser: Browser):
+def test_figures_are_given_out_as_svg_and_png_on_the_record(server: Server, visit: Visit):
     server.manage(*CLOSED_STUDY, "--to", str(server.folder / "simulated"))
     study, _none = tell(server)
-    width, height = SIZES["laptop"]
-    context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
-    context.set_default_timeout(40_000)
-    page = context.new_page()
-    page.goto("/start/")
-    sign_in(page, server.password)
-    page.wait_for_url("**/start/")
-    page.goto(f"/studies/{study}/results/")
+    page = visit(f"/studies/{study}/results/", size="laptop")
     picture(page, "study-results")
     with page.expect_download() as fetched:
         page.click("a:has-text('learning.svg')")
@@ -61,5 +54,4 @@ def test_figures_are_given_out_as_svg_and_png_on_the_record(server: Server, brow
     page.route("**/results/download/*", lambda route: route.abort())  # as without a network
     page.click("button:has-text('primary.png')")
     expect(page.locator(".figure [role=alert]:not(:empty)")).to_contain_text("did not come")
-    context.close()
     assert tell(server)[1] == ["SIM3 learning.svg"] * 2

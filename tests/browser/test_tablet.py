@@ -5,32 +5,22 @@ from __future__ import annotations
 import time
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 
-from tests.support.browsers import SIZES, go_on_to_scores, sign_in
-from tests.support.servers import serve
+from tests.support.browsers import PATIENCE_MS, Visit, go_on_to_scores
+from tests.support.layout import set_screen
+from tests.support.servers import Server
 
 pytestmark = pytest.mark.browser
 
-PATIENCE_MS = 40_000
-
 
 @pytest.mark.realtime
-def test_a_paired_tablet_follows_its_station(tmp_path, browser: Browser):
-    with serve(tmp_path) as server:
-
-        def open_page(size: str) -> Page:
-            width, height = SIZES[size]
-            context = browser.new_context(
-                base_url=server.url, viewport={"width": width, "height": height}
-            )
-            context.set_default_timeout(PATIENCE_MS)
-            return context.new_page()
-
-        pt, tablet = open_page("laptop"), open_page("tablet-portrait")
+def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, visit: Visit):
+    with browser.new_context(base_url=server.url) as alone:
+        alone.set_default_timeout(PATIENCE_MS)
+        pt, tablet = visit("/start/", size="laptop"), alone.new_page()
+        set_screen(tablet, "tablet-portrait")
         tablet.goto("/tablet/")
-        pt.goto("/start/")
-        sign_in(pt, server.password)
         pt.click("text=Tablets")
         pt.fill("#code", tablet.inner_text(".code").lower())
         pt.click("text=Let it in")

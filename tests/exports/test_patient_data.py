@@ -328,7 +328,7 @@ async def test_served_by_asgi_it_comes_part_by_part():
 async def test_by_asgi_a_patients_file_is_as_whole_as_any(transactional_db):
     world = await sync_to_async(build_world)("birch")
     client = AsyncClient()
-    await client.aforce_login(world.people[Role.LEAD])
+    await sync_to_async(client.force_login)(world.people[Role.LEAD])
     url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
     response: Any = await client.get(url)
     files = open_archive(b"".join([part async for part in response]))

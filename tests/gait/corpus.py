@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, Stride, measure_both_legs
+from rehab.gait import LegSamples, Stride, measure_strides
 from rehab.gait.recordings.tables import read_any_table
 from tests.gait.walks import read_moore
 from tests.support.data import signals
@@ -54,10 +54,9 @@ class CorpusWalk:
         return float(1 / np.median(np.diff(self.t_s)))
 
     def measure(self) -> list[Stride]:
-        return measure_both_legs(
+        return measure_strides(
             self.t_s,
-            self.legs["left"],
-            self.legs["right"],
+            self.legs,
             rate_hz=self.rate_hz,
             mass_kg=self.mass_kg,
             look_ahead_s=0.05,

@@ -14,7 +14,6 @@ from rehab.gait import (
     RejectionReason,
     StrideDetector,
     TwoLegDetector,
-    measure_strides,
 )
 from tests.gait.walks import ANGLE, FORCE, MOMENT, make_walk, pair_up, read_moore
 
@@ -132,13 +131,7 @@ def test_missing_samples(walk, clean, width_s, seed):
     for stride in clean:
         begin = stride.initial_contact_s + rng.uniform() * stride.stance_s
         keep &= ~((walk.t_s > begin) & (walk.t_s < begin + width_s))
-    found = measure_strides(
-        walk.t_s[keep],
-        *walk.left[:, keep],
-        rate_hz=walk.rate_hz,
-        mass_kg=walk.mass_kg,
-        look_ahead_s=0.0,
-    )
+    found = replace(walk, t_s=walk.t_s[keep], left=walk.left[:, keep]).one_leg(look_ahead_s=0.0)
 
     check_nothing_is_wrong(found, clean)
     if 0.05 < width_s < 0.5:  # else few strides have both their contacts
@@ -239,7 +232,7 @@ def test_a_clock_that_jumps_costs_two_strides_at_most(walk, clean, jump_s):
 @pytest.mark.parametrize("factor", [0.5, 2.0, 10.0])
 def test_a_rate_told_wrongly(walk, factor):
     rate_hz = min(max(walk.rate_hz * factor, 50), 5000)
-    found = measure_strides(walk.t_s, *walk.left, rate_hz=rate_hz, mass_kg=walk.mass_kg)
+    found = walk.one_leg(rate_hz=rate_hz)
     assert not any(stride.valid for stride in found)
 
 

@@ -123,7 +123,7 @@ def test_a_column_of_frame_numbers_may_be_empty(walk, tmp_path):
     t_s, legs, frames = read_signals(path)
 
     assert find_frame_problem(t_s, frames).startswith("The frame numbers are ignored: some are")
-    assert measure_strides(t_s, *legs["left"], rate_hz=RATE, mass_kg=75.0, frame=frames)
+    assert measure_strides(t_s, legs, rate_hz=RATE, mass_kg=75.0, frame=frames)
 
 
 def test_frame_numbers_are_saved_with_the_signals(walk, tmp_path, capsys):

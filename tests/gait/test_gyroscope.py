@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from rehab.gait import ContactKind, GaitInputError, GyroscopeDetector, compute_ankle_velocity
+from rehab.gait import ContactKind, GaitInputError, GyroscopeDetector
 from rehab.gait.__main__ import main
 from rehab.gait.contacts.gyroscope_strides import measure_gyroscope
 from tests.support.data import signals
@@ -118,10 +118,6 @@ def test_settings_that_cannot_be():
         GyroscopeDetector(100, segment="thigh")
     with pytest.raises(GaitInputError, match="Give the samples' rate"):
         GyroscopeDetector(5)
-
-
-def test_ankle_velocity_of_two_gyroscopes():
-    assert compute_ankle_velocity([1.0, 2.0], [0.5, -1.0]).tolist() == [0.5, 3.0]
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import compute_ankle_moment, measure_strides
+from rehab.gait import LegSamples, compute_ankle_moment, measure_strides
 from rehab.gait.signals.filters import (
     ZeroPhaseFilter,
     differentiate,
@@ -83,7 +83,12 @@ def test_a2_from_force_and_center_of_pressure():
     leg = ("LeftGRF_y", "LeftAnklePlantarFlexionMoment", "LeftAnklePlantarFlexionAngle")
     force, lab_moment, angle = (column[name] for name in leg)
     ours, labs = (
-        measure_strides(column["time"], force, moment, angle, rate_hz=100, mass_kg=79.4)
+        measure_strides(
+            column["time"],
+            {"left": LegSamples(force, moment, angle)},
+            rate_hz=100,
+            mass_kg=79.4,
+        )
         for moment in (moment, lab_moment)
     )
 

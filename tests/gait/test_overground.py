@@ -1,11 +1,17 @@
 """People who walk over plates in a floor: single steps, one leg or both, feet beside the plate."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from rehab.gait import RejectionReason
+from rehab.gait import LegSamples, RejectionReason
+from rehab.gait.recordings.csv_files import save_signals
+from rehab.sources.arguments import make_parser
+from rehab.sources.recording.source import RecordingSource
+from rehab.training.phases import make_phase
+from rehab.training.steps import Side
 from tests.gait.walks import FORCE, MOMENT, make_walk
 
 
@@ -74,3 +80,29 @@ def test_a_foot_that_is_half_beside_its_plate_does_not_count(treadmill, load):
 
     assert found
     assert all(RejectionReason.WEIGHT in stride.reasons for stride in found)
+
+
+def test_signals_over_plates_are_replayed_as_a_source(treadmill, tmp_path):
+    """The steps that ``python -m rehab.gait --overground`` finds are those that a source sends."""
+    walk, clean = treadmill
+    passing, path = pass_over(walk, clean), tmp_path / "plates.csv"
+    legs = {side: LegSamples(*getattr(passing, side)) for side in ("left", "right")}
+    save_signals(path, passing.t_s, legs, None)
+    arguments = ["--mass", str(walk.mass_kg), "--rate", str(walk.rate_hz), "--token", "t"]
+    played = {}
+    for mode in ([], ["--overground"]):
+        options = make_parser("recording", RecordingSource).parse_args(
+            [str(path), *arguments, *mode]
+        )
+        play = RecordingSource(options, lambda _text: None).open_walk(Side.LEFT)
+        played[bool(mode)] = [
+            stride.value
+            for stride in iter(partial(play, make_phase("training")), None)
+            if not stride.reasons
+        ]
+
+    measured = passing.both_legs(is_overground=True, look_ahead_s=0.05)
+    values = [stride.a2_w_kg for stride in measured if stride.valid]
+    assert played[True] == pytest.approx(values, rel=1e-3)
+    assert len(values) > 5
+    assert not played[False]

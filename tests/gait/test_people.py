@@ -86,17 +86,6 @@ def test_a_plate_zeroed_wrongly_costs_the_first_steps_only():
     assert found[-1].initial_contact_s == pytest.approx(truth[-1].initial_contact_s, abs=0.01)
 
 
-def test_velocity_serves_as_well_as_angle():
-    walk, _ = make_walk(rate_hz=200)
-    velocity = np.gradient(walk.left[2], 1 / 200)
-    detector = StrideDetector(200, walk.mass_kg, look_ahead_s=0.05, is_velocity=True)
-    found = detector.feed(walk.t_s, walk.left[0], walk.left[1], velocity) + detector.finish()
-
-    for one, other in zip(found, walk.one_leg(), strict=True):
-        assert one.valid
-        assert one.a2_w_kg == pytest.approx(other.a2_w_kg, rel=0.02)
-
-
 def test_propulsion_and_position():
     walk, _ = make_walk(rate_hz=200)
     forward = np.where(walk.left[FORCE] > 100, 90.0, 0.0)

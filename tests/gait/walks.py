@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, measure_both_legs, measure_strides
+from rehab.gait import LegSamples, measure_strides
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.training.steps import Measurement, Side
 from tests.support.data import signals
@@ -27,20 +27,15 @@ class Walk:
     frames: np.ndarray | None = None
 
     def one_leg(self, **settings):
-        return measure_strides(
-            self.t_s, *self.left, rate_hz=self.rate_hz, mass_kg=self.mass_kg, **settings
-        )
+        return self._measure({"left": LegSamples(*self.left)}, **settings)
 
     def both_legs(self, **settings):
-        return measure_both_legs(
-            self.t_s,
-            LegSamples(*self.left),
-            LegSamples(*self.right),
-            rate_hz=self.rate_hz,
-            mass_kg=self.mass_kg,
-            frame=self.frames,
-            **settings,
-        )
+        legs = {"left": LegSamples(*self.left), "right": LegSamples(*self.right)}
+        return self._measure(legs, frame=self.frames, **settings)
+
+    def _measure(self, legs, **settings):
+        given = {"rate_hz": self.rate_hz, "mass_kg": self.mass_kg} | settings
+        return measure_strides(self.t_s, legs, **given)
 
     def change(self, row, change, *, both=False):
         """Return the walk with one channel changed, on the left or on both legs."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 import signal
 import socket
-import subprocess
-import sys
 import urllib.error
 import urllib.request
 from types import SimpleNamespace
@@ -15,7 +13,7 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from rehab.management.commands import serve as command
-from tests.support.servers import ROOT, clean_environment, serve
+from tests.support.servers import serve, try_python
 
 pytestmark = pytest.mark.server
 
@@ -54,14 +52,7 @@ def test_a_port_that_is_taken_is_named_with_the_cure(tmp_path):
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = other.getsockname()[1]
-        result = subprocess.run(
-            [sys.executable, "manage.py", "serve"],
-            cwd=ROOT,
-            env=clean_environment(tmp_path, port),
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
+        result = try_python(tmp_path, "manage.py", "serve", port=port)
     assert result.returncode == 1
     assert re.search(r"choose another port: GARRY_PORT=\d+ make run", result.stderr)
 

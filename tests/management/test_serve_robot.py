@@ -6,8 +6,6 @@ import asyncio
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from typing import Any
 
@@ -16,7 +14,7 @@ import pytest
 from django.core.management import CommandError, call_command
 from websockets.asyncio.client import connect
 
-from tests.support.servers import ROOT, clean_environment, serve
+from tests.support.servers import run_python, serve
 
 PREPARE = """
 import django; django.setup()
@@ -51,18 +49,6 @@ from rehab.sessions.log import SessionEvent
 events = SessionEvent.everywhere.filter(kind__startswith="robot_").order_by("pk")
 print(json.dumps([[event.kind, event.data] for event in events]))
 """
-
-
-def python(folder, code: str) -> str:
-    environment = clean_environment(folder, 1) | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"}
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
 
 
 def children(folder) -> list[dict[str, Any]]:
@@ -132,7 +118,7 @@ def still_running(started, within_s):
 @pytest.mark.essential
 @pytest.mark.realtime
 def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
-    cookie, source = python(tmp_path, 'KINDS = ["source"]\n' + PREPARE).split()
+    cookie, source = run_python(tmp_path, "-c", 'KINDS = ["source"]\n' + PREPARE).split()
     with serve(tmp_path, "--robot", "twin") as server:
         robot = wait_for_child(tmp_path)
         assert robot["name"] == "robot"
@@ -149,7 +135,7 @@ def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
     assert ended[0]["outcome"] == "done"
     poses = [report["pose"]["x_m"] for report in reports if report["kind"] == "status"]
     assert 0.05 < max(poses) < 0.08
-    log = json.loads(python(tmp_path, READ_LOG))
+    log = json.loads(run_python(tmp_path, "-c", READ_LOG))
     kept = {name: value for name, value in ended[0].items() if name != "kind"}
     assert ["robot_gesture", kept] in log
     kinds = {kind for kind, _ in log}
@@ -168,7 +154,7 @@ def test_a_killed_server_leaves_no_robot(tmp_path):
 @pytest.mark.long
 @pytest.mark.server
 def test_a_station_with_a_robot_of_its_own_gets_no_other(tmp_path):
-    python(tmp_path, 'KINDS = ["robot"]\n' + PREPARE)
+    run_python(tmp_path, "-c", 'KINDS = ["robot"]\n' + PREPARE)
     with serve(tmp_path, "--robot", "kinematic"):
         time.sleep(0.5)
         assert children(tmp_path) == []

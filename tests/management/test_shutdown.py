@@ -6,7 +6,6 @@ import asyncio
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 from typing import Any
@@ -14,19 +13,7 @@ from typing import Any
 import pytest
 from websockets.asyncio.client import connect
 
-from tests.support.servers import ROOT, clean_environment, serve
-
-
-def python(server, *arguments: str) -> str:
-    environment = clean_environment(server.folder, server.port)
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=ROOT,
-        env=environment | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+from tests.support.servers import run_python, serve
 
 
 async def walk_until_closed(
@@ -90,7 +77,7 @@ async def walk_until_closed(
 @pytest.mark.realtime
 def test_sigterm_with_fifty_viewers(tmp_path):
     with serve(tmp_path) as server:
-        rows = json.loads(python(server, "-m", "tests.support.live_seed", "10"))
+        rows = json.loads(run_python(tmp_path, "-m", "tests.support.live_seed", "10"))
         codes, acknowledged = asyncio.run(
             walk_until_closed(
                 f"ws://127.0.0.1:{server.port}",
@@ -100,7 +87,7 @@ def test_sigterm_with_fifty_viewers(tmp_path):
         )
         assert server.process.wait(15) == 0
         ids = ",".join(str(row["session"]) for row in rows)
-        log = json.loads(python(server, "-m", "tests.support.live_log", ids))
+        log = json.loads(run_python(tmp_path, "-m", "tests.support.live_log", ids))
     assert codes == [4012] * 60
     assert len(acknowledged) == 10
     for session, number in acknowledged.items():

@@ -25,8 +25,6 @@ from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectedField, SessionCorrection, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import SessionRequest, create_session
-from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.boards import figures_of
 from tests.support.marks import mark
@@ -40,23 +38,11 @@ def page_of(world: World, client: Client) -> str:
     return client.get(url).content.decode()
 
 
-def start(world: World) -> TrainingSession:
-    return create_session(
-        SessionRequest(
-            patient=world.patient,
-            valence="positive",
-            goal=GoalRule(value=1.0),
-            protocol=world.session.protocol,
-            measure=world.session.measure,
-        )
-    )
-
-
 # --- the program --------------------------------------------------------------------------------
 
 
 def test_an_ended_program_leaves_the_lists_and_is_found_by_name(world):
-    client = client_of(world)
+    client = world.pt
     key = {"patient_id": world.patient.pk}
     client.post(reverse("end-program", kwargs=key), {"reason": "moved"})
     world.patient.refresh_from_db()
@@ -69,23 +55,23 @@ def test_an_ended_program_leaves_the_lists_and_is_found_by_name(world):
 
 
 def test_an_ended_program_cannot_be_started_until_it_is_reopened(world):
-    client = client_of(world)
+    client = world.pt
     end_program(world.patient, EndReason.DONE, NOW)
     page = page_of(world, client)
     setup = reverse("setup", kwargs={"patient_id": world.patient.pk})
     assert f'action="{setup}"' not in page
     assert reverse("take-home", kwargs={"patient_id": world.patient.pk}) in page
     with pytest.raises(InvalidSetting, match="has ended"):
-        start(world)
+        world.begin_session()
     client.post(reverse("reopen", kwargs={"patient_id": world.patient.pk}))
     world.patient.refresh_from_db()
     assert (world.patient.ended_at, world.patient.end_reason) == (None, "")
     assert f'action="{setup}"' in page_of(world, client)
-    start(world)
+    world.begin_session()
 
 
 def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
-    start(world)
+    world.begin_session()
     for act in (
         lambda: end_program(world.patient, EndReason.DONE, NOW),
         lambda: erase(world.patient, ErasureReason.ASKED, None, NOW),
@@ -93,7 +79,7 @@ def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
         with pytest.raises(SessionStillOpen, match="End it first"):
             act()
     url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
-    assert b"open session" in client_of(world).post(url, {"reason": "done"}).content
+    assert b"open session" in world.pt.post(url, {"reason": "done"}).content
     world.patient.refresh_from_db()
     assert world.patient.ended_at is None
     assert world.patient.nickname == mark("amber", Patient)
@@ -101,7 +87,7 @@ def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
 
 def test_the_page_asks_for_a_reason(world):
     url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
-    assert client_of(world).post(url, {"reason": "bored"}).status_code == 200
+    assert world.pt.post(url, {"reason": "bored"}).status_code == 200
     assert Patient.everywhere.get(pk=world.patient.pk).ended_at is None
 
 
@@ -115,7 +101,7 @@ def everything_stored() -> str:
 
 
 def test_erasing_leaves_nothing_that_leads_to_the_person(world):
-    patient, lead = world.patient, client_of(world, Role.LEAD)
+    patient, lead = world.patient, world.lead
     secrets = {"nickname": "Rosamunde", "code": "CASE-4711", "body_mass_kg": 87.125}
     details = reverse("edit-patient", kwargs={"patient_id": patient.pk})
     lead.post(details, secrets | {"paretic_side": "left"})
@@ -140,7 +126,7 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
         at=NOW,
         data={"value": {"valence": "positive", "bands": bands}},
     )
-    other = Patient.everywhere.create(clinic=world.clinic, code="other", nickname="Other")
+    other = world.add_patient("Other")
     lead_user = world.people[Role.LEAD]
     for walker in (other, patient):  # given to somebody else, and back
         changes = {
@@ -185,14 +171,14 @@ def test_an_imported_session_still_tells_its_score_once_erased(world):
     world.session.refresh_from_db()
     assert world.session.legacy_id == -world.session.pk
     url = reverse("session", kwargs={"session_id": world.session.pk})
-    assert client_of(world).get(url).status_code == 200
+    assert world.pt.get(url).status_code == 200
 
 
 def test_an_erased_patient_never_comes_back(world):
     erase(world.patient, ErasureReason.ASKED, None, NOW)
     reopen_program(world.patient)
     assert world.patient.ended_at == NOW
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
     client.post(consent, {"purpose": "boards", "answer": "clinic"})
     assert Patient.everywhere.get(pk=world.patient.pk).boards == "own"
@@ -214,18 +200,18 @@ def test_an_erased_patient_never_comes_back(world):
 )
 def test_only_the_patients_own_code_and_a_reason_erase(given, world):
     url = reverse("erase", kwargs={"patient_id": world.patient.pk})
-    assert client_of(world, Role.LEAD).post(url, given).status_code == 200
+    assert world.lead.post(url, given).status_code == 200
     assert Patient.everywhere.get(pk=world.patient.pk).erased_at is None
 
 
 def test_only_leads_erase_and_only_in_their_clinic(world):
     url = reverse("erase", kwargs={"patient_id": world.patient.pk})
     given = {"reason": "asked", "code": world.patient.code}
-    assert client_of(world, Role.PT).post(url, given).status_code == 403
+    assert world.pt.post(url, given).status_code == 403
     assert client_of(build_world("birch"), Role.LEAD).post(url, given).status_code == 404
     assert Patient.everywhere.get(pk=world.patient.pk).erased_at is None
     records = reverse("records", kwargs={"patient_id": world.patient.pk})
-    assert url not in client_of(world, Role.PT).get(records).content.decode()
+    assert url not in world.pt.get(records).content.decode()
 
 
 # --- retention ------------------------------------------------------------------------------------
@@ -305,8 +291,8 @@ def test_a_dry_run_says_whom_and_changes_nothing(world):
 def test_an_open_session_holds_up_one_patient_and_no_other(world):
     world.clinic.retention_months = 1
     world.clinic.save()
-    other = Patient.everywhere.create(clinic=world.clinic, code="o", nickname="O")
-    start(world)
+    other = world.add_patient()
+    world.begin_session()
     last_walked(world, 400)
     Patient.everywhere.filter(pk=other.pk).update(created_at=datetime.now(UTC) - timedelta(400))
     assert "End it first" in retain()

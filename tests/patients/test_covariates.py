@@ -15,7 +15,7 @@ from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.training.measures import InvalidSetting
-from tests.support.world import NOW, client_of
+from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
 TODAY = date(2026, 3, 2)
@@ -39,12 +39,12 @@ def test_a_patients_covariates_come_from_the_form_and_leave_with_the_person(worl
     details = {"nickname": "Rosa", "code": "R-1", "paretic_side": "right"}
     details |= {"birth_year": "1958", "stroke_month": "2025-11", "severity": "moderate"}
     url = reverse("edit-patient", args=[world.patient.pk])
-    assert client_of(world).post(url, details).status_code == 302
+    assert world.pt.post(url, details).status_code == 302
     patient = Patient.everywhere.get(pk=world.patient.pk)
     assert patient.birth_year == 1958
     assert patient.stroke_month == date(2025, 11, 1)
     assert patient.severity == "moderate"
-    assert 'value="2025-11"' in client_of(world).get(url).content.decode()
+    assert 'value="2025-11"' in world.pt.get(url).content.decode()
     erase(patient, ErasureReason.ASKED, None, NOW)
     patient.refresh_from_db()
     assert (patient.birth_year, patient.stroke_month, patient.severity) == (None, None, "")
@@ -56,14 +56,12 @@ def test_a_patients_covariates_come_from_the_form_and_leave_with_the_person(worl
 )
 def test_what_cannot_be_of_a_patient_is_refused(world, wrong):
     details = {"nickname": "Rosa", "code": "R-1", "paretic_side": "right", "birth_year": "1958"}
-    answer = client_of(world).post(
-        reverse("edit-patient", args=[world.patient.pk]), details | wrong
-    )
+    answer = world.pt.post(reverse("edit-patient", args=[world.patient.pk]), details | wrong)
     assert "errorlist" in answer.content.decode()
 
 
 def test_the_api_has_covariates_of_patient_and_session(world):
-    client = client_of(world)
+    client = world.pt
     changed = client.patch(
         reverse("api:change_patient", kwargs={"patient_id": world.patient.pk}),
         {"birth_year": 1961, "stroke_month": "2025-11-17", "severity": "mild"},

@@ -11,29 +11,20 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.patients.visits import plan_visit
-from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.patient_summary import describe_today, is_milestone
 from rehab.sessions.reports.results import Result
-from rehab.stations.models import Station
 from rehab.training.valences import VALENCES
 from tests.support.boards import tablet_at
 from tests.support.walks import HIT, MISS, walk
-from tests.support.world import NOW, World, client_of
+from tests.support.world import NOW, World
 
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def patient(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
 def read(world: World, session: TrainingSession, client: Client | None = None) -> str:
     """Return the page's words; to a therapist, or in another browser."""
-    browser = client or client_of(world)
+    browser = client or world.pt
     page = browser.get(reverse("ending", args=[session.pk])).content.decode()
     words = html.unescape(re.sub(r"<[^>]+>", " ", page.split("<main")[1]))
     return " ".join(words.replace("\N{NO-BREAK SPACE}", " ").split())
@@ -72,12 +63,10 @@ def test_today_stands_beside_last_time(world, patient):
 
 def test_a_paired_tablet_tells_the_patient_the_same(world, patient):
     walk(patient, "positive", [HIT] * 4 + [MISS] * 6, days_ago=7)
-    other = Patient.everywhere.create(
-        clinic=world.clinic, code="B-2", nickname="Omar", paretic_side="left"
-    )
+    other = world.add_patient("Omar")
     walk(other, "positive", [HIT] * 10, days_ago=1)
     session = walk(patient, "positive", [HIT] * 7 + [MISS] * 3)
-    station = Station.everywhere.create(clinic=world.clinic, name="East")
+    station = world.add_station()
     TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
     plan_visit(patient, (NOW + timedelta(days=7)).date(), time(14, 15))
     words = read(world, session, tablet_at(station))
@@ -136,5 +125,5 @@ def test_a_blinded_study_tells_no_figure(world, patient):
 
 def test_an_open_session_goes_on(world, patient):
     session = walk(patient, "positive", [HIT], end=None)
-    answer = client_of(world).get(reverse("ending", args=[session.pk]))
+    answer = world.pt.get(reverse("ending", args=[session.pk]))
     assert answer.headers["Location"] == reverse("walk", args=[session.pk])

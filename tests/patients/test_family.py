@@ -54,7 +54,7 @@ def links_page(world):
 
 def give(world, weeks=4, name="yes"):
     """Give a link on the page; return its path."""
-    answer = client_of(world).post(links_page(world), {"weeks": weeks, "name": name})
+    answer = world.pt.post(links_page(world), {"weeks": weeks, "name": name})
     found = re.search(r"http://testserver(/family/[\w-]{43}/)", answer.content.decode())
     assert found, answer.content.decode()
     return found[1]
@@ -87,7 +87,7 @@ def test_a_link_shows_sessions_and_the_next_visit_to_who_has_it(agreed):
     assert (entry.patient_id, entry.clinic_id) == (agreed.patient.pk, agreed.clinic.pk)
     link = FamilyLink.everywhere.get()
     assert (link.opened, link.token_hash in path) == (1, False)
-    answer = client_of(agreed).get(links_page(agreed)).content.decode()
+    answer = agreed.pt.get(links_page(agreed)).content.decode()
     assert "opened once" in answer.replace("\n", " ")
     assert path not in answer  # it is shown this once
 
@@ -111,7 +111,7 @@ def test_it_needs_no_cookie_where_forgeries_are_checked(agreed):
 
 def test_the_therapists_forms_come_with_an_origin(agreed):
     """Where a page sends no referrer, browsers send the origin "null", which Django refuses."""
-    answer = client_of(agreed).get(links_page(agreed))
+    answer = agreed.pt.get(links_page(agreed))
     assert answer["Referrer-Policy"] == "same-origin"
 
 
@@ -132,7 +132,7 @@ ENDS = {
         blinded=True
     ),
     "the link expires": lambda world: FamilyLink.everywhere.update(expires_at=NOW),
-    "the therapist ends it": lambda world: client_of(world).post(
+    "the therapist ends it": lambda world: world.pt.post(
         reverse("end-family-link", kwargs={"link_id": FamilyLink.everywhere.get().pk})
     ),
 }
@@ -171,7 +171,7 @@ def test_no_link_is_given_where(agreed, why, monkeypatch):
     if why == "a study hides the sessions":
         monkeypatch.setattr(family, "hidden_patients", lambda _by: Patient.everywhere.all())
     before = FamilyLink.everywhere.count()
-    answer = client_of(agreed).post(links_page(agreed), {"weeks": 4, "name": "yes"}, follow=True)
+    answer = agreed.pt.post(links_page(agreed), {"weeks": 4, "name": "yes"}, follow=True)
     assert "/family/" not in re.sub(r"/patients/\d+/family/", "", answer.content.decode())
     assert FamilyLink.everywhere.count() == before
 

@@ -5,18 +5,16 @@ from __future__ import annotations
 from datetime import UTC, datetime, time, timedelta
 
 import pytest
-from django.test import Client
 from django.utils import timezone
 
 from rehab.patients.visits import Progress, Visit, patients_today, plan_visit, suggested_time
-from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day import dashboard
 from tests.support.clock import HERE
 from tests.support.walks import HIT, walk
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world
 
 pytestmark = pytest.mark.django_db
 
@@ -30,19 +28,9 @@ def world(world: World) -> World:
     return world
 
 
-def patient(world: World, name: str) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code=name, nickname=name, paretic_side="left"
-    )
-
-
-def pt_of(world: World) -> Client:
-    return client_of(world)
-
-
 def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     names = ("Ana", "Bo", "Cleo", "Dora", "Emil", "Fay")
-    ana, bo, cleo, dora, emil, fay = (patient(world, name) for name in names)
+    ana, bo, cleo, dora, emil, fay = (world.add_patient(name) for name in names)
     today = HERE.date()
     plan_visit(ana, today, time(11, 0))
     plan_visit(bo, today, None)
@@ -63,20 +51,20 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
 
 
 def test_a_day_is_the_clinics_own(world):
-    rosa = patient(world, "Rosa")
+    rosa = world.add_patient()
     plan_visit(rosa, NOW.date(), None)
     late = NOW.replace(hour=23, minute=30)
     assert patients_today(world.people[Role.PT], late)
     world.clinic.time_zone = "Asia/Tokyo"
     world.clinic.save()
     Visit.everywhere.all().delete()
-    pt_of(world).post(f"/patients/{rosa.pk}/visits/", {"in": "0"})
+    world.pt.post(f"/patients/{rosa.pk}/visits/", {"in": "0"})
     (visit,) = Visit.everywhere.all()
     assert visit.day == (timezone.now() + timedelta(hours=9)).date()
 
 
 def test_who_was_set_up_yesterday_and_walked_today_is_on_both_lists_of_today(world):
-    rosa, pt = patient(world, "Rosa"), world.people[Role.PT]
+    rosa, pt = world.add_patient(), world.people[Role.PT]
     session = walk(rosa, "positive", [HIT] * 9)
     sessions = TrainingSession.everywhere.filter(pk=session.pk)
     sessions.update(created_at=NOW - timedelta(1))
@@ -92,7 +80,7 @@ def test_the_first_of_two_midnights_begins_the_day(world):
     world.clinic.time_zone = "America/Havana"
     world.clinic.save()
     pt, first = world.people[Role.PT], datetime(2026, 11, 1, 4, 30, tzinfo=UTC)
-    walked = walk(patient(world, "Rosa"), "positive", [HIT] * 9, now=first)
+    walked = walk(world.add_patient(), "positive", [HIT] * 9, now=first)
     now = clinic_time(first + timedelta(hours=1), world.clinic)  # it is half past twelve again
     assert [row.patient for row in patients_today(pt, now)] == [walked.patient]
     listed = dashboard.sessions_today(pt, world.clinic, now)
@@ -100,12 +88,12 @@ def test_the_first_of_two_midnights_begins_the_day(world):
 
 
 def test_the_next_visit_is_one_tap_at_the_usual_time(world):
-    rosa = patient(world, "Rosa")
+    rosa = world.add_patient()
     session = walk(rosa, "positive", [HIT])
     began = datetime(2026, 10, 20, 10, 8, tzinfo=HERE.tzinfo)
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     assert suggested_time(world.people[Role.PT], rosa, HERE) == time(10, 15)
-    client, today = pt_of(world), timezone.now().astimezone(HERE.tzinfo).date()
+    client, today = world.pt, timezone.now().astimezone(HERE.tzinfo).date()
     page = client.get(f"/patients/{rosa.pk}/").content.decode()
     assert "In a week" in page
     assert "10:15" in page
@@ -130,16 +118,16 @@ def test_the_next_visit_is_one_tap_at_the_usual_time(world):
 )
 def test_a_day_that_cannot_be_says_what_to_do(world, given, said):
     url = f"/patients/{world.patient.pk}/visits/"
-    answer = pt_of(world).post(url, given, follow=True)
+    answer = world.pt.post(url, given, follow=True)
     assert said in answer.content.decode()
     assert not Visit.everywhere.exists()
 
 
 def test_a_visit_is_removed_from_its_own_patient_alone(world):
-    rosa, joon = patient(world, "Rosa"), patient(world, "Joon")
+    rosa, joon = world.add_patient(), world.add_patient("Joon")
     mine = plan_visit(rosa, timezone.now().date() + timedelta(1), time(9, 30))
     other = plan_visit(joon, timezone.now().date() + timedelta(1), None)
-    client = pt_of(world)
+    client = world.pt
     client.post(f"/patients/{rosa.pk}/visits/", {"remove": other.pk})
     assert Visit.everywhere.filter(pk=other.pk).exists()
     client.post(f"/patients/{rosa.pk}/visits/", {"remove": mine.pk})
@@ -149,12 +137,6 @@ def test_a_visit_is_removed_from_its_own_patient_alone(world):
 def test_nobody_plans_for_another_clinic(world):
     birch = build_world("birch")
     before = Visit.everywhere.count()
-    answer = pt_of(world).post(f"/patients/{birch.patient.pk}/visits/", {"in": "1"})
+    answer = world.pt.post(f"/patients/{birch.patient.pk}/visits/", {"in": "1"})
     assert answer.status_code == 404
     assert Visit.everywhere.count() == before
-
-
-def test_going_back_asks_the_server_anew(world):
-    """An old list would offer a start that has happened."""
-    for page in ("/start/", f"/patients/{world.patient.pk}/"):
-        assert "no-store" in pt_of(world).get(page).headers["Cache-Control"]

@@ -175,7 +175,7 @@ def test_a_tablet_is_noted_as_itself(world):
 
 
 def test_a_page_that_asks_again_and_again_is_noted_once_in_five_minutes(world, monkeypatch):
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     url = reverse("session", kwargs={"session_id": world.session.pk})
     for minutes, count in ((0, 1), (1, 1), (4, 1), (5, 2), (9, 2), (10, 3)):
         monkeypatch.setattr(timezone, "now", lambda m=minutes: NOW + timedelta(minutes=m))
@@ -184,7 +184,7 @@ def test_a_page_that_asks_again_and_again_is_noted_once_in_five_minutes(world, m
 
 
 def test_changes_are_noted_each_time_and_refusals_never(world):
-    client = client_of(world, Role.PT)
+    client = world.pt
     url = reverse("screen", kwargs={"patient_id": world.patient.pk})
     for _ in range(2):
         client.post(url, {"screen_side": "left"})
@@ -198,7 +198,7 @@ def test_changes_are_noted_each_time_and_refusals_never(world):
 def test_a_page_costs_at_most_two_statements_more_and_one_that_polls_none(
     world, django_assert_num_queries, django_assert_max_num_queries
 ):
-    client = client_of(world, Role.LEAD)
+    client = world.lead
     request = client.get(reverse("monitor", kwargs={"session_id": world.session.pk})).wsgi_request
     request.resolver_match = get_resolver().resolve(request.path)
     response = client.get(request.path)
@@ -227,7 +227,7 @@ def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
         Act.EXPORT, world.people[Role.PT], patient_id=world.patient.pk, about="here", now=NOW
     )
     entry = entries().get()
-    lead = client_of(world, Role.LEAD)
+    lead = world.lead
     changelist = reverse("admin:rehab_auditentry_changelist")
     assert "here" in lead.get(changelist).content.decode()
     for key, value in (
@@ -271,7 +271,7 @@ def test_a_new_token_is_noted(model, world):
     row = world.rows[model]
     ApiToken.everywhere.update(user=world.people[Role.LEAD])
     url = reverse(f"admin:rehab_{model.__name__.lower()}_changelist")
-    client_of(world, Role.LEAD).post(url, {"action": "renew_tokens", "_selected_action": row.pk})
+    world.lead.post(url, {"action": "renew_tokens", "_selected_action": row.pk})
     entry = entries().get(act=Act.TOKEN)
     assert (entry.by, entry.about) == (
         world.people[Role.LEAD],

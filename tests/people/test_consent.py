@@ -22,19 +22,12 @@ from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import SessionRequest, create_session
-from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.boards import figures_of
 from tests.support.world import NOW, World, client_of
 
 pytestmark = pytest.mark.django_db
 LOG = (TrainingSession, Step, SessionEvent, SessionMetric)
-
-
-@pytest.fixture
-def pt(world) -> Client:
-    return client_of(world)
 
 
 def tap(client: Client, patient: Patient, purpose: str, answer: str) -> Patient:
@@ -82,7 +75,7 @@ def test_new_words_are_a_new_version_and_old_consent_stays_with_the_old_ones(wor
 def test_a_lead_writes_the_words_and_others_do_not(world, pt):
     url = reverse("consent-text")
     assert pt.get(url).status_code == 403
-    lead = client_of(world, Role.LEAD)
+    lead = world.lead
     assert lead.post(url, {"text": "First line\r\nsecond"}).status_code == 302
     assert current_text(world.clinic).text == "First line\nsecond"
     assert lead.post(url, {"text": " "}).status_code == 200  # refused
@@ -163,7 +156,7 @@ def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
 
 
 def test_boards_with_others_need_consent(world):
-    patient = Patient.everywhere.create(clinic=world.clinic, code="n", nickname="N")
+    patient = world.add_patient()
     patient.boards = BoardsConsent.TOTAL
     with pytest.raises(ValidationError, match="consent to boards"):
         patient.full_clean()
@@ -174,7 +167,7 @@ def test_boards_with_others_need_consent(world):
 @pytest.mark.parametrize(("before", "asked"), [("own", "clinic"), ("clinic", "own")])
 def test_the_admin_shows_boards_and_leads_to_where_they_are_agreed_to(before, asked, world, pt):
     tap(pt, world.patient, "boards", before)
-    lead = client_of(world, Role.LEAD)
+    lead = world.lead
     url = reverse("admin:rehab_patient_change", args=[world.patient.pk])
     consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
     assert f'href="{consent}"' in lead.get(url).content.decode()
@@ -215,36 +208,23 @@ def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
 # --- care -----------------------------------------------------------------------------------------
 
 
-def set_up(world: World) -> TrainingSession:
-    walked = world.session
-    return create_session(
-        SessionRequest(
-            patient=world.patient,
-            valence="positive",
-            goal=GoalRule(value=1.0),
-            protocol=walked.protocol,
-            measure=walked.measure,
-        )
-    )
-
-
 def test_a_clinic_may_need_consent_to_care_before_a_session(world, pt):
     consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
     assert "no session without it" not in pt.get(consent).content.decode()
-    set_up(world)  # off, unless the clinic says so
+    world.begin_session()  # off, unless the clinic says so
     world.clinic.care_needs_consent = True
     world.clinic.save()
     with pytest.raises(InvalidSetting, match="not agreed to care.*Consent and data"):
-        set_up(world)
+        world.begin_session()
     tap(pt, world.patient, "care", "yes")
-    set_up(world)
+    world.begin_session()
     page = pt.post(consent, {"purpose": "care", "answer": "no"}, follow=True).content.decode()
     assert "This clinic sets up no session without it." in page
     assert f'href="{reverse("records", args=[world.patient.pk])}">End the program' in page
     with pytest.raises(InvalidSetting):
-        set_up(world)
+        world.begin_session()
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
-    set_up(world)
+    world.begin_session()
 
 
 # --- remote view ----------------------------------------------------------------------------------
@@ -254,7 +234,7 @@ HERE, AWAY = "192.168.1.7", "203.0.113.9"
 
 @pytest.mark.parametrize("name", ["monitor", "walk"])
 def test_from_elsewhere_a_session_is_watched_with_consent_only(name, world, pt):
-    session = set_up(world)
+    session = world.begin_session()
     url, consent = reverse(name, args=[session.pk]), reverse("consent", args=[world.patient.pk])
     assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 200  # no networks: nobody is asked
     assert 'value="remote"' not in pt.get(consent).content.decode()

@@ -8,10 +8,9 @@ import pytest
 from django.urls import reverse
 
 from rehab.people.models import User
-from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import Protocol
 from tests.support.form_noise import run_noise
-from tests.support.world import build_world, client_of
+from tests.support.world import build_world
 
 
 # tests/bench has 10,000.
@@ -40,7 +39,7 @@ HUGE = "9" * 5000  # Python reads no number of so many digits
 )
 def test_a_number_that_is_longer_than_any_key_is_no_failure(world, page, query, form, status):
     address = f"{reverse(page)}?{urlencode(query)}"
-    assert client_of(world, Role.LEAD).post(address, form).status_code == status
+    assert world.lead.post(address, form).status_code == status
 
 
 @pytest.mark.django_db
@@ -55,7 +54,7 @@ def test_a_number_that_is_longer_than_any_key_is_no_failure(world, page, query, 
 )
 def test_a_form_that_names_no_field_to_find_its_row_by(model, page, status):
     world = build_world("amber")
-    browser = client_of(world, Role.LEAD)
+    browser = world.lead
     name = f"admin:rehab_{model._meta.model_name}_{page}"
     address = reverse(name, kwargs={"object_id": world.rows[model].pk})
     assert browser.get(address, {"_to_field": ""}).status_code == status

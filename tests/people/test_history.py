@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from django.db.models import ProtectedError
 from django.test import Client
 from django.urls import reverse
 
@@ -26,6 +27,16 @@ def last_of(row) -> HistoryEntry:
     return HistoryEntry.everywhere.filter(model_name=type(row).__name__, object_id=row.pk).first()
 
 
+def test_an_account_that_has_changed_something_is_never_deleted(world):
+    """The digest of what it did names it: accounts are switched off instead."""
+    newcomer = User.everywhere.create_user("new", role=Role.PT, clinic=world.clinic)
+    HistoryEntry.everywhere.create(
+        clinic=world.clinic, model_name="Patient", object_id=1, kind="added", by=newcomer
+    )
+    with pytest.raises(ProtectedError):
+        newcomer.delete()
+
+
 @pytest.mark.parametrize("model", TRACKED, ids=lambda model: model.__name__)
 def test_every_row_of_people_and_settings_has_its_making_on_record(model, world):
     entry = last_of(world.rows[model])
@@ -36,7 +47,7 @@ def test_every_row_of_people_and_settings_has_its_making_on_record(model, world)
 def test_a_change_tells_the_field_before_and_after_and_who_did_it(world):
     url = reverse("edit-patient", kwargs={"patient_id": world.patient.pk})
     given = {"nickname": "Rosa", "code": "R1", "paretic_side": "right"}
-    assert client_of(world, Role.PT).post(url, given).status_code == 302
+    assert world.pt.post(url, given).status_code == 302
     entry = last_of(world.patient)
     assert entry.by == world.people[Role.PT]
     assert entry.changes == {
@@ -84,7 +95,7 @@ def test_passwords_pins_and_tokens_are_never_kept(world):
 
 def test_revoking_a_token_in_the_admin_is_on_record(world):
     chosen = {"action": "revoke_tokens", "_selected_action": [world.device.pk]}
-    client_of(world, Role.LEAD).post(reverse("admin:rehab_device_changelist"), chosen)
+    world.lead.post(reverse("admin:rehab_device_changelist"), chosen)
     entry = last_of(Device.everywhere.get(pk=world.device.pk))
     assert entry.by == world.people[Role.LEAD]
     assert list(entry.changes) == ["revoked_at"]
@@ -104,7 +115,7 @@ def test_a_rows_page_tells_its_changes_and_those_of_its_parts(world):
     step.save()
     GestureStep.everywhere.create(gesture=step.gesture, position=2, hold_s=1.0).delete()
     url = reverse("admin:rehab_composedgesture_history", args=[step.gesture_id])
-    words = client_of(world, Role.LEAD).get(url).content.decode()
+    words = world.lead.get(url).content.decode()
     assert "1.0 → 2.5" in words
     assert "Deleted: step" in words
 
@@ -113,7 +124,7 @@ def test_a_choice_and_a_row_are_told_in_words(world):
     world.device.kind = "robot"
     world.device.save()
     url = reverse("admin:rehab_device_history", args=[world.device.pk])
-    assert "Source of steps → Robot" in client_of(world, Role.LEAD).get(url).content.decode()
+    assert "Source of steps → Robot" in world.lead.get(url).content.decode()
 
 
 def test_each_role_reads_the_changes_of_what_it_may_read_and_of_its_clinic(world):
@@ -147,11 +158,11 @@ def test_erased_values_are_gone_but_not_who_and_when(world):
     entry = last_of(world.patient)
     assert entry.changes["nickname"] is None
     url = reverse("admin:rehab_patient_history", args=[world.patient.pk])
-    assert "erased" in client_of(world, Role.LEAD).get(url).content.decode()
+    assert "erased" in world.lead.get(url).content.decode()
 
 
 def test_an_accounts_page_tells_which_role_it_had(world):
-    pt, lead = world.people[Role.PT], client_of(world, Role.LEAD)
+    pt, lead = world.people[Role.PT], world.lead
     given = {"username": pt.username, "role": "lead", "is_active": "on"}
     assert lead.post(reverse("admin:rehab_user_change", args=[pt.pk]), given).status_code == 302
     words = lead.get(reverse("admin:rehab_user_history", args=[pt.pk])).content.decode()

@@ -13,16 +13,9 @@ from django.utils import translation
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.stations import tablets
-from rehab.stations.models import Device
-from tests.support.world import World, client_of
+from tests.support.world import World
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def pt(world: World) -> Client:
-    return client_of(world)
 
 
 def spoken(client: Client, path: str, browser: str = "en") -> str:
@@ -39,17 +32,6 @@ def spoken(client: Client, path: str, browser: str = "en") -> str:
 def clinic_speaks(world: World, language: str) -> None:
     world.clinic.language = language
     world.clinic.save()
-
-
-def paired(world: World) -> Client:
-    tablet = Device(
-        clinic=world.clinic, station=world.device.station, kind=Device.Kind.TABLET, name="T"
-    )
-    token = tablet.new_token()
-    tablet.save()
-    client = Client()
-    client.cookies[tablets.COOKIE] = token
-    return client
 
 
 def test_a_strangers_pages_have_the_browsers_language(client):
@@ -80,7 +62,7 @@ def test_what_a_patient_reads_is_in_the_patients_language(world, pt):
     open_one = TrainingSession.everywhere.get(pk=world.session.pk)
     open_one.pk, open_one.state, open_one.started_at = None, "ready", None
     open_one.save()
-    tablet = paired(world)
+    tablet, _ = world.add_tablet()
     for path in (
         reverse("walk", args=[open_one.pk]),
         reverse("scores", args=[world.session.pk]),
@@ -93,7 +75,7 @@ def test_what_a_patient_reads_is_in_the_patients_language(world, pt):
 
 def test_a_tablet_that_waits_speaks_as_its_clinic(world):
     clinic_speaks(world, "es")
-    assert spoken(paired(world), "/tablet/") == "es"
+    assert spoken(world.add_tablet()[0], "/tablet/") == "es"
 
 
 def test_programs_are_answered_in_english(world, pt):

@@ -36,7 +36,7 @@ def is_refused(client: Client, url: str, **asked: str) -> bool:
 
 @pytest.mark.wide
 def test_a_list_is_called_what_it_lists(world):
-    client, titled = client_of(world, Role.LEAD), 0
+    client, titled = world.lead, 0
     for model in REGISTERED:
         page = client.get(list_of(model))
         if page.status_code == 200 and "cl" in page.context:
@@ -61,7 +61,7 @@ def test_a_researcher_cannot_ask_letter_by_letter_what_is_hidden(world):
 @pytest.mark.wide
 @pytest.mark.parametrize("model", REGISTERED, ids=lambda model: model.__name__)
 def test_a_list_is_not_narrowed_by_fields_that_it_has_no_filter_for(world, model):
-    client, url = client_of(world, Role.LEAD), list_of(model)
+    client, url = world.lead, list_of(model)
     if "cl" not in client.get(url).context:
         return  # a page of its own, which always shows all
     pages = admin.site.get_model_admin(model)
@@ -78,7 +78,7 @@ def test_a_list_is_not_narrowed_by_fields_that_it_has_no_filter_for(world, model
 def test_the_check_above_finds_a_list_that_takes_any_field(world, monkeypatch):
     monkeypatch.setattr(PresetAdmin, "get_changelist", admin.ModelAdmin.get_changelist)
     url = reverse("admin:rehab_preset_changelist")
-    assert not is_refused(client_of(world, Role.LEAD), url, name__icontains="1")
+    assert not is_refused(world.lead, url, name__icontains="1")
 
 
 @pytest.mark.wide
@@ -121,4 +121,4 @@ def test_every_link_on_a_list_and_on_a_rows_page_leads_somewhere(world, role):
     ],
 )
 def test_a_day_of_no_calendar_is_refused(world, asked):
-    assert is_refused(client_of(world), reverse(SESSIONS), **asked)
+    assert is_refused(world.pt, reverse(SESSIONS), **asked)

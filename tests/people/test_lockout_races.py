@@ -8,24 +8,20 @@ from threading import Barrier
 import pytest
 from django.db import connection
 from django.test import Client
-from django.utils import timezone
 
-from rehab.people.models import Clinic, User
-from rehab.people.roles import Role
+from rehab.people.models import User
 from rehab.people.sign_in import lockout
 from rehab.people.sign_in.backends import PasswordBackend
 from rehab.people.sign_in.factors import factors
-from rehab.people.sign_in.factors.totp import generate_code, generate_secret
+from tests.support.accounts import add_account, add_app, enter
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
-PASSWORD = "walk well 2026"
 AT_ONCE = 30
 
 
 @pytest.fixture
 def pt() -> User:
-    clinic = Clinic.everywhere.create(name="Elm")
-    return User.everywhere.create_user("rosa", password=PASSWORD, role=Role.PT, clinic=clinic)
+    return add_account()
 
 
 def count_calls(monkeypatch, owner: object, name: str) -> list[object]:
@@ -58,11 +54,8 @@ def at_once(attempts: list[tuple[Client, str, dict[str, str]]]) -> list[int]:
 
 
 def test_no_more_than_five_codes_are_checked_however_many_are_sent_at_once(pt, monkeypatch):
-    secret = generate_secret()
-    now_s = int(timezone.now().timestamp())
-    factors.add_app(pt, secret, generate_code(secret, now_s // 30), timezone.now())
-    client = Client()
-    client.post("/sign-in/", {"username": "rosa", "password": PASSWORD})
+    add_app(pt)
+    enter(client := Client())
     pending = client.cookies["sessionid"].value
     attempts = []
     for number in range(AT_ONCE):

@@ -24,14 +24,11 @@ from rehab.people.consent.services import (
     withdraw_consent,
 )
 from rehab.people.models import BoardsConsent, ErasureReason, Patient
-from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.defaults import install_defaults
-from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.boards import figures_of
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 SCREEN = {"screen_side": "left", "screen_text": "large"}
@@ -39,11 +36,11 @@ DETAILS = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left", "body_mass
 
 
 def save_screen(world: World) -> Any:
-    return client_of(world).post(reverse("screen", args=[world.patient.pk]), SCREEN)
+    return world.pt.post(reverse("screen", args=[world.patient.pk]), SCREEN)
 
 
 def save_details(world: World) -> Any:
-    return client_of(world).post(reverse("edit-patient", args=[world.patient.pk]), DETAILS)
+    return world.pt.post(reverse("edit-patient", args=[world.patient.pk]), DETAILS)
 
 
 def patch(world: World) -> Any:
@@ -85,7 +82,7 @@ def test_who_is_erased_while_somebody_saves_stays_erased(save, status, world, mo
 @pytest.mark.parametrize("save", [save_screen, save_details, patch])
 def test_who_leaves_the_boards_while_somebody_saves_has_left_them(save, world, monkeypatch):
     leave = reverse("leave-boards", kwargs={"session_id": world.session.pk})
-    between(monkeypatch, lambda: client_of(world).post(leave))
+    between(monkeypatch, lambda: world.pt.post(leave))
     assert save(world).status_code in (200, 302)
     stored = Patient.everywhere.get(pk=world.patient.pk)
     assert stored.boards == BoardsConsent.OWN
@@ -113,17 +110,8 @@ def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
     record_boards_consent(stale[1], BoardsConsent.CLINIC, None, NOW)
     assert Consent.everywhere.count() == agreed
     assert Patient.everywhere.get(pk=world.patient.pk).boards == BoardsConsent.OWN
-    walked = world.session
     with pytest.raises(InvalidSetting, match="has ended"):
-        create_session(
-            SessionRequest(
-                patient=stale[2],
-                valence="positive",
-                goal=GoalRule(value=1.0),
-                protocol=walked.protocol,
-                measure=walked.measure,
-            )
-        )
+        world.begin_session(stale[2])
 
 
 def test_who_no_longer_agrees_stands_on_no_board_whatever_the_row_says(world):
@@ -177,7 +165,7 @@ def at_once(*acts: Callable[[], Any]) -> list[Any]:
 
 def test_the_admin_holds_the_patient_whom_it_changes(busy, monkeypatch):
     """The erasing comes while the form is looked at, and is done after it or before it."""
-    patient, lead = busy.patient, client_of(busy, Role.LEAD)
+    patient, lead = busy.patient, busy.lead
     other = Patient.everywhere.get(pk=patient.pk)
     found, threads = Patient.full_clean, list[threading.Thread]()
 
@@ -205,7 +193,7 @@ def test_the_admin_holds_the_patient_whom_it_changes(busy, monkeypatch):
 def test_a_consent_that_is_tapped_twice_is_noted_once(busy):
     current_text(busy.clinic)
     url = reverse("consent", args=[busy.patient.pk])
-    browsers = [client_of(busy) for _ in range(2)]
+    browsers = [busy.pt for _ in range(2)]
     for _ in range(5):
         withdraw_consent(busy.patient, Purpose.CARE, None, NOW)
         taps = [

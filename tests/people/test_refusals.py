@@ -14,11 +14,10 @@ from django.test import Client
 from django.urls import reverse
 from django.utils.translation import override
 
-from rehab.people.models import Clinic, Patient
+from rehab.people.models import Clinic
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
-from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, NotAllowed, State
 from rehab.training.controls import CONTROLS
 from rehab.training.goals import GoalRule
@@ -29,7 +28,7 @@ from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, build_gesture
 from tests.support.forms import feedback_form, gesture_form, session_form
 from tests.support.programs import program_of
-from tests.support.world import World, client_of
+from tests.support.world import World
 
 CATALOG = Path(__file__).parents[2] / "locale/es/LC_MESSAGES/django.po"
 ENGLISH = re.compile(
@@ -134,7 +133,7 @@ def test_a_protocol_is_refused_in_spanish(world):
     phases = {"kind": "training", "name": "Bloque", "feedback": "on", "gain": "9", "position": "1"}
     data = {f"phases-0-{name}": value for name, value in phases.items()}
     data |= {"name": "Uno", "phases-TOTAL_FORMS": "1", "phases-INITIAL_FORMS": "0"}
-    found = complaints(client_of(world), reverse("admin:rehab_protocol_add"), data)
+    found = complaints(world.pt, reverse("admin:rehab_protocol_add"), data)
     assert "No se puede usar una ganancia de 9. Dé una de 0,5 a 1,5." in found
 
 
@@ -150,35 +149,32 @@ def test_a_preset_is_refused_in_spanish(world):
         "source": "",
         "protocol": world.rows[Protocol].pk,
     }
-    found = complaints(client_of(world), reverse("admin:rehab_preset_add"), data)
+    found = complaints(world.pt, reverse("admin:rehab_preset_add"), data)
     assert "Dé el objetivo como valor o como porcentaje de la línea base." in found
 
 
 def test_a_feedback_type_is_refused_in_spanish(world):
     url = f"{reverse('admin:rehab_feedbacktype_add')}?slug=positive"
     data = feedback_form("positive", hit_points="0")
-    found = complaints(client_of(world, Role.LEAD), url, data)
+    found = complaints(world.lead, url, data)
     assert "Positiva: esta retroalimentación da puntos por un acierto y no quita nada" in found
     data = feedback_form("positive", **{"bands-2-from_percent": "99"})
-    found = complaints(client_of(world, Role.LEAD), url, data)
+    found = complaints(world.lead, url, data)
     assert "Positiva: una franja debe empezar en 1, el objetivo." in found
 
 
 def test_a_gesture_is_refused_in_spanish(world):
     url = reverse("admin:rehab_composedgesture_add")
-    found = complaints(client_of(world), url, gesture_form("ola", [{"turn_deg": 30}]))
+    found = complaints(world.pt, url, gesture_form("ola", [{"turn_deg": 30}]))
     assert "Termina con un giro de 30° a la izquierda." in found
-    found = complaints(client_of(world), url, gesture_form("nod", [{"hold_s": 1}]))
+    found = complaints(world.pt, url, gesture_form("nod", [{"hold_s": 1}]))
     assert "Todos los robots conocen ya nod." in found
 
 
 def test_a_set_up_is_refused_in_spanish_and_to_a_program_in_english(world):
-    rosa = Patient.everywhere.create(
-        clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
-    )
-    station = Station.everywhere.create(clinic=world.clinic, name="Ventana")
+    rosa, station = world.add_patient(), world.add_station("Ventana")
     percent = session_form(station) | {"goal_by": "percent", "goal_percent": "100"}
-    page = client_of(world).post(f"/patients/{rosa.pk}/new/", percent)
+    page = world.pt.post(f"/patients/{rosa.pk}/new/", percent)
     told = str(page.context["form"].errors)
     assert "necesita una fase de línea base antes de la primera retroalimentación" in told
     asked = {"patient": rosa.pk, "station": station.pk, "goal_percent": 100}

@@ -14,7 +14,7 @@ from django.urls import reverse
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.stations.models import Device, Station
-from tests.support.world import NOW, World, client_of
+from tests.support.world import NOW, World
 
 pytestmark = pytest.mark.django_db
 
@@ -75,7 +75,7 @@ def renamed(world: World, page: str) -> tuple[Any, Callable[[Any], Any], str, Ch
 )
 def test_a_new_name_changes_nothing_else_of_the_row(world, page):
     row, rename, field, change = renamed(world, page)
-    lead = client_of(world, Role.LEAD)
+    lead = world.lead
     with changed_meanwhile(row, change):
         assert rename(lead).status_code == 302
     stored = type(row).everywhere.filter(pk=row.pk).values(field, *change).get()

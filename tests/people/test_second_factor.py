@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from datetime import timedelta
 
 import pytest
 from django.core.management import call_command
@@ -17,16 +16,10 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.factors import factors
 from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
-from rehab.people.sign_in.factors.totp import (
-    TIME_STEP_S,
-    generate_code,
-    generate_secret,
-)
+from tests.support import accounts
+from tests.support.accounts import PASSWORD, add_account, add_app, code_of, is_in
 
 pytestmark = pytest.mark.postgres
-
-PASSWORD = "walk well 2026"
-RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
 
 
 # --- accounts -------------------------------------------------------------------------------------
@@ -34,19 +27,13 @@ RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
 
 @pytest.fixture
 def pt(db: None) -> User:
-    clinic = Clinic.everywhere.create(name="Elm")
-    return User.everywhere.create_user("rosa", password=PASSWORD, role=Role.PT, clinic=clinic)
+    return add_account()
 
 
 @pytest.fixture
 def app(pt) -> App:
     """An app of the therapist's, set up a while ago."""
-    secret = generate_secret()
-    then = timezone.now() - timedelta(days=3)
-    kept = factors.add_app(
-        pt, secret, generate_code(secret, int(then.timestamp()) // TIME_STEP_S), then
-    )
-    return App(secret, kept)
+    return App(*add_app(pt))
 
 
 class App:
@@ -57,23 +44,17 @@ class App:
         self.recovery_codes = recovery_codes
 
     def code(self, steps_ago: int = 0) -> str:
-        return generate_code(
-            self.secret, int(timezone.now().timestamp()) // TIME_STEP_S - steps_ago
-        )
+        return code_of(self.secret, steps_ago)
 
 
-def enter(client: Client, username: str = "rosa", then: str = ""):
-    """Fill in the sign-in page; give where it leads."""
-    form = {"username": username, "password": PASSWORD, "next": then}
-    return client.post("/sign-in/", form).headers["Location"]
+def enter(client: Client, username: str = "rosa", then: str = "") -> str:
+    """Fill in the sign-in page; return where it leads."""
+    answer = accounts.enter(client, username=username, next_url=then)
+    return str(answer.headers["Location"])
 
 
 def prove(client: Client, code: str):
     return client.post("/sign-in/code/", {"code": code})
-
-
-def is_in(client: Client) -> bool:
-    return client.get("/start/").status_code == 200
 
 
 def require(pt: User) -> None:
@@ -225,7 +206,7 @@ def test_removing_and_renewing_take_the_password(client, pt, app):
 
 
 def test_nobody_removes_what_is_another_ones(client, pt, app):
-    User.everywhere.create_user("other", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
+    add_account("other", Role.LEAD)
     enter(client, "other")
     removal = f"{reverse('remove-authenticator')}?which={Authenticator.everywhere.get().pk}"
     assert client.post(removal, {"password": PASSWORD}).headers["Location"] == "/account/"
@@ -292,7 +273,7 @@ def test_the_last_one_stays_where_one_is_required(client, pt, app):
 
 
 def test_a_lead_asks_for_it_and_helps_whoever_lost_it(client, pt, app):
-    lead = User.everywhere.create_user("lead", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
+    lead = add_account("lead", Role.LEAD)
     enter(client, "lead")
     form = {
         "name": "Elm",
@@ -317,7 +298,7 @@ def test_a_lead_asks_for_it_and_helps_whoever_lost_it(client, pt, app):
     ("action", "act"), [("remove_second_factors", "factors"), ("unlock", "unlock")]
 )
 def test_what_a_lead_does_to_an_accounts_door_is_noted(action, act, client, pt, app):
-    lead = User.everywhere.create_user("lead", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
+    lead = add_account("lead", Role.LEAD)
     enter(client, "lead")
     client.post("/admin/rehab/user/", {"action": action, "_selected_action": pt.pk})
     entry = AuditEntry.everywhere.get(act=act)
@@ -326,7 +307,7 @@ def test_what_a_lead_does_to_an_accounts_door_is_noted(action, act, client, pt, 
 
 
 def test_a_host_is_noted_in_the_accounts_clinic_and_a_hosts_own_account_in_no_clinics(client, pt):
-    host = User.everywhere.create_user("host", password=PASSWORD, role=Role.HOST)
+    host = add_account("host", Role.HOST)
     enter(client, "host")
     for account in (pt, host):
         client.post("/admin/rehab/user/", {"action": "unlock", "_selected_action": account.pk})
@@ -339,7 +320,7 @@ def test_a_host_is_noted_in_the_accounts_clinic_and_a_hosts_own_account_in_no_cl
 
 def test_a_lead_of_another_clinic_removes_nothing(client, pt, app):
     oak = Clinic.everywhere.create(name="Oak")
-    User.everywhere.create_user("oak", password=PASSWORD, role=Role.LEAD, clinic=oak)
+    add_account("oak", Role.LEAD, oak)
     enter(client, "oak")
     form = {"action": "remove_second_factors", "_selected_action": pt.pk}
     client.post("/admin/rehab/user/", form)

@@ -15,39 +15,27 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.browser_sessions import LAST_ACTIVITY_AT, SIGNED_IN_AT
+from tests.support.accounts import PASSWORD, add_account, enter, is_in
 
 pytestmark = pytest.mark.django_db
-PASSWORD = "walk well 2026"
 
 
 @pytest.fixture
 def pt() -> User:
-    clinic = Clinic.everywhere.create(name="Elm")
-    return User.everywhere.create_user("rosa", password=PASSWORD, role=Role.PT, clinic=clinic)
-
-
-def enter(client: Client, password: str = PASSWORD, username: str = "rosa", **headers: str):
-    """Fill in the sign-in page."""
-    form = {"username": username, "password": password}
-    return client.post("/sign-in/", form, headers=headers)
-
-
-def is_in(client: Client) -> bool:
-    """Whether a page for therapists opens."""
-    return client.get("/start/").status_code == 200
+    return add_account()
 
 
 def test_a_stranger_comes_back_to_the_page_that_was_asked_for(client, pt):
     asked = client.get("/patients/new/?from=list")
     assert asked.headers["Location"] == "/sign-in/?next=/patients/new/%3Ffrom%3Dlist"
-    form = {"username": "rosa", "password": PASSWORD, "next": "/patients/new/?from=list"}
-    assert client.post("/sign-in/", form).headers["Location"] == "/patients/new/?from=list"
+    answer = enter(client, next_url="/patients/new/?from=list")
+    assert answer.headers["Location"] == "/patients/new/?from=list"
     assert is_in(client)
 
 
 def test_nobody_is_led_to_a_foreign_page(client, pt):
-    form = {"username": "rosa", "password": PASSWORD, "next": "https://elsewhere.example/"}
-    assert client.post("/sign-in/", form).headers["Location"] == "/start/"
+    answer = enter(client, next_url="https://elsewhere.example/")
+    assert answer.headers["Location"] == "/start/"
 
 
 def test_the_admin_has_no_door_of_its_own(client, pt):
@@ -63,7 +51,7 @@ def test_the_admin_has_no_door_of_its_own(client, pt):
 @pytest.mark.parametrize("role", [Role.RESEARCHER, Role.HOST])
 def test_who_may_not_open_the_start_page_begins_in_the_admin(client, pt, role):
     clinic = None if role == Role.HOST else pt.clinic
-    User.everywhere.create_user("other", password=PASSWORD, role=role, clinic=clinic)
+    add_account("other", role, clinic)
     assert enter(client, username="other").headers["Location"] == "/admin/"
 
 
@@ -180,7 +168,7 @@ def test_coming_in_forgets_wrong_tries(client, pt):
 def test_a_lead_unlocks_accounts_of_the_own_clinic_only(client, pt):
     other = Clinic.everywhere.create(name="Oak")
     for name, clinic in (("lead", pt.clinic), ("oak", other)):
-        User.everywhere.create_user(name, password=PASSWORD, role=Role.LEAD, clinic=clinic)
+        add_account(name, Role.LEAD, clinic)
     guess(client, 5)
     form = {"action": "unlock", "_selected_action": pt.pk}
     for name, is_unlocked in (("oak", False), ("lead", True)):

@@ -160,7 +160,7 @@ def test_a_password_that_a_lead_gives_is_traced_with_the_account(world, pt):
     lead = world.people[Role.LEAD]
     url = reverse("admin:auth_user_password_change", args=[pt.pk])
     given = {"usable_password": "true", "password1": "a new one 2026"}
-    client_of(world, Role.LEAD).post(url, given | {"password2": "a new one 2026"})
+    world.lead.post(url, given | {"password2": "a new one 2026"})
     entry = AuditEntry.everywhere.filter(act=Act.PASSWORD, by=lead).get()
     assert entry.about == f"{pt}: {pt}"
 
@@ -252,10 +252,10 @@ def test_ending_all_ends_every_browser_of_this_account_and_no_other(world, pt, c
 def test_leads_read_the_sign_ins_of_their_clinic_alone(world, pt, client):
     enter(client, pt.username)
     log = reverse("admin:rehab_auditentry_changelist")
-    assert "192.0.2.0/24" in client_of(world, Role.LEAD).get(log).content.decode()
+    assert "192.0.2.0/24" in world.lead.get(log).content.decode()
     others = client_of(build_world("birch"), Role.LEAD).get(log).content.decode()
     assert "192.0.2.0/24" not in others
-    assert client_of(world, Role.PT).get(log).status_code == 403
+    assert world.pt.get(log).status_code == 403
 
 
 @pytest.mark.parametrize(

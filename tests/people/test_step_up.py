@@ -16,38 +16,23 @@ from rehab.people.roles import Role
 from rehab.people.sign_in import resets
 from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.factors.factors import Authenticator
-from rehab.people.sign_in.factors.totp import TIME_STEP_S, generate_code, generate_secret
 from rehab.people.sign_in.step_up import CONFIRMED_AT, LIFETIME
 from rehab.people.sign_in.tokens import ApiToken
+from tests.support.accounts import PASSWORD, add_account, add_app, code_of, enter
+from tests.support.world import signed_in
 
 pytestmark = pytest.mark.django_db
-PASSWORD = "walk well 2026"
 NEW = "other words 2027"
 
 
 @pytest.fixture
-def clinic() -> Clinic:
-    return Clinic.everywhere.create(name="Elm")
-
-
-def account(username: str, role: Role, clinic: Clinic | None) -> User:
-    return User.everywhere.create_user(username, password=PASSWORD, role=role, clinic=clinic)
+def lead() -> User:
+    return add_account("lena", Role.LEAD)
 
 
 @pytest.fixture
-def lead(clinic) -> User:
-    return account("lena", Role.LEAD, clinic)
-
-
-@pytest.fixture
-def pt(clinic) -> User:
-    return account("rosa", Role.PT, clinic)
-
-
-def signed_in(user: User) -> Client:
-    client = Client()
-    client.force_login(user)
-    return client
+def pt() -> User:
+    return add_account()
 
 
 def wait(client: Client, **passed: float) -> None:
@@ -152,9 +137,8 @@ def test_the_password_leads_to_no_foreign_page(lead, next_url):
 
 @pytest.mark.parametrize("kind", ["app", "recovery code"])
 def test_a_code_counts_like_the_password_and_once(kind, lead):
-    secret, recovery_codes = give_app(lead)
-    step = int(timezone.now().timestamp()) // TIME_STEP_S
-    code = generate_code(secret, step) if kind == "app" else recovery_codes[0]
+    secret, recovery_codes = add_app(lead)
+    code = code_of(secret) if kind == "app" else recovery_codes[0]
     client = signed_in(lead)
     wait(client, minutes=10)
     asked = client.get(reverse("add-app"))
@@ -166,18 +150,18 @@ def test_a_code_counts_like_the_password_and_once(kind, lead):
 
 
 def test_wrong_codes_lock_as_they_do_at_the_sign_in(lead):
-    secret, _ = give_app(lead)
+    secret, _ = add_app(lead)
     client = signed_in(lead)
     url = reverse("confirm")
     assert [client.post(url, {"code": "000000"}).status_code for _ in range(5)][3:] == [200, 429]
-    right = generate_code(secret, int(timezone.now().timestamp()) // TIME_STEP_S)
+    right = code_of(secret)
     assert client.post(url, {"code": right}).status_code == 429
     assert client.post(reverse("recovery-codes"), {"code": right}).status_code == 429
     assert client.post(url, {"password": PASSWORD}).status_code == 302  # counted by itself
 
 
 def test_a_passkey_counts_like_the_password(lead, monkeypatch):
-    give_app(lead)
+    add_app(lead)
     client = signed_in(lead)
     url = reverse("confirm")
     refused = client.post(url, {"passkey": "{}"})
@@ -192,15 +176,14 @@ def test_a_passkey_counts_like_the_password(lead, monkeypatch):
 
 
 def test_an_account_without_a_password_shows_a_code(lead):
-    secret, _ = give_app(lead)
+    secret, _ = add_app(lead)
     lead.set_unusable_password()
     lead.save()
     client = signed_in(lead)
     page = client.get(reverse("confirm")).content.decode()
     assert 'name="password"' not in page
     assert client.post(reverse("confirm"), {"password": ""}).status_code == 200
-    code = generate_code(secret, int(timezone.now().timestamp()) // TIME_STEP_S)
-    assert client.post(reverse("confirm"), {"code": code}).status_code == 302
+    assert client.post(reverse("confirm"), {"code": code_of(secret)}).status_code == 302
 
 
 def test_nothing_shown_confirms_nothing(lead):
@@ -214,37 +197,29 @@ def test_nothing_shown_confirms_nothing(lead):
 # --- factors ------------------------------------------------------------------------------------
 
 
-def add_app(client: Client) -> None:
+def enroll_app(client: Client) -> None:
     client.get(reverse("add-app"))
     secret = client.session["app_secret"]
-    code = generate_code(secret, int(timezone.now().timestamp()) // TIME_STEP_S)
-    assert client.post(reverse("add-app"), {"code": code}).status_code in {200, 302}
+    assert client.post(reverse("add-app"), {"code": code_of(secret)}).status_code in {200, 302}
 
 
 def test_adding_a_factor_ends_every_other_sign_in(pt):
     thief, owner = signed_in(pt), signed_in(pt)
-    add_app(owner)
+    enroll_app(owner)
     assert owner.get("/start/").status_code == 200
     assert thief.get("/start/").status_code == 302
 
 
 def test_a_second_factor_ends_a_sign_in_that_waits_for_the_first_one(pt):
     thief = Client()
-    give_app(pt)
-    thief.post("/sign-in/", {"username": "rosa", "password": PASSWORD})
+    add_app(pt)
+    enter(thief)
     assert thief.get("/sign-in/code/").status_code == 200
-    add_app(signed_in(pt))
+    enroll_app(signed_in(pt))
     assert thief.get("/sign-in/code/").headers["Location"] == "/sign-in/"
 
 
 # --- a lead's own account -----------------------------------------------------------------------
-
-
-def give_app(user: User) -> tuple[str, list[str]]:
-    """Enroll an app a while ago; return its secret and the recovery codes."""
-    secret, now = generate_secret(), timezone.now() - timedelta(hours=1)
-    code = generate_code(secret, int(now.timestamp()) // TIME_STEP_S)
-    return secret, factors.add_app(user, secret, code, now)
 
 
 def remove_factors(client: Client, *users: User) -> str:
@@ -264,8 +239,8 @@ def has_new_password(user: User) -> bool:
 
 def test_nobody_sheds_the_own_factor_in_the_admin(lead, pt):
     for user in (lead, pt):
-        give_app(user)
-    assert "Your own you change on the page Your account" in remove_factors(
+        add_app(user)
+    assert "Change your own on the page Your account" in remove_factors(
         signed_in(lead), lead, pt
     )
     assert [one.user for one in Authenticator.everywhere.all()] == [lead]
@@ -285,12 +260,12 @@ def test_nobody_sets_the_own_password_without_the_old_one(lead, pt):
 
 @pytest.fixture
 def host() -> User:
-    return account("hugo", Role.HOST, None)
+    return add_account("hugo", Role.HOST)
 
 
 @pytest.fixture
 def second_host() -> User:
-    return account("helga", Role.HOST, None)
+    return add_account("helga", Role.HOST)
 
 
 def confirm_reset(client: Client, request_id: int) -> None:
@@ -300,7 +275,7 @@ def confirm_reset(client: Client, request_id: int) -> None:
 def test_a_host_alone_resets_nobody(host, lead, pt):
     client = signed_in(host)
     for user in (lead, pt):  # a lead made a therapist, reset and made a lead again is one, too
-        give_app(user)
+        add_app(user)
         assert "has to confirm this" in remove_factors(client, user)
         assert set_password(client, user).status_code == 302
         assert not has_new_password(user)
@@ -322,7 +297,7 @@ def test_a_host_resets_once_what_the_lead_or_a_second_host_confirms(who, host, s
     assert (entry.clinic, entry.about) == (lead.clinic, "user: lena")
     set_password(client, lead)
     assert has_new_password(lead)
-    give_app(lead)
+    add_app(lead)
     remove_factors(client, lead)  # for which it was not confirmed
     assert factors.authenticators_of(lead).exists()
 
@@ -330,7 +305,7 @@ def test_a_host_resets_once_what_the_lead_or_a_second_host_confirms(who, host, s
 def test_others_confirm_no_reset(host, lead, pt):
     set_password(signed_in(host), lead)
     request = resets.ResetRequest.everywhere.get()
-    other = account("oskar", Role.LEAD, Clinic.everywhere.create(name="Oak"))
+    other = add_account("oskar", Role.LEAD, Clinic.everywhere.create(name="Oak"))
     for user in (pt, other):
         client = signed_in(user)
         assert "Confirm the reset" not in client.get("/account/").content.decode()

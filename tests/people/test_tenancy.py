@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from garry_site import urls as site_urls
 from rehab.people.audit.audit_log import AuditEntry
-from rehab.people.roles import Right, Role, rights_of
+from rehab.people.roles import Right, rights_of
 from rehab.people.scope import CrossClinicReference, Scope, ScopedManager, UnscopedQuery
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
@@ -24,7 +24,6 @@ from tests.support.tenancy import (
 )
 from tests.support.world import (
     all_actors,
-    client_of,
     scoped_models,
 )
 
@@ -106,7 +105,7 @@ def test_rows_of_two_clinics_are_never_tied_together(worlds):
 def test_the_audit_log_names_no_patient_of_another_clinic(worlds):
     """A form that is sent for one is answered like that of nobody, and noted."""
     amber, birch = worlds
-    lead = client_of(amber, Role.LEAD)
+    lead = amber.lead
     form = reverse("admin:rehab_patient_change", args=[birch.patient.pk])
     assert lead.post(form).status_code == 302
     assert AuditEntry.everywhere.filter(clinic=amber.clinic, about=form).exists()

@@ -17,7 +17,6 @@ from rehab.boards.admin import LeaderboardAdmin
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels import formatting, shared_panels
 from rehab.boards.ranking import results
-from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.audit import history_text
 from rehab.people.audit.history import HistoryEntry
@@ -174,27 +173,6 @@ def test_a_board_of_another_clinic_is_caught(worlds, monkeypatch):
     leaks, _ = find_leaks(worlds, some_actors(worlds, "pt of amber"), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})
     assert f"pt of amber: {url} shows Leaderboard of birch" in leaks
-
-
-@pytest.mark.long
-def test_unscoped_calls_of_the_api_are_caught(worlds, monkeypatch):
-    monkeypatch.setattr(people_api, "patients_of", lambda user: Patient.everywhere.order_by("pk"))
-    leaks, _ = find_leaks(
-        worlds,
-        some_actors(worlds, "pt of birch", "researcher of amber", "researcher of birch"),
-        under="/api/v1/",
-    )
-    key = worlds[0].patient.pk
-    assert "pt of birch: /api/v1/patients shows Patient of amber" in leaks
-    assert f"pt of birch: /api/v1/patients/{key} shows Patient of amber" in leaks
-    assert not any("researcher" in leak for leak in leaks)  # the role table held
-
-
-def test_a_name_that_the_api_tells_researchers_is_caught(worlds, monkeypatch):
-    monkeypatch.setattr(people_api, "may_see_names", lambda context: True)
-    leaks, _ = find_leaks(worlds, some_actors(worlds, "researcher of amber"), under="/api/v1/")
-    assert "researcher of amber: /api/v1/sessions shows Patient of amber" in leaks
-    assert "researcher of amber: /api/v1/sessions names a patient by nickname" in leaks
 
 
 @pytest.mark.long

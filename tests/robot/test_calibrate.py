@@ -6,11 +6,11 @@ import math
 import pytest
 
 from robot import calibrate, play_gesture
+from robot.base_options import VirtualClock
 from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.calibrate import NotMeasured, measure
 from robot.calibration import BadCalibration, apply_calibration, store_calibration
 from robot.motion.response import Response
-from robot.play_gesture import VirtualClock
 
 pytestmark = pytest.mark.matrix
 

@@ -76,12 +76,6 @@ def test_pauses_grow_to_five_seconds_and_begin_again():
     assert pauses.next_s() == 0.2
 
 
-def test_jitter_takes_up_to_half_of_a_pause():
-    pauses = BackOff(Timing(), lambda: 0.999)
-
-    assert pauses.next_s() == pytest.approx(0.1, rel=0.01)
-
-
 def test_a_silent_server_is_noticed_within_ten_seconds():
     timing = Timing()
 

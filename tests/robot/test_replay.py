@@ -2,13 +2,13 @@
 
 import pytest
 
+from robot.base_options import VirtualClock
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.behavior.performer import Performer
 from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
-from robot.play_gesture import VirtualClock
 from robot.replay import main, read_ticks, replay
 from robot.wire.incident import read_lines, to_lines
 

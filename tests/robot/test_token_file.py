@@ -10,7 +10,6 @@ import pytest
 
 from robot.connection_args import find_token_store
 from robot.link import Link
-from robot.token_file import TokenFile
 from tests.support.running_client import QUICK, serving
 
 
@@ -20,8 +19,7 @@ def test_the_file_is_replaced_whole_and_closed_to_others(tmp_path):
     path.chmod(0o644)
     link = tmp_path / "link"
     link.symlink_to(path)
-    assert TokenFile(link, print).is_writable
-    assert TokenFile(link, print).keep("new")
+    assert find_token_store(Namespace(token_file=link), print)("new")
     assert path.read_text() == "new\n"
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert link.is_symlink()
@@ -36,7 +34,7 @@ def test_a_disk_that_refuses_leaves_the_old_one(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", refuse)
-    assert not TokenFile(path, said.append).keep("new")
+    assert not find_token_store(Namespace(token_file=path), said.append)("new")
     assert path.read_text() == "old\n"
     assert "No space left on device" in said[0]
 
@@ -80,7 +78,7 @@ async def test_a_token_is_said_back_once_it_is_stored(is_kept):
 
     async with serving(handler) as url, asyncio.timeout(5):
         hello = {"type": "hello", "version": 1}
-        link = Link(url, "t-1", lambda: hello, timing=QUICK, keep_token=keep)
+        link = Link(url, "t-1", lambda: hello, timing=QUICK, store_token=keep)
         assert (await anext(link))["type"] == "welcome"
         assert (await anext(link))["type"] == "welcome"  # of the second connection
         await link.close()

@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from robot.bases import BASES, Abilities, BaseLost
+from robot.bases import BASES, BaseLost
 from robot.black_box import recorder
 from robot.black_box.recorder import BlackBox
 from robot.link import REFUSALS, Link, LinkRefused, Timing
@@ -16,16 +16,10 @@ from robot.wire.close_codes import CloseCode
 from robot.wire.incident import unpack
 from robot.worker import Worker
 from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
-from tests.support.robot_stage import IdealBase
+from tests.support.robot_stage import IdealBase, RealBase
 
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
 ENDING = REFUSALS.keys() - {CloseCode.NOT_PROTOCOL}  # of the close codes, those that end the work
-
-
-class RealBase(IdealBase):
-    """A base that no program may arm."""
-
-    abilities = Abilities(simulated=False, moves=True)
 
 
 @pytest.fixture
@@ -215,17 +209,14 @@ async def test_a_broken_frame_is_counted_and_the_work_goes_on(garry, junk):
         assert len(garry.sockets) == 1
 
 
-async def test_a_stranger_on_the_other_end_is_left(garry):
-    garry.welcome = {"no": "type"}
-    worker = Worker(partial(Link, garry.url, TOKEN), BASES["null"](time.monotonic))
-    with pytest.raises(LinkRefused, match="no GARRY server"):
-        async with asyncio.timeout(5):
-            await worker.run()
-
-
-async def test_a_refusal_ends_it(garry):
-    worker = Worker(partial(Link, garry.url, "wrong"), BASES["null"](time.monotonic))
-    with pytest.raises(LinkRefused, match="Unknown token"):
+@pytest.mark.parametrize(
+    ("token", "welcome", "words"),
+    [(TOKEN, {"no": "type"}, "no GARRY server"), ("wrong", {}, "Unknown token")],
+)
+async def test_a_stranger_or_a_refusal_ends_it(garry, token, welcome, words):
+    garry.welcome = welcome
+    worker = Worker(partial(Link, garry.url, token), BASES["null"](time.monotonic))
+    with pytest.raises(LinkRefused, match=words):
         async with asyncio.timeout(5):
             await worker.run()
 
@@ -265,7 +256,7 @@ async def test_what_was_recorded_around_a_stop_is_sent_once_to_its_own_session(
     assert (incident["session"], incident["reason"]) == (7, "stopped")
     assert 0.3 <= incident["ago_s"] < 5
     records = unpack(incident["recording"])
-    assert {"type": "stop"} in [one.get("heard") for one in records]
+    assert {"type": "stop"} in [one.get("received") for one in records]
     assert any(any(one["tick"][:2]) for one in records if "tick" in one)
 
 

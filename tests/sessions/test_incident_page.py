@@ -74,11 +74,11 @@ def test_a_damaged_recording_is_said(world):
     [
         [],
         [{"at_s": 1.0}],
-        [{"at_s": 1.0, "kept": None}, {"at_s": 2, "tick": "1234567"}],
+        [{"at_s": 1.0, "retained": None}, {"at_s": 2, "tick": "1234567"}],
         [{"at_s": 1.0, "tick": [None] * 7}, {"at_s": 1, "tick": [0] * 7, "hazards": [[]]}],
-        [{"at_s": 1.0, "said": {"kind": [], "lights": [1]}}, {"at_s": 1, "heard": {"type": {}}}],
-        [{"at_s": 1.0, "said": {"kind": "gesture", "phase": {}, "outcome": {}}}],
-        [{"at_s": 1.0, "lost": []}, {"at_s": 1.0, "said": {"kind": "status", "lights": []}}],
+        [{"at_s": 1.0, "sent": {"kind": [], "lights": [1]}}, {"at_s": 1, "received": {"type": {}}}],
+        [{"at_s": 1.0, "sent": {"kind": "gesture", "phase": {}, "outcome": {}}}],
+        [{"at_s": 1.0, "lost": []}, {"at_s": 1.0, "sent": {"kind": "status", "lights": []}}],
     ],
 )
 def test_a_robot_that_records_nonsense_breaks_no_page(records):

@@ -117,14 +117,6 @@ def test_date_start_duration_score_type_and_goal_are_there_to_read(patient):
     assert figures["hit_rate"] == pytest.approx(2 / 3)
 
 
-def test_explicit_feedback_has_no_score(patient):
-    aggregate = begin(patient, "explicit")
-    walk(aggregate, 4.0, 2.0)
-    change(aggregate, ChangeKind.FINISH)
-    assert not SessionMetric.everywhere.filter(slug="score").exists()
-    assert SessionMetric.everywhere.get(slug="hit_rate").value == 0.5
-
-
 def test_events_say_who_changed_what_after_which_step(patient):
     aggregate = begin(patient)
     walk(aggregate, 4.0, 4.0)
@@ -302,11 +294,6 @@ def test_a_session_that_could_not_be_walked_is_not_created(patient, settings, me
     with pytest.raises(InvalidSetting, match=message):
         begin(patient, **settings)
     assert not TrainingSession.everywhere.exists()
-
-
-def test_a_gain_out_of_bounds_is_refused():
-    with pytest.raises(InvalidSetting, match="0.5 to 1.5"):
-        make_phase("training", gain=0.4)
 
 
 def test_which_leg_is_trained_must_be_known(patient):

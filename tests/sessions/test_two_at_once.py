@@ -16,7 +16,6 @@ from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import StationTaken
 from rehab.sessions.setup.defaults import install_defaults
 from rehab.stations.models import Station
 from tests.support.forms import session_form
@@ -103,18 +102,6 @@ def test_pages_and_programs_obey(world, station, people):
         assert set(at_once(*acts)) in answers
         assert open_at(station) == 1
         TrainingSession.everywhere.filter(station=station).update(state="aborted")
-
-
-def test_a_station_that_is_taken_is_refused_whoever_asks(world, station, people):
-    rosa, omar = people
-    by = world.people[Role.PT]
-    first = SessionForm(session_form(station), patient=rosa, by=by)
-    second = SessionForm(session_form(station), patient=omar, by=by)
-    assert first.is_valid()
-    assert second.is_valid()
-    first.save()
-    with pytest.raises(StationTaken, match="Rosa"):
-        second.save()
 
 
 def test_of_two_corrections_of_the_same_form_one_is_made(world):

@@ -1,6 +1,6 @@
 """An intake with all that goes in and comes out of it."""
 
-from rehab.gait import LegSamples, measure_both_legs
+from rehab.gait import LegSamples, measure_strides
 from rehab.gait.recordings.columns import REQUIRED, SIDES, SIGNAL_LAYOUTS
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake import Intake, IntakeSettings
@@ -47,7 +47,7 @@ def measure(made, rate_hz=200.0):
     left, right = (
         LegSamples(leg.force_n, leg.moment_nm, leg.angle_rad) for leg in (made.left, made.right)
     )
-    return measure_both_legs(made.t_s, left, right, rate_hz=rate_hz, mass_kg=MASS)
+    return measure_strides(made.t_s, {"left": left, "right": right}, rate_hz=rate_hz, mass_kg=MASS)
 
 
 def rows_of(table, names=NAMES):

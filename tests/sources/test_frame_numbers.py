@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rehab.gait import measure_both_legs
+from rehab.gait import measure_strides
 from rehab.gait.recordings.columns import read_column_map
 from rehab.gait.recordings.tables import read_signals
 from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure, rows_of
@@ -109,9 +109,7 @@ def test_frame_numbers_are_kept(table, tmp_path):
     harness.intake.finish()
     harness.intake.close()
     t_s, legs, frames = read_signals(path)
-    again = measure_both_legs(
-        t_s, legs["left"], legs["right"], rate_hz=200, mass_kg=MASS, frame=frames
-    )
+    again = measure_strides(t_s, legs, rate_hz=200, mass_kg=MASS, frame=frames)
 
     assert frames[0] == 7000
     assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.gait import measure_both_legs
+from rehab.gait import measure_strides
 from rehab.gait.recordings.columns import read_column_map
 from rehab.gait.recordings.tables import read_signals
 from rehab.training.steps import Side
@@ -252,7 +252,7 @@ def test_what_is_kept_is_measured_alike(made, table, tmp_path):
     harness.intake.close()
 
     t_s, legs, _ = read_signals(path)
-    again = measure_both_legs(t_s, legs["left"], legs["right"], rate_hz=200, mass_kg=MASS)
+    again = measure_strides(t_s, legs, rate_hz=200, mass_kg=MASS)
     live = [m.value for m in harness.strides() if not m.reasons]
     assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(live, rel=1e-4)
 

@@ -6,7 +6,7 @@ import pytest
 from django.urls import reverse
 
 from rehab.stations.addresses import reachable_host
-from tests.support.world import World, client_of
+from tests.support.world import World
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ def test_a_tablet_reaches_what_it_is_told(opened: str, names: list[str], told: s
 
 @pytest.mark.django_db
 def test_the_page_says_where_or_what_to_do(world: World, settings: object) -> None:
-    client = client_of(world)
+    client = world.pt
     settings.HOST, settings.ALLOWED_HOSTS = "127.0.0.1", ["127.0.0.1"]  # type: ignore[attr-defined]
     page = client.get(reverse("pair"), headers={"host": "127.0.0.1:8000"}).content.decode()
     assert "GARRY_HOST" in page

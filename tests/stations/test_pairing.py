@@ -14,7 +14,7 @@ from rehab.people.random_codes import ALPHABET
 from rehab.people.rate_limits import TokenBuckets
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
-from tests.support.world import World, build_world, client_of
+from tests.support.world import World, build_world
 
 pytestmark = pytest.mark.django_db
 
@@ -25,13 +25,8 @@ def fresh_cache():
 
 
 @pytest.fixture
-def pt(world: World) -> Client:
-    return client_of(world)
-
-
-@pytest.fixture
 def station(world: World) -> Station:
-    return Station.everywhere.create(clinic=world.clinic, name="Bay 4")
+    return world.add_station()
 
 
 def shown_code(tablet: Client) -> str:

@@ -8,11 +8,10 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from rehab.people.roles import Role
 from rehab.stations.models import Device, PinAttempts, Station
 from rehab.stations.pins import FREE_ATTEMPTS, LONGEST_LOCKOUT, PinRefused, check_pin, set_pin
 from rehab.stations.tablets import COOKIE
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world
 
 pytestmark = pytest.mark.django_db
 SCREEN = "tablet 1"
@@ -27,12 +26,8 @@ def station(world: World) -> Station:
 
 
 @pytest.fixture
-def tablet(station: Station) -> tuple[Client, Device]:
-    device = Device(clinic=station.clinic, station=station, kind=Device.Kind.TABLET, name="T")
-    client = Client()
-    client.cookies[COOKIE] = device.new_token()
-    device.save()
-    return client, device
+def tablet(world: World, station: Station) -> tuple[Client, Device]:
+    return world.add_tablet(station)
 
 
 def wait_for(station: Station, pin: str, now, who: str = SCREEN) -> int:
@@ -134,14 +129,14 @@ def test_a_station_of_another_clinic_opens_nothing(tablet):
     client, _ = tablet
     answer = client.post("/tablets/leave/", {"station": birch.rows[Station].pk})
     assert answer.status_code == 404
-    pt = client_of(birch)
+    pt = birch.pt
     assert pt.post("/tablets/leave/", {"station": tablet[1].station_id}).status_code == 404
     stranger = Client().post("/tablets/leave/", {"station": tablet[1].station_id})
     assert stranger.headers["Location"].startswith("/sign-in/")
 
 
 def test_a_lead_sets_and_removes_the_pin_in_the_admin(world, station):
-    lead = client_of(world, Role.LEAD)
+    lead = world.lead
     url, kept = f"/admin/rehab/station/{station.pk}/change/", station.pin_hash
     given = {"name": "Bay 5", "devices-TOTAL_FORMS": 0, "devices-INITIAL_FORMS": 0}
     assert kept not in lead.get(url).content.decode()

@@ -11,8 +11,7 @@ from django.urls import reverse
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import SCORES_SHOWN_FOR, TrainingSession
-from rehab.stations.models import Device, Station
-from rehab.stations.tablets import COOKIE
+from rehab.stations.models import Device
 from tests.support.world import NOW, World
 
 pytestmark = pytest.mark.django_db
@@ -21,17 +20,12 @@ MINUTE = timedelta(minutes=1)
 
 @pytest.fixture
 def tablet(world: World) -> Device:
-    return Device(
-        clinic=world.clinic, station=world.rows[Station], kind=Device.Kind.TABLET, name="T"
-    )
+    return world.add_tablet()[1]
 
 
 @pytest.fixture
-def screen(tablet: Device) -> Client:
-    client = Client()
-    client.cookies[COOKIE] = tablet.new_token()
-    tablet.save()
-    return client
+def screen(world: World) -> Client:
+    return world.add_tablet()[0]
 
 
 def walk(world: World, state: str, began=None, ended=None) -> TrainingSession:
@@ -83,7 +77,7 @@ def test_it_sees_the_last_one_for_a_quarter_of_an_hour(world, tablet, state):
 
 def test_another_stations_patient_does_not_count(world, tablet):
     elsewhere = walk(world, "running", NOW - MINUTE)
-    elsewhere.station = Station.everywhere.create(clinic=world.clinic, name="Bay 9")
+    elsewhere.station = world.add_station()
     elsewhere.save()
     end(world.session, NOW - 5 * MINUTE)
     assert seen(tablet) == {world.session.pk}

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 from django.test import Client
-from hypothesis import HealthCheck, Phase, given, settings
 
 from rehab.people.models import Patient
 from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.web import api_base
-from tests.support.api_noise import Noise, make_noise
+from tests.support.api_noise import make_noise
 from tests.support.marks import mark
+from tests.support.noise import draw
 from tests.support.programs import ROOT, program_of
 from tests.support.world import build_world, scoped_models
 
@@ -41,17 +41,7 @@ def run_noise(count: int, monkeypatch: pytest.MonkeyPatch) -> str:
     answers: Counter[int] = Counter()
     slowest = 0.0
 
-    @settings(
-        max_examples=count,
-        deadline=None,
-        derandomize=True,
-        database=None,
-        phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck),
-    )
-    @given(make_noise(paths, schemas, known))
-    def send(noise: Noise) -> None:
-        nonlocal slowest
+    for noise in draw(make_noise(paths, schemas, known), count):
         method, path = noise.call.split()
         began = time.perf_counter()
         response: Any = program.client.generic(
@@ -69,7 +59,6 @@ def run_noise(count: int, monkeypatch: pytest.MonkeyPatch) -> str:
         assert isinstance(answer, dict | list)
         assert not any(word in text for word in marks), (noise, text)
 
-    send()
     assert slowest < SLOWEST_S
     counts = ", ".join(f"{code}: {number}" for code, number in sorted(answers.items()))
     return f"{answers.total()} calls ({counts}), slowest {1000 * slowest:.0f} ms"

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import Any
 
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+from tests.support.servers import Server
+from tests.support.walk_seed import Walk
 
 SIZES = {
     "phone": (390, 844),
@@ -16,6 +20,10 @@ SIZES = {
     "tablet-landscape": (1280, 800),
     "laptop": (1440, 900),
 }
+
+
+PATIENCE_MS = 40_000  # a loaded machine draws eight pages slowly
+Visit = Callable[..., Page]  # the fixture `visit` (tests/browser/conftest.py)
 
 
 @contextmanager
@@ -28,6 +36,46 @@ def chromium() -> Iterator[Browser]:
         )
         yield browser
         browser.close()
+
+
+@contextmanager
+def signed_in(
+    browser: Browser,
+    server: Server,
+    walk: Walk | None = None,
+    size: str | None = None,
+    *,
+    port: int = 0,
+    alone: bool = False,
+    **options: Any,
+) -> Iterator[BrowserContext]:
+    """Open a browser where the walk's PT is signed in, or without one the first account.
+
+    Parameters
+    ----------
+    size
+        Of its windows, by ``SIZES``.
+    port
+        Through which it reaches the server, if that is another one.
+    alone
+        Whether it is the walk's paired tablet.
+    """
+    url = f"http://127.0.0.1:{port or server.port}"
+    if size is not None:
+        options["viewport"] = dict(zip(("width", "height"), SIZES[size], strict=True))
+    context = browser.new_context(base_url=url, **options)
+    context.set_default_timeout(PATIENCE_MS)
+    if walk is None:
+        page = context.new_page()
+        page.goto("/start/")
+        sign_in(page, server.password)
+        page.wait_for_url("**/start/")
+        page.close()
+    else:
+        name, value = ("garry_tablet", walk.tablet) if alone else ("sessionid", walk.cookie)
+        context.add_cookies([{"name": name, "value": value, "url": url}])
+    yield context
+    context.close()
 
 
 def sign_in(page: Page, password: str, name: str = "pt") -> None:

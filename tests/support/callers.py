@@ -160,6 +160,11 @@ class SourceCaller(Caller):
             self.number = welcome["next"] - 1
         return welcome
 
+    async def open(self, **extra: Any) -> Self:
+        """Dial in and say hello; return the source once it is welcome."""
+        await (await self.dial()).hello(**extra)
+        return self
+
     async def walk(self, *values: float | None, **extra: Any) -> None:
         """Send steps and wait until they are acknowledged."""
         for value in values:
@@ -183,6 +188,11 @@ class Page(Caller):
         """Open it; return the snapshot."""
         await self.dial()
         return await self.hear("snapshot")
+
+    async def open(self) -> Self:
+        """Open it; return the page once it has its snapshot."""
+        await self.watch()
+        return self
 
     @property
     def events(self) -> list[Message]:
@@ -259,6 +269,11 @@ class RobotCaller(Caller):
         """Say hello; return the welcome."""
         await self.say({"type": "hello", "version": 1, "base": "null"} | extra)
         return await self.hear("welcome")
+
+    async def open(self, **extra: Any) -> Self:
+        """Dial in and say hello; return the robot once it is welcome."""
+        await (await self.dial()).hello(**extra)
+        return self
 
 
 _keys: dict[int, str] = {}

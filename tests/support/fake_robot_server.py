@@ -8,15 +8,10 @@ from typing import Any
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
+from tests.support import robot_stage
+
 TOKEN = "t-1"
-CUE = {
-    "above": "celebrate",
-    "below": None,
-    "threshold": 0.9,
-    "window_s": 5,
-    "rest_s": 5,
-    "intensity": 1,
-}
+CUE = robot_stage.CUE | {"below": None}
 
 Message = dict[str, Any]
 

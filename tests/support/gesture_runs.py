@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from robot.base_options import VirtualClock
 from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.motion.gesture import Gesture
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
 from robot.motion.response import Response
-from robot.play_gesture import VirtualClock, play_gesture
+from robot.play_gesture import play_gesture
 
 REST_S = 1.0  # between two gestures; in a session it is longer
 

@@ -158,13 +158,7 @@ def _faults(seen: Estimate, frame_filter: FrameFilter, number: int) -> Iterator[
         yield "bumper"
     if seen.bumper & ~SensorSide.CENTER or seen.cliff or seen.wheel_drop or seen.over_current:
         yield "hazard"
-    if (
-        seen.buttons
-        or seen.pressed
-        or seen.is_charging
-        or frame_filter.firmware
-        or frame_filter.hardware
-    ):
+    if seen.buttons or seen.is_charging or frame_filter.firmware:
         yield "button, charger or version"
     if seen.restarted:
         yield "began anew"

@@ -18,7 +18,7 @@ from typing import Any, Self
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from tests.support.servers import ROOT, clean_environment, free_port
+from tests.support.servers import ROOT, clean_environment, free_port, run_python
 
 Message = dict[str, Any]
 WITHIN_S = 10.0
@@ -108,7 +108,7 @@ class Pair:
 
     def __init__(self, folder: Path, database: str, redis: str, count: int = 2) -> None:
         self.ports = [free_port() for _ in range(count)]
-        self.log = folder / "log"
+        self.folder, self.log = folder, folder / "log"
         self.environment = clean_environment(folder, self.ports[0]) | {
             "DJANGO_SETTINGS_MODULE": "garry_site.settings",
             "GARRY_HOSTED": "1",
@@ -148,12 +148,7 @@ class Pair:
 
     def run_python(self, *arguments: str) -> str:
         """Run Python on the database."""
-        command = [sys.executable, *arguments]
-        result = subprocess.run(
-            command, cwd=ROOT, env=self.environment, capture_output=True, text=True, check=False
-        )
-        assert result.returncode == 0, result.stderr
-        return result.stdout
+        return run_python(self.folder, *arguments, **self.environment)
 
     def begin(self, place: int) -> None:
         """Start a server."""

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import BrowserContext, Page
 from playwright.sync_api import TimeoutError as PlaywrightTimeout
 
 from tests.support.browsers import SIZES
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk
 
-PATIENCE_MS = 40_000  # a loaded machine draws eight pages slowly
 # What is on the page, in one word: the same after a reload, and on a second tablet.
 DIGEST = """() => ({
   look: document.body.dataset.look, theme: document.body.dataset.theme,
@@ -26,18 +23,6 @@ DIGEST = """() => ({
   dots: [...document.querySelectorAll(".dots circle")].map((dot) =>
     dot.matches(".gap") ? "gap" : [dot.matches(".hit"), dot.getAttribute("cy")]),
 })"""
-
-
-@contextmanager
-def signed_in(
-    browser: Browser, server: Server, walk: Walk, port: int = 0, **options: Any
-) -> Iterator[BrowserContext]:
-    url = f"http://127.0.0.1:{port or server.port}"
-    context = browser.new_context(base_url=url, **options)
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": url}])
-    context.set_default_timeout(PATIENCE_MS)
-    yield context
-    context.close()
 
 
 def open_page(context: BrowserContext, walk: Walk, size: str = "tablet-portrait") -> Page:

@@ -2,8 +2,10 @@
 
 import json
 import math
+from argparse import ArgumentParser
 from contextlib import suppress
 
+from robot.base_options import add_base_arguments, make_base
 from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.rosbridge.topics import PROFILES, Topics
 from robot.behavior.performer import Performer
@@ -96,6 +98,13 @@ class Stage:
 
     def of(self, kind):
         return [report for report in self.performer.reports if report["kind"] == kind]
+
+
+def base_of(*words):
+    """Return the base that `--base rosbridge` with these words stands for."""
+    parser = ArgumentParser()
+    add_base_arguments(parser)
+    return make_base(parser.parse_args(["--base", "rosbridge", *words]), lambda: 0.0)
 
 
 def moving(stage):

@@ -12,10 +12,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from tests.support import templates
 
 ROOT = Path(__file__).parents[2]
+SETTINGS = "garry_site.settings"
 
 
 @dataclass
@@ -45,15 +47,7 @@ class Server:
 
     def manage(self, *arguments: str) -> str:
         """Run a management command on its database; return what that prints."""
-        done = subprocess.run(
-            [sys.executable, "manage.py", *arguments],
-            cwd=ROOT,
-            env=clean_environment(self.folder, self.port),
-            check=True,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        return done.stdout
+        return run_python(self.folder, "manage.py", *arguments, port=self.port)
 
     def run_shell(self, program: str) -> str:
         """Run a program with its rows; return what that prints."""
@@ -78,18 +72,35 @@ def clean_environment(folder: Path, port: int) -> dict[str, str]:
     return clean | {"GARRY_DATA_DIR": str(folder), "GARRY_PORT": str(port)}
 
 
+def try_python(
+    folder: Path, *arguments: str, port: int = 8000, umask: int = -1, **variables: str
+) -> subprocess.CompletedProcess[str]:
+    """Run Python on a data folder, with our settings and these variables; return what became."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        env=clean_environment(folder, port) | {"DJANGO_SETTINGS_MODULE": SETTINGS} | variables,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        umask=umask,
+    )
+
+
+def run_python(folder: Path, *arguments: str, **options: Any) -> str:
+    """Run Python on a data folder; return what it prints."""
+    done = try_python(folder, *arguments, **options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
 @cache
 def _tables() -> bytes:
     """Return a database with the tables and no row of ours, as a server makes one at first."""
     if kept := templates.read("server"):
         return kept
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run(
-            [sys.executable, "manage.py", "migrate", "--verbosity", "0"],
-            cwd=ROOT,
-            env=clean_environment(Path(folder), 8000),
-            check=True,
-        )
+        run_python(Path(folder), "manage.py", "migrate", "--verbosity", "0")
         database = Path(folder, "garry.sqlite3")
         assert not database.with_name("garry.sqlite3-wal").exists()  # all is in the file
         made = database.read_bytes()

@@ -12,7 +12,6 @@ import json
 import random
 import signal
 import ssl
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -23,7 +22,7 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from tests.support.servers import ROOT, clean_environment, free_port
+from tests.support.servers import ROOT, clean_environment, free_port, run_python
 
 GONE = (ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError)
 
@@ -187,16 +186,7 @@ class Torture:
 
     def run_python(self, *arguments: str) -> str:
         """Run Python beside the server, on its database."""
-        result = subprocess.run(
-            [sys.executable, *arguments],
-            cwd=ROOT,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert result.returncode == 0, result.stderr
-        return result.stdout
+        return run_python(self.folder, *arguments, **self.environment)
 
     async def start_server(self) -> asyncio.subprocess.Process:
         process = await asyncio.create_subprocess_exec(

@@ -39,6 +39,11 @@ class Walk:
         """The address of its patient's page."""
         return f"/sessions/{self.session}/"
 
+    @property
+    def monitor_path(self) -> str:
+        """The address of the PT's page."""
+        return f"{self.path}monitor/"
+
 
 class Feet:
     """A source that sends what a test tells it to, and returns when it is stored."""
@@ -54,10 +59,7 @@ class Feet:
 
     def hear(self, kind: str) -> dict[str, Any]:
         """Return the next message of a type."""
-        while True:
-            message: dict[str, Any] = json.loads(self._socket.recv(10))
-            if message["type"] == kind:
-                return message
+        return hear(self._socket, kind)
 
     def walk(self, *performances: float | None, sd: float | None = None) -> None:
         """Take steps of these shares of the goal; None for one that was not measured.
@@ -83,6 +85,23 @@ def feet_of(server: Server, walk: Walk, **hello: Any) -> Iterator[Feet]:
     url = f"ws://127.0.0.1:{server.port}/ws/source/"
     with connect(url, additional_headers={"Authorization": f"Bearer {walk.source}"}) as socket:
         yield Feet(socket, hello or {"speed": None})
+
+
+@contextmanager
+def robot_of(server: Server, walk: Walk, base: str = "null") -> Iterator[ClientConnection]:
+    """Connect a session's robot. All that it is sent is stored, whether it is read or not."""
+    url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
+    with connect(url, additional_headers={"Authorization": header}, max_queue=None) as robot:
+        robot.send(json.dumps({"type": "hello", "version": 1, "base": base}))
+        yield robot
+
+
+def hear(robot: ClientConnection, kind: str) -> dict[str, Any]:
+    """Return the next message of a type."""
+    while True:
+        message: dict[str, Any] = json.loads(robot.recv(10))
+        if message["type"] == kind:
+            return message
 
 
 def make_walks(server: Server, *wanted: dict[str, Any]) -> list[Walk]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from django.apps import apps
@@ -41,6 +42,7 @@ from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
+from rehab.stations.tablets import COOKIE
 from rehab.studies.models import StudyMark, StudyVersion
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.power_runs import PowerRun
@@ -57,7 +59,7 @@ NOW = START  # the moment at which a test begins
 RECORDED = [
     {"at_s": 10.0, "tick": [0.2, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0]},
     {"at_s": 10.5, "tick": [0.2, 0.0, 0.1, 0.0, 0.0, 0.2, 0.0], "hazards": ["bump"]},
-    {"at_s": 10.5, "kept": "bump", "is_first": True},
+    {"at_s": 10.5, "retained": "bump", "is_first": True},
     {"at_s": 10.7, "tick": [0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.0]},
 ]
 
@@ -89,6 +91,49 @@ class World:
         """The clinic's finished session."""
         session: TrainingSession = self.rows[TrainingSession]
         return session
+
+    @cached_property
+    def pt(self) -> Client:
+        """A browser of the clinic's therapist."""
+        return client_of(self)
+
+    @cached_property
+    def lead(self) -> Client:
+        """A browser of the clinic's lead."""
+        return client_of(self, Role.LEAD)
+
+    def add_patient(self, name: str = "Rosa", code: str = "", **fields: Any) -> Patient:
+        """Return a new patient of the clinic; the left leg is the paretic one."""
+        fields = {"paretic_side": "left"} | fields
+        return Patient.everywhere.create(
+            clinic=self.clinic, nickname=name, code=code or name, **fields
+        )
+
+    def add_station(self, name: str = "Bay 4", **fields: Any) -> Station:
+        """Return a new station of the clinic."""
+        return Station.everywhere.create(clinic=self.clinic, name=name, **fields)
+
+    def add_tablet(self, station: Station | None = None) -> tuple[Client, Device]:
+        """Return a paired tablet's browser and row; at the clinic's own station by default."""
+        at = station or self.rows[Station]
+        device = Device(clinic=self.clinic, station=at, kind=Device.Kind.TABLET, name="T")
+        client = Client()
+        client.cookies[COOKIE] = device.new_token()
+        device.save()
+        return client, device
+
+    def begin_session(self, patient: Patient | None = None, **options: Any) -> TrainingSession:
+        """Return a new session, ready to start, with the measure and protocol of the finished."""
+        like = self.session
+        options = {"valence": "positive", "goal": GoalRule(value=1.0)} | options
+        return create_session(
+            SessionRequest(
+                patient=patient or self.patient,
+                measure=like.measure,
+                protocol=like.protocol,
+                **options,
+            )
+        )
 
 
 def scoped_models() -> list[type[Any]]:

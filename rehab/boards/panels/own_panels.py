@@ -15,8 +15,7 @@ from django.utils.translation import pgettext
 
 from rehab.boards.choices import Aggregation, CountedTypes, Participants, PeriodKind
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.formatting import date_rows, format_rows
-from rehab.boards.panels.panel import BoardPanel
+from rehab.boards.panels.formatting import BoardPanel, date_rows, format_rows
 from rehab.boards.ranking.anonymity import find_visible_own_rows
 from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from typing import Any
 
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
@@ -14,14 +14,14 @@ from rehab.boards.cache import read_lists, read_standings
 from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels.formatting import (
-    PanelRow,
+    BoardPanel,
+    Total,
     date_rows,
     format_figure,
     format_rows,
     name_rows,
     to_percent,
 )
-from rehab.boards.panels.panel import BoardPanel, Total
 from rehab.boards.ranking.anonymity import count_participants, find_visible_rows
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import period_of
@@ -132,16 +132,18 @@ class BoardViewer:
         board, patient = self.board, self.patient
         if patient is None:
             return self._panel(note=note, summary=summary)
+        # A board of several patients shows own sessions as a board of neighbors does.
+        neighbors = Leaderboard(among=Participants.SELF, display=DisplayMode.NEIGHBORS)
         period = period_of(board, self.now)
         sessions = read_sessions(board, TrainingSession.everywhere.filter(patient=patient), period)
         results = own_results(board, sessions, self.valence, period)
         standings = Standings(results, board.ties)
         if board.aggregation == Aggregation.SUM:
-            mine = format_rows(board, find_visible_rows(self._own_board(), standings, None))
+            mine = format_rows(board, find_visible_rows(neighbors, standings, None))
             rows = [replace(row, title="", rank=None, you=True) for row in mine]
             return self._panel(rows=rows, note=note, summary=summary)
         me = standings.find_session(self.session.pk) if self.session else None
-        shown_as = board if board.is_own else self._own_board()
+        shown_as = board if board.is_own else neighbors
         rows = format_rows(board, find_visible_rows(shown_as, standings, me))
         walked = TrainingSession.everywhere.only(
             "created_at", "started_at", "active_s", "legacy_id"
@@ -151,31 +153,11 @@ class BoardViewer:
         dated = date_rows(rows, found, self.session, now)
         return self._panel(rows=dated, note=note, summary=summary)
 
-    def _own_board(self) -> Leaderboard:
-        """Return a board that shows own sessions as one of several patients falls back to."""
-        return Leaderboard(among=Participants.SELF, display=DisplayMode.NEIGHBORS)
-
-    def _panel(
-        self,
-        *,
-        rows: Sequence[PanelRow] = (),
-        total: Total | None = None,
-        note: str = "",
-        shared: bool = False,
-        summary: str = "",
-    ) -> BoardPanel:
+    def _panel(self, **content: Any) -> BoardPanel:
+        """Return the board's panel with the fields of `BoardPanel` that are given."""
         board = self.board
         valence = (
             self.valence if board.list_key(self.valence) else next(iter(board.counted_valences), "")
         )
-        return BoardPanel(
-            slug=f"{board.pk or 'new'}",
-            title=board.name,
-            label=board.name,
-            rows=rows,
-            total=total,
-            note=note,
-            kept=is_kept(board.metric, valence),
-            shared=shared,
-            summary=summary,
-        )
+        kept = is_kept(board.metric, valence)
+        return BoardPanel(f"{board.pk or 'new'}", board.name, board.name, kept=kept, **content)

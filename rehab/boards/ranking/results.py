@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from datetime import date, datetime
 from itertools import groupby
 from typing import NamedTuple
@@ -99,15 +99,14 @@ def make_result(
     board: Leaderboard, valence: str, sessions: Sequence[CountedSession], period: Period
 ) -> Result:
     """Return the result of some sessions: the sum or the mean of their figures."""
-    add = board.aggregation == Aggregation.SUM
-    figures = ((session.day, session.figure(board.metric)) for session in sessions)
-    figure = combine(figures, board.metric, add)
-    stakes = ((session.day, session.points_at_stake(board.metric)) for session in sessions)
-    points_at_stake = combine(stakes, board.metric, add)
-    tie = 0
-    if board.tie_breaker:
-        ties = ((session.day, session.figure(board.tie_breaker)) for session in sessions)
-        tie = combine(ties, board.tie_breaker, add)
+
+    def combined(slug: str, of: Callable[[CountedSession, str], float]) -> int:
+        parts = ((session.day, of(session, slug)) for session in sessions)
+        return combine(parts, slug, add=board.aggregation == Aggregation.SUM)
+
+    figure = combined(board.metric, CountedSession.figure)
+    at_stake = combined(board.metric, CountedSession.points_at_stake)
+    tie = combined(board.tie_breaker, CountedSession.figure) if board.tie_breaker else 0
     last = sessions[-1]
     merit = figure if board.higher_is_better else -figure
     return Result(
@@ -115,12 +114,12 @@ def make_result(
         session_id=last.session_id,
         valence=board.list_key(valence),
         figure=figure,
-        points_at_stake=points_at_stake if is_kept(board.metric, last.valence) else None,
+        points_at_stake=at_stake if is_kept(board.metric, last.valence) else None,
         key=make_key(merit, tie, last.at, last.session_id),
     )
 
 
-def combine(parts: Iterable[tuple[date, float]], slug: str, add: bool) -> int:
+def combine(parts: Iterable[tuple[date, float]], slug: str, *, add: bool) -> int:
     """Return the mean of the figures of some days or (``add``) their sum, as a whole number.
 
     In a sum no day counts more than ``MAX_PER_DAY``.

@@ -70,8 +70,15 @@ class CountedSession:
         return (
             board.metric in self.values
             and not (self.is_mixed and needs_one_valence(board))
-            and is_long_enough(board, self.values)
+            and self.is_long_enough(board)
             and (not is_kept(board.metric, self.valence) or self.points_at_stake(board.metric) > 0)
+        )
+
+    def is_long_enough(self, board: Leaderboard) -> bool:
+        """Return whether it has the steps or the minutes that a board asks for."""
+        steps, minutes = self.values.get("steps", 0), self.values.get("active_minutes", 0)
+        return steps >= board.min_valid_strides or (
+            board.min_minutes is not None and minutes >= board.min_minutes
         )
 
 
@@ -153,13 +160,6 @@ def needs_one_valence(board: Leaderboard) -> bool:
     """Return whether a board excludes sessions whose feedback type was changed."""
     by_points = {board.metric, board.tie_breaker} & POINT_METRICS
     return board.types != CountedTypes.ALL or bool(by_points)
-
-
-def is_long_enough(board: Leaderboard, values: dict[str, float]) -> bool:
-    """Return whether a session with these metrics has the steps or minutes that a board needs."""
-    if values.get("steps", 0) >= board.min_valid_strides:
-        return True
-    return board.min_minutes is not None and values.get("active_minutes", 0) >= board.min_minutes
 
 
 def is_kept(slug: str, valence: str) -> bool:

@@ -14,12 +14,13 @@ from rehab.boards.ranking.results import Key, Result
 class RankedRow(NamedTuple):
     """A result and its rank.
 
-    ``rank`` follows the board's rule for equal figures; ``shared_rank`` is the one that equals
-    share under the standard rule.
+    It begins with the fields of `Result`. ``rank`` follows the board's rule for equal figures;
+    ``shared_rank`` is the one that equals share under the standard rule.
     """
 
     patient_id: int
     session_id: int
+    valence: str
     figure: int
     points_at_stake: int | None
     key: Key
@@ -110,12 +111,4 @@ class Standings:
             rank = 1 + bisect_left(self._keys, result.key)
         elif self._ties == TieRule.DENSE:
             rank = 1 + bisect_left(self._merits, result.key[0])
-        return RankedRow(
-            result.patient_id,
-            result.session_id,
-            result.figure,
-            result.points_at_stake,
-            result.key,
-            shared,
-            rank,
-        )
+        return RankedRow(*result, shared, rank)

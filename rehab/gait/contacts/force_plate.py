@@ -7,9 +7,9 @@ from collections import deque
 
 import numpy as np
 
+from rehab.gait.contacts.chunk_wait import ChunkWait
 from rehab.gait.contacts.contact import Contact
 from rehab.gait.contacts.drag import REST_N, find_edge
-from rehab.gait.contacts.patience import Patience
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, find_finite_maximum, find_last
@@ -88,15 +88,15 @@ class ContactFinder:
         """The force above which a contact is certain [N]."""
         return self._zero.offset_n + self._contact_n
 
-    def find_patience(self, stop: int) -> Patience:
+    def find_wait(self, stop: int) -> ChunkWait:
         """Return for which force the samples from ``stop`` on may wait for others."""
         contact, certain_n = self.current, self.certain_n
         if contact is None:
-            return Patience(most_n=certain_n, young=self._shortest)
+            return ChunkWait(most_n=certain_n, young=self._shortest)
         young = contact.begin_index + self._shortest - stop
         low = self._dragged if self._low_index is None else self._look_index - stop
         free_n = self.offset_n + self._release_n + REST_N
-        return Patience(least_n=certain_n, young=young, low=low, free_n=free_n)
+        return ChunkWait(least_n=certain_n, young=young, low=low, free_n=free_n)
 
     def advance(self, start: int, stop: int) -> list[Contact]:
         """Process new samples ``start:stop`` and return the steps that ended in them."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rehab.gait.offline import make_detector
 from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
-from rehab.gait.online import StrideDetector
 from rehab.gait.selfcheck.cures import CURES
 from rehab.gait.selfcheck.lag import find_deceleration_peak
 from rehab.gait.signals.filters import Floats
@@ -19,7 +19,7 @@ from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
 from rehab.gait.stances.lag_watch import BRAKING_S
 from rehab.gait.strides import Stride
-from rehab.gait.two_legs import SUPPORTED_BELOW, TwoLegDetector
+from rehab.gait.two_legs import SUPPORTED_BELOW
 
 OFTEN = 0.2  # of the strides; a fault of fewer is the walker's, not the set-up's
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
@@ -105,13 +105,7 @@ def check_signals(
     time = np.asarray(t_s, dtype=np.float64)
     legs = {"left": left, "right": right}
     given = {side: LegSamples(*leg) for side, leg in legs.items() if leg is not None}
-    if len(given) == 2:
-        both = TwoLegDetector(rate_hz, mass_kg)
-        strides = both.feed(time, given["left"], given["right"])
-    else:
-        strides = []
-        for side, leg in given.items():
-            strides += StrideDetector(rate_hz, mass_kg, side=side).feed(time, *leg)
+    strides = make_detector(given, rate_hz, mass_kg).feed_legs(time, given) if given else []
     findings = _check_rate(time, rate_hz)
     decelerations: dict[str, float | None] = {}
     for side, leg in given.items():

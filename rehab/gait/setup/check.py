@@ -9,7 +9,7 @@ from statistics import median
 
 import numpy as np
 
-from rehab.gait.offline import measure_both_legs, measure_strides
+from rehab.gait.offline import measure_strides
 from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
@@ -18,8 +18,8 @@ from rehab.gait.setup.proposal import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
+from rehab.gait.stances.gaps import LATE_S
 from rehab.gait.stances.lag_watch import find_moment_lag
-from rehab.gait.stances.timing import LATE_S
 from rehab.gait.strides import GaitInputError, Stride
 
 # Moment and force fall together within 8 ms (five people: ``lag_watch``; simulated: -11 to -3).
@@ -159,18 +159,7 @@ def _make_map(proposal: Proposal) -> ColumnMap:
 
 
 def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:
-    if len(legs) == 2:
-        return measure_both_legs(
-            time_s,
-            legs["left"],
-            legs["right"],
-            rate_hz=proposal.rate_hz,
-            mass_kg=proposal.mass_kg,
-        )
-    ((side, leg),) = legs.items()
-    return measure_strides(
-        time_s, *leg, rate_hz=proposal.rate_hz, mass_kg=proposal.mass_kg, side=side
-    )
+    return measure_strides(time_s, legs, rate_hz=proposal.rate_hz, mass_kg=proposal.mass_kg)
 
 
 def _find_timing(

@@ -23,6 +23,7 @@ from rehab.gait.stances.continuity import (
     check_steps,
     read_moving,
 )
+from rehab.gait.stances.gaps import HARMFUL_FROM, ClockJudge
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
 from rehab.gait.stances.lag_watch import (
     AROUND_S,
@@ -47,7 +48,6 @@ from rehab.gait.stances.resampling import (
     bridge_gaps,
     decimate,
 )
-from rehab.gait.stances.timing import HARMFUL_FROM, ClockJudge
 from rehab.gait.stances.uncertainty import Uncertainty
 from rehab.gait.strides import Flag, RejectionReason
 
@@ -98,7 +98,7 @@ class StanceAnalyzer:
         The samples with their nominal rate.
     mass_kg, weight_n
         Body mass, and weight [N].
-    cutoff_hz, is_velocity
+    cutoff_hz
         As in ``StrideDetector``.
     """
 
@@ -109,17 +109,15 @@ class StanceAnalyzer:
         mass_kg: float,
         weight_n: float,
         cutoff_hz: float,
-        is_velocity: bool,
     ) -> None:
         self._buffer = buffer
         self._rate_hz = rate_hz
         self._mass_kg = mass_kg
         self._weight_n = weight_n
-        self._is_velocity = is_velocity
         self._decimation = max(1, int(rate_hz // DECIMATED_HZ))
         self._even_hz = rate_hz / self._decimation
-        self._analyzer = PushOffAnalyzer(self._even_hz, mass_kg, cutoff_hz, is_velocity)
-        self._uncertainty = Uncertainty(self._even_hz, cutoff_hz, is_velocity)
+        self._analyzer = PushOffAnalyzer(self._even_hz, mass_kg, cutoff_hz)
+        self._uncertainty = Uncertainty(self._even_hz, cutoff_hz)
         self._forward_filter = ZeroPhaseFilter(FORWARD_HZ, self._even_hz)
         self._resampler = Resampler(self._even_hz, LONGEST_S)
         self._before = int(BEFORE_S * rate_hz)
@@ -146,12 +144,9 @@ class StanceAnalyzer:
         clock = self._clock.judge(window, late_s, before, critical)
         reasons += clock.reasons
         moving = read_moving(window)
-        reasons += check_samples(
-            moving, before, clock, self._rate_hz, self._mass_kg, self._is_velocity
-        )
-        if not self._is_velocity:
-            late = moving.steps[:, critical : before + end - begin]
-            reasons += check_fills(late, self._rate_hz)
+        reasons += check_samples(moving, before, clock, self._rate_hz, self._mass_kg)
+        late = moving.steps[:, critical : before + end - begin]
+        reasons += check_fills(late, self._rate_hz)
         if end_s - begin_s < STANCE_MIN_S:
             reasons.append(RejectionReason.SHORT_STANCE)
         elif end_s - begin_s > STANCE_MAX_S:
@@ -203,7 +198,7 @@ class StanceAnalyzer:
         flags: list[Flag],
     ) -> None:
         """Append what a push-off is like."""
-        reasons += check_steps(stance, push_off, gap_s, self._is_velocity)
+        reasons += check_steps(stance, push_off, gap_s)
         half = stance.index(0.5)
         force_n = stance.signals[0, half : stance.end + 1] - contact.offset_n
         moment_nm = stance.signals[1, half : stance.end + 1]
@@ -212,8 +207,8 @@ class StanceAnalyzer:
         reasons += self._check_lags(force_n[late:], moment_nm[late:])
         if self._angle_lag.beyond_s:
             flags.append(Flag.UNUSUAL_TIMING)
-        reasons += check_push_off(push_off, stance, self._is_velocity)
-        if not self._is_velocity and has_clonus(push_off, stance):
+        reasons += check_push_off(push_off, stance)
+        if has_clonus(push_off, stance):
             flags.append(Flag.CLONUS)
 
     def _watch_angle(self, sure: tuple[int, float] | None, end: int) -> None:
@@ -222,7 +217,7 @@ class StanceAnalyzer:
         At its own end that was not known yet.
         """
         last, self._last_end = self._last_end, sure
-        if last is None or self._is_velocity:
+        if last is None:
             return
         around = int((AROUND_S + 0.1) * self._rate_hz)
         first, stop = last[0] - around, min(last[0] + around, end)

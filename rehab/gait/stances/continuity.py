@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
 from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT
+from rehab.gait.stances.gaps import GAP_S, StanceClock
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
-from rehab.gait.stances.timing import GAP_S, StanceClock
 from rehab.gait.strides import RejectionReason
 
 RATE_TOLERANCE = 0.2
@@ -30,7 +30,6 @@ STRAIGHT_S = 0.06
 STRAIGHT_TO = np.array([[4.0], [0.02]])
 MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
 ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
-VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
 
 # Spikes and steps are looked for h = 10 ms apart: in the angle by its fourth difference, to which a
 # push-off adds little however fast it is, a spike six and a step three times its size; in the
@@ -84,7 +83,6 @@ def check_samples(
     clock: StanceClock,
     rate_hz: float,
     mass_kg: float,
-    is_velocity: bool,
 ) -> list[RejectionReason]:
     """Return what is wrong with the samples of a stance, before anything is measured from them.
 
@@ -98,8 +96,6 @@ def check_samples(
         The stance's clock.
     rate_hz, mass_kg
         Nominal rate, and body mass.
-    is_velocity
-        Whether the angle is a velocity [rad/s].
     """
     reasons = []
     count = len(clock.kinetics_s) - stance
@@ -108,13 +104,7 @@ def check_samples(
         reasons.append(RejectionReason.RATE)
     for row, frozen_s, scale, (at_once, by_time), reason in (
         (0, MOMENT_FROZEN_S, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
-        (
-            1,
-            ANGLE_FROZEN_S,
-            1.0,
-            VELOCITY_JUMP if is_velocity else ANGLE_JUMP,
-            RejectionReason.ANGLE_LOST,
-        ),
+        (1, ANGLE_FROZEN_S, 1.0, ANGLE_JUMP, RejectionReason.ANGLE_LOST),
     ):
         values, moved = moving.values[row, stance:], moving.steps[row, stance:]
         if not moving.jumps[row] <= scale * (at_once + by_time / rate_hz):
@@ -172,9 +162,7 @@ def _find_longest_run(found: NDArray[np.bool_]) -> int:
     return int(np.diff(others).max()) - 1
 
 
-def check_steps(
-    stance: ResampledStance, push_off: PushOff, gap_s: float, is_velocity: bool
-) -> list[RejectionReason]:
+def check_steps(stance: ResampledStance, push_off: PushOff, gap_s: float) -> list[RejectionReason]:
     """Return which channels of a stance have a spike or a step where it changes push-off.
 
     Parameters
@@ -185,8 +173,6 @@ def check_steps(
         What was measured of the stance.
     gap_s
         Longest time between two samples: over it, a straight line stands for the walker's curve.
-    is_velocity
-        Whether the angle is a velocity [rad/s]; it is not checked then.
     """
     apart = max(1, round(APART_S * stance.rate_hz))
     apart_s = apart / stance.rate_hz
@@ -203,13 +189,12 @@ def check_steps(
     steps = np.abs(rough[apart:] - rough[:-apart])
     if _is_discontinuous(steps, moment, walking, *MOMENT_STEP):
         reasons.append(RejectionReason.MOMENT_LOST)
-    if not is_velocity:
-        bends = angle[2 * apart :] - 2 * angle[apart:-apart]
-        bends += angle[: -2 * apart]
-        fourth = bends[2 * apart :] - 2 * bends[apart:-apart]
-        fourth += bends[: -2 * apart]
-        if _is_discontinuous(np.abs(fourth), angle, walking, *ANGLE_FOURTH):
-            reasons.append(RejectionReason.ANGLE_LOST)
+    bends = angle[2 * apart :] - 2 * angle[apart:-apart]
+    bends += angle[: -2 * apart]
+    fourth = bends[2 * apart :] - 2 * bends[apart:-apart]
+    fourth += bends[: -2 * apart]
+    if _is_discontinuous(np.abs(fourth), angle, walking, *ANGLE_FOURTH):
+        reasons.append(RejectionReason.ANGLE_LOST)
     return reasons
 
 

@@ -67,18 +67,6 @@ def compute_ankle_moment(
     return moment
 
 
-def compute_ankle_velocity(foot_rad_s: ArrayLike, shank_rad_s: ArrayLike) -> Floats:
-    """Return the ankle's angular velocity [rad/s] from gyroscopes on foot and shank.
-
-    Parameters
-    ----------
-    foot_rad_s, shank_rad_s
-        Shape (n,), both about the axis to the walker's left: positive where the toes go down.
-    """
-    foot: Floats = np.asarray(foot_rad_s, dtype=np.float64)
-    return foot - np.asarray(shank_rad_s, dtype=np.float64)
-
-
 @dataclass(slots=True)
 class PushOff:
     """Ankle moment, angle, velocity and power of a stance, filtered, and the peak of power.
@@ -86,8 +74,7 @@ class PushOff:
     Attributes
     ----------
     moment_nm_kg, angle_rad, velocity_rad_s, power_w_kg
-        Shape (n,), as the resampled stance. ``angle_rad`` is the velocity where velocities are
-        sent.
+        Shape (n,), as the resampled stance.
     peak
         The sample of highest power.
     a2_w_kg, a2_time_s
@@ -133,20 +120,11 @@ class PushOffAnalyzer:
         Body mass of the walker.
     cutoff_hz
         Cut-off of the zero-phase low-pass on moment and angle.
-    is_velocity
-        Whether velocities [rad/s] are sent instead of angles [rad].
     """
 
-    def __init__(
-        self,
-        rate_hz: float,
-        mass_kg: float,
-        cutoff_hz: float = CUTOFF_HZ,
-        is_velocity: bool = False,
-    ) -> None:
+    def __init__(self, rate_hz: float, mass_kg: float, cutoff_hz: float = CUTOFF_HZ) -> None:
         self._rate_hz = rate_hz
         self._mass_kg = mass_kg
-        self._is_velocity = is_velocity
         self._filter = ZeroPhaseFilter(cutoff_hz, rate_hz)
         self._beyond_s = np.arange(1, round(BEYOND_S * rate_hz) + 1) / rate_hz
         # At most as many samples beyond each end are looked at by the filter.
@@ -163,7 +141,7 @@ class PushOffAnalyzer:
             return None
         last_s = stance.first_s + (count - 1) / self._rate_hz
         moment, angle = self._smooth(signals, last_s - stance.end_s)
-        velocity = angle if self._is_velocity else differentiate(angle, self._rate_hz)
+        velocity = differentiate(angle, self._rate_hz)
         moment /= self._mass_kg
         power = moment * velocity
         peak = begin + int(power[begin : end + 1].argmax())
@@ -198,20 +176,17 @@ class PushOffAnalyzer:
         left = count - min(round(known_s * self._rate_hz), count // 2)
         braking = self._find_velocity(angle[:left]) / STOP_S
         # The slope is that of half its stretch ago, for as much of it as the ankle brakes already.
-        late_s = 0.0 if self._is_velocity else min(max(known_s, 0.0), SLOPE_S) / 2
+        late_s = min(max(known_s, 0.0), SLOPE_S) / 2
         after = wide[1, end : end + n]
         np.multiply(self._beyond_s[:n], -braking, out=after)
         after += self._find_velocity(angle) - braking * late_s
         np.maximum(after, -TURN_S * braking, out=after)
-        if not self._is_velocity:
-            after /= self._rate_hz
-            after[0] += angle.item(-1)
-            np.add.accumulate(after, out=after)
+        after /= self._rate_hz
+        after[0] += angle.item(-1)
+        np.add.accumulate(after, out=after)
         wide[1, end + n :] = after.item(-1)
         return self._filter.smooth_wide(wide)
 
     def _find_velocity(self, motion: Floats) -> float:
         """Return the ankle's velocity at the end of a stretch of motion, 0 if it dorsiflexes."""
-        if self._is_velocity:
-            return max(0.0, motion.item(-1))
         return max(0.0, float(motion[-len(self._slope) :].dot(self._slope)))

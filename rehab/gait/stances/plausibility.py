@@ -155,20 +155,8 @@ def _find_lever(force_n: Floats, moment_nm: Floats, at: int) -> float:
     return moment / force
 
 
-def check_push_off(
-    push_off: PushOff, stance: ResampledStance, is_velocity: bool
-) -> list[RejectionReason]:
-    """Return what is wrong with the push-off of a stance.
-
-    Parameters
-    ----------
-    push_off
-        What was measured of the stance.
-    stance
-        The stance itself.
-    is_velocity
-        Whether its angle is a velocity [rad/s].
-    """
+def check_push_off(push_off: PushOff, stance: ResampledStance) -> list[RejectionReason]:
+    """Return what is wrong with the push-off of a stance."""
     reasons = []
     begin, end = stance.begin, stance.end
     highest, lowest = (
@@ -188,7 +176,7 @@ def check_push_off(
             largest > MOMENT_DRIFT and find_upper_median(swing) > MOMENT_DRIFT
         ):
             reasons.append(RejectionReason.MOMENT_IN_SWING)
-    reasons += _check_motion(push_off, stance, is_velocity)
+    reasons += _check_motion(push_off, stance)
     peak_w_kg = push_off.a2_w_kg
     share = (push_off.a2_time_s - stance.begin_s) / (stance.end_s - stance.begin_s)
     if peak_w_kg <= 0 or share < PEAK_FROM or push_off.peak >= end:
@@ -200,15 +188,11 @@ def check_push_off(
     return reasons
 
 
-def _check_motion(
-    push_off: PushOff, stance: ResampledStance, is_velocity: bool
-) -> list[RejectionReason]:
+def _check_motion(push_off: PushOff, stance: ResampledStance) -> list[RejectionReason]:
     begin, end = stance.begin, stance.end
     reasons = []
     angle = push_off.angle_rad[begin : end + 1]
-    highest, lowest = find_maximum(angle), find_minimum(angle)
-    # Of velocities, the fastest: a swing of 0.1 s.
-    moved = max(highest, -lowest) / 10 if is_velocity else highest - lowest
+    moved = find_maximum(angle) - find_minimum(angle)
     if moved < ANGLE_RANGE_MIN:
         reasons.append(RejectionReason.ANGLE_FLAT)
     elif moved > ANGLE_RANGE_MAX:

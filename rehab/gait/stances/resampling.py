@@ -9,7 +9,7 @@ import numpy as np
 
 from rehab.gait.signals.filters import Floats, find_shares
 from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT, TIME
-from rehab.gait.stances.timing import StanceClock
+from rehab.gait.stances.gaps import StanceClock
 
 MIN_STANCE_SAMPLES = 8  # 0.16 s at 50 Hz
 

@@ -27,16 +27,16 @@ class Uncertainty:
 
     Parameters
     ----------
-    rate_hz, cutoff_hz, is_velocity
+    rate_hz, cutoff_hz
         As in ``PushOffAnalyzer``.
     """
 
-    def __init__(self, rate_hz: float, cutoff_hz: float, is_velocity: bool) -> None:
+    def __init__(self, rate_hz: float, cutoff_hz: float) -> None:
         self._rate_hz = rate_hz
         impulse = np.zeros((1, 2 * (ZeroPhaseFilter(cutoff_hz, rate_hz).reach + 4) + 1))
         impulse[0, impulse.shape[1] // 2] = 1.0
         response = ZeroPhaseFilter(cutoff_hz, rate_hz).smooth_extended(impulse, 0)[0]
-        slope = response if is_velocity else differentiate(response, rate_hz)
+        slope = differentiate(response, rate_hz)
         self._moment_gain = math.sqrt(float(response @ response))
         self._velocity_gain = math.sqrt(float(slope @ slope))
 

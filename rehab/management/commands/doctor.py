@@ -19,11 +19,11 @@ from django.contrib.staticfiles import finders
 from django.core.checks import run_checks
 from django.core.management import BaseCommand
 from django.db import DatabaseError, connection
-from django.db.migrations.executor import MigrationExecutor
 from django.utils import timezone
 
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
+from rehab.people.sign_in.first_start import count_pending_migrations
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
@@ -92,8 +92,7 @@ def examine_settings() -> Iterator[Diagnosis]:
 
 def examine_database() -> Iterator[Diagnosis]:
     """Diagnose database and disk."""
-    executor = MigrationExecutor(connection)
-    pending = len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
+    pending = count_pending_migrations()
     kind = f"{connection.vendor}, {connection.settings_dict['NAME']}"
     if pending:
         yield Diagnosis(

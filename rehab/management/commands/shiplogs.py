@@ -1,4 +1,4 @@
-"""`manage.py shiplogs`: append what was sealed of the logs to a file that is kept elsewhere."""
+"""`manage.py shiplogs`: append what was sealed of the logs to a file stored elsewhere."""
 
 from __future__ import annotations
 

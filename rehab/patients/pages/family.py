@@ -22,11 +22,10 @@ from rehab.patients.family import (
     find_link,
     give_link,
     note_opening,
-    why_not,
+    refusal_reason,
 )
-from rehab.patients.pages.records import get_patient
 from rehab.patients.visits import next_visit
-from rehab.people.access import for_roles, public, user_of
+from rehab.people.access import for_roles, get_patient, public, user_of
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.rate_limits import TokenBuckets
@@ -110,7 +109,7 @@ def _render_links(request: HttpRequest, patient: Patient, **given: str) -> HttpR
     context = {
         "patient": patient,
         "links": [(link, link.is_over(now)) for link in rows.select_related("created_by")[:20]],
-        "why_not": why_not(patient),
+        "refusal_reason": refusal_reason(patient),
         "weeks": WEEKS,
         **given,
     }

@@ -6,7 +6,7 @@ from typing import Any
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import get_object_or_404, redirect, render
+from django.shortcuts import redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
@@ -14,18 +14,12 @@ from django.views.decorators.http import require_POST, require_safe
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase
 from rehab.patients.forms import EndProgramForm, ErasureForm
-from rehab.people.access import for_roles, user_of
+from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.consent.services import active_consents
-from rehab.people.models import EndReason, ErasureReason, Patient, User
+from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.sessions.models import TrainingSession
-
-
-def get_patient(user: User, patient_id: int) -> Patient:
-    """Return a patient that a user may see. Raises Http404 for any other."""
-    patients = Patient.objects.visible_to(user).select_related("clinic")
-    return get_object_or_404(patients, pk=patient_id)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -66,7 +60,7 @@ def end_patient_program(request: HttpRequest, patient_id: int) -> HttpResponse:
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
-    message = _("%(patient)s's program has ended. Give the summary along.")
+    message = _("%(patient)s's program has ended. Hand over the summary.")
     messages.success(request, message % {"patient": patient.nickname})
     return redirect("patient", patient_id=patient.pk)
 

@@ -6,7 +6,7 @@ from datetime import date, time, timedelta
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import get_object_or_404, redirect
+from django.shortcuts import redirect
 from django.utils import timezone
 from django.utils.dateformat import format as format_date
 from django.utils.dateparse import parse_date, parse_time
@@ -14,10 +14,9 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
 from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, plan_visit, suggested_time
-from rehab.people.access import for_roles, user_of
-from rehab.people.models import Patient
+from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.roles import Role
-from rehab.people.web.row_keys import read_key
+from rehab.people.row_values import read_key
 from rehab.sessions.formatting import clinic_time
 
 MAX_AHEAD = timedelta(days=366)
@@ -32,9 +31,7 @@ class InvalidVisitDay(ValueError):
 def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Plan a visit (``in``: days from today, or ``day`` and ``at``) or remove one (``remove``)."""
     user = user_of(request)
-    patient = get_object_or_404(
-        Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
-    )
+    patient = get_patient(user, patient_id)
     visits = Visit.objects.visible_to(user).filter(patient=patient)
     given = request.POST
     if removed := read_key(given.get("remove", "")):

@@ -20,11 +20,10 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import user_of
 from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import User
-from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.people.sign_in import attempts, resets, step_up
+from rehab.people.sign_in import attempts, resets
 from rehab.people.sign_in.factors import factors
-from rehab.people.web.admin_base import ScopedOptions, TrackedAdmin, rights_for
+from rehab.people.web.admin_base import ScopedOptions, TrackedAdmin, asks_who_it_is, rights_for
 
 
 class NewAccountForm(AdminUserCreationForm):
@@ -67,8 +66,7 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         """End the lockouts of the chosen accounts."""
         for account in accounts:
             with transaction.atomic():
-                by, address = user_of(request), client_address(request)
-                record_security_change(Act.UNLOCK, by, account, address, timezone.now())
+                record_security_change(Act.UNLOCK, request, account, timezone.now())
                 attempts.forget_all(account)
         message = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, message % {"count": accounts.count()})
@@ -76,20 +74,16 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
     @admin.action(
         description=_("Remove second factors (lost phone or key)"), permissions=["change"]
     )
-    def remove_second_factors(
-        self, request: HttpRequest, accounts: QuerySet[User]
-    ) -> HttpResponse | None:
+    @asks_who_it_is
+    def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Remove all second factors of the chosen accounts, but not one's own."""
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
         removed = 0
         for account in accounts:
             if not self._may_reset(request, account):
                 continue
             removed += 1
             with transaction.atomic():
-                by, address = user_of(request), client_address(request)
-                record_security_change(Act.FACTORS, by, account, address, timezone.now())
+                record_security_change(Act.FACTORS, request, account, timezone.now())
                 factors.remove_second_factors(account)
         message = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "
@@ -97,8 +91,8 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         )
         if removed:
             messages.warning(request, message % {"count": removed})
-        return None
 
+    @asks_who_it_is
     def changeform_view(
         self,
         request: HttpRequest,
@@ -107,8 +101,6 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         extra_context: Any = None,
     ) -> HttpResponse:
         """Show an account or the form of a new one, which could let a stranger stay in: ask."""
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
         return super().changeform_view(request, object_id, form_url, extra_context)
 
     def user_change_password(
@@ -121,18 +113,22 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         account = self.get_object(request, unquote(id))
         if account is not None and account.pk == user_of(request).pk:
             return redirect("own-password")
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
+        return self._change_password_of_other(request, id, account, form_url)
+
+    @asks_who_it_is
+    def _change_password_of_other(
+        self, request: HttpRequest, key: str, account: Any, form_url: str
+    ) -> HttpResponse:
         sent = request.method == "POST"
         if sent and account is not None and not self._may_reset(request, account):
             return redirect("admin:rehab_user_change", account.pk)
-        return super().user_change_password(request, id, form_url)
+        return super().user_change_password(request, key, form_url)
 
     def _may_reset(self, request: HttpRequest, account: User) -> bool:
         """Return whether this person may reset how an account signs in; where not, say why."""
         user = user_of(request)
         if account.pk == user.pk:
-            messages.error(request, gettext("Your own you change on the page Your account."))
+            messages.error(request, gettext("Change your own on the page Your account."))
             return False
         if resets.may_reset(user, account, timezone.now()):
             return True

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 
 from django.db import Error, IntegrityError, models, transaction
 from django.db.models import F, Q, QuerySet
+from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
@@ -24,6 +25,7 @@ from rehab.people.append_only import Allowed
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.sealing import ERASED, SealableModel, has_seal, is_cut
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.networks import client_address
 from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.scope import Scope
 
@@ -67,7 +69,7 @@ class Act(models.TextChoices):
     ROBOT_TRIAL = "robot_trial", _("Tried a gesture on the robot")
 
 
-# What an account's own page of sign-ins tells.
+# What an account's own page of sign-ins lists.
 SIGN_IN_ACTS = (
     *(Act.SIGN_IN, Act.SIGN_IN_FAILED, Act.LOCK_OUT, Act.SIGN_INS_ENDED, Act.PASSWORD),
     *(Act.FACTOR_ADDED, Act.FACTOR_REMOVED, Act.RECOVERY_CODES, Act.TOKEN_USE, Act.REFUSED),
@@ -206,10 +208,10 @@ def record(act: Act, actor: Any, **details: Any) -> None:
     build_entry(act, actor, **details).save()
 
 
-def record_security_change(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
+def record_security_change(act: Act, request: HttpRequest, row: Any, now: datetime) -> None:
     """Add an entry about a change to who has access: of an account, a device or an API token."""
-    about = f"{row._meta.verbose_name}: {row}"
-    record(act, actor, clinic_id=clinic_id_of(row), about=about, address=address, now=now)
+    about, address = f"{row._meta.verbose_name}: {row}", client_address(request)
+    record(act, request.user, clinic_id=clinic_id_of(row), about=about, address=address, now=now)
 
 
 def record_after_the_fact(entries: list[AuditEntry]) -> None:

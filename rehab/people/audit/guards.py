@@ -1,4 +1,4 @@
-"""Triggers that keep rows append-only in the database itself, whoever asks it.
+"""Triggers that make rows append-only in the database itself, for every client.
 
 Which models, and which few changes are let through, stands in the models
 (`rehab.people.append_only`). The triggers are installed after each migration, since SQLite drops a

@@ -105,7 +105,7 @@ class HistoryEntry(SealableModel):
     kind = models.CharField(_("kind"), max_length=8, choices=Kind.choices)
     changes = models.JSONField(_("values"), default=dict, encoder=DjangoJSONEncoder)
     by = models.ForeignKey(
-        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+        User, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("by")
     )
     through = models.CharField(
         _("by which program or device"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any, ClassVar
 
@@ -34,7 +33,7 @@ class SealableModel(AppendOnlyModel):
     """A row of a log, with a digest of its values.
 
     The digest outlives the values: an erasure empties these and removes the salt, without which
-    nobody can try out what they were. `seals` chains the digests.
+    no one can guess what they were. `seals` chains the digests.
     """
 
     sealed_fields: ClassVar[tuple[str, ...]]
@@ -58,16 +57,11 @@ class SealableModel(AppendOnlyModel):
         self.digest = self.compute_digest()
 
     def compute_digest(self) -> str:
-        """Return the digest of the values as they are."""
-        return digest_of(self, self.sealed_fields)
-
-
-def digest_of(row: Any, names: Iterable[str]) -> str:
-    """Return the digest of a row's salt and of these of its values."""
-    fields = [row._meta.get_field(name) for name in names]
-    values = {field.name: _plain(getattr(row, field.attname)) for field in fields}
-    text = json.dumps(values, sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(f"{row.salt}\n{text}".encode()).hexdigest()
+        """Return the digest of the salt and the sealed values as they are."""
+        fields: list[Any] = [self._meta.get_field(name) for name in self.sealed_fields]
+        values = {field.name: _plain(getattr(self, field.attname)) for field in fields}
+        text = json.dumps(values, sort_keys=True, ensure_ascii=False)
+        return hashlib.sha256(f"{self.salt}\n{text}".encode()).hexdigest()
 
 
 def _plain(value: Any) -> Any:

@@ -1,7 +1,7 @@
 """Records sign-ins in the audit log: who came in, who failed, and what changed about coming in.
 
-Django and our models tell it by signals, so that no way in can forget to. A failure
-for a name that no account has goes to the server's log, without the name: it may be a password.
+Signals of Django and of our models report it, so that no way in is forgotten. A failure for a name
+that no account has goes to the server's log, without the name: it may be a password.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from django.core.exceptions import NON_FIELD_ERRORS, ValidationError
@@ -20,7 +21,14 @@ from rehab.people.models.choices import (
     Severity,
 )
 from rehab.people.models.clinics import Clinic, language_choices
-from rehab.people.policy import Covariate, erased, erased_by, personal_fields, retained
+from rehab.people.policy import (
+    Covariate,
+    FieldPolicy,
+    erased,
+    erased_by,
+    personal_fields,
+    retained,
+)
 from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
@@ -34,6 +42,17 @@ def generate_pseudonym() -> str:
 def rename_erased(patient: Patient, _pseudonym: str) -> None:
     """Replace an erased patient's pseudonym and code by one new pseudonym."""
     patient.pseudonym = patient.code = generate_pseudonym()
+
+
+def _detail(policy: Callable[..., FieldPolicy], *what: Any, **where: Any) -> FieldPolicy:
+    """Return the policy of a field that people enter, and may see and look up."""
+    usual = {"shown": True, "research": False, "history": True, "is_detail": True}
+    return policy(*what, **usual | where)
+
+
+def _setting(reason: str, **where: Any) -> FieldPolicy:
+    """Return the policy of a field that stays, is shown, and whose changes are recorded."""
+    return retained(reason, **{"shown": True, "research": False, "history": True} | where)
 
 
 class PatientErased(ValidationError):
@@ -139,30 +158,22 @@ class Patient(ClinicModel):
 
     personal = personal_fields(
         {
-            "nickname": erased(
-                _("Erased"), shown=True, research=False, history=True, is_detail=True
-            ),
-            "code": erased_by(
-                rename_erased, shown=True, research=False, history=True, is_detail=True
-            ),
+            "nickname": _detail(erased, _("Erased")),
+            "code": _detail(erased_by, rename_erased),
             "pseudonym": erased_by(rename_erased, shown=True, research=True, history=True),
-            "clinic": retained(
-                "tells where, and nothing of whom", shown=True, research=False, history=True
-            ),
-            "body_mass_kg": erased(shown=True, research=False, history=True, is_detail=True),
-            "birth_year": erased(
-                shown=True,
+            "clinic": _setting("tells where, and nothing of whom"),
+            "body_mass_kg": _detail(erased),
+            "birth_year": _detail(
+                erased,
                 research=Covariate(
                     "age_band",
                     "years",
                     "Age when it began, by calendar years, in bands of ten.",
                     value=age_band,
                 ),
-                history=True,
-                is_detail=True,
             ),
-            "stroke_month": erased(
-                shown=True,
+            "stroke_month": _detail(
+                erased,
                 research=Covariate(
                     "months_since_stroke",
                     "months",
@@ -170,59 +181,31 @@ class Patient(ClinicModel):
                     "integer",
                     value=months_since,
                 ),
-                history=True,
-                is_detail=True,
             ),
-            "severity": erased(
+            "severity": _detail(
+                erased,
                 "",
-                shown=True,
                 research=Covariate(
                     "severity", "", "mild, moderate or severe, as the clinic judges it now."
                 ),
-                history=True,
-                is_detail=True,
             ),
-            "paretic_side": retained(
+            "paretic_side": _detail(
+                retained,
                 "half of all people have the same; studies adjust by it",
-                shown=True,
                 research=Covariate("paretic_side", "", "The leg that the stroke weakened."),
-                history=True,
-                is_detail=True,
             ),
-            "language screen_side screen_text screen_still screen_sounds": retained(
-                "a setting that many people share", shown=True, research=False, history=True
+            "language screen_side screen_text screen_still screen_sounds": _setting(
+                "a setting that many people share"
             ),
-            "boards": retained(
-                "erasure withdraws the consent first",
-                shown="leaderboards",
-                research=False,
-                history=True,
-            ),
+            "boards": _setting("erasure withdraws the consent first", shown="leaderboards"),
             "alias": erased(shown="animal_name", research=False, history=True),
-            "blinded": retained(
-                "the study's, and many people's",
-                shown="in_a_blinded_study",
-                research=False,
-                history=True,
-            ),
-            "simulated": retained("no person", shown=True, research=True, history=True),
+            "blinded": _setting("the study's, and many people's", shown="in_a_blinded_study"),
+            "simulated": _setting("no person", research=True),
             "legacy_id": erased(shown="participant_of_the_original", research=False, history=True),
-            "created_at": retained("the sessions' days tell as much", shown=True, research=False),
-            "ended_at": retained(
-                "what was done, and when",
-                shown="program_ended_at",
-                research=False,
-                history=True,
-            ),
-            "end_reason": retained(
-                "one of five words",
-                shown="program_end_reason",
-                research=False,
-                history=True,
-            ),
-            "erased_at erasure_reason": retained(
-                "what was done, and when", shown=True, research=False, history=True
-            ),
+            "created_at": _setting("the sessions' days tell as much", history=False),
+            "ended_at": _setting("what was done, and when", shown="program_ended_at"),
+            "end_reason": _setting("one of five words", shown="program_end_reason"),
+            "erased_at erasure_reason": _setting("what was done, and when"),
         }
     )
 

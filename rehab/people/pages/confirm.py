@@ -20,7 +20,7 @@ from rehab.people.sign_in.forms import ProofForm
 def ask_again(request: HttpRequest, title: str, words: str, act: str) -> HttpResponse | None:
     """Return the page that asks for the password or a factor; None once that was shown.
 
-    ``words`` tell what is about to be done, ``act`` is the button's text.
+    ``words`` say what is about to be done, ``act`` is the button's text.
     """
     user = user_of(request)
     form = ProofForm(request, user, request.POST if request.method == "POST" else None)

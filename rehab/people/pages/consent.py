@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import get_object_or_404, redirect, render
+from django.shortcuts import redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
-from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.access import clinic_of, for_roles, get_patient, user_of
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (
     active_consents,
@@ -45,36 +45,17 @@ LEVELS = {
 }
 
 
-@dataclass(frozen=True)
-class PurposeChoice:
-    """A purpose on the page, with its options."""
-
-    purpose: Purpose
-    meaning: str
-    consent: Consent | None
-    is_outdated: bool  # given to an older text
-    options: list[tuple[str, str, bool]]  # value, label, whether it is chosen now
-    is_missing: bool  # without it no session can be set up
-
-
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Show a patient's consents; a POST records the answer to one of them."""
     user = user_of(request)
-    patients = Patient.objects.visible_to(user).select_related("clinic")
-    patient = get_object_or_404(patients, pk=patient_id)
+    patient = get_patient(user, patient_id)
     if request.method == "POST" and patient.erased_at is None:
         purpose, answer = request.POST.get("purpose"), request.POST.get("answer", "")
         if purpose == Purpose.BOARDS and answer in BoardsConsent.values:
             record_boards_consent(patient, BoardsConsent(answer), user, timezone.now())
-        elif purpose in (
-            *offered_purposes(patient.clinic),
-            *active_consents(patient),
-        ) and answer in (
-            "yes",
-            "no",
-        ):
+        elif answer in ("yes", "no") and purpose in _listed_purposes(patient):
             change = record_consent if answer == "yes" else withdraw_consent
             change(patient, Purpose(purpose), user, timezone.now())
         else:
@@ -90,12 +71,14 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     return render(request, "people/consent.html", context)
 
 
-def list_choices(patient: Patient) -> list[PurposeChoice]:
-    """Return the purposes that are offered, or consented to, each with its options."""
+def list_choices(patient: Patient) -> list[dict[str, Any]]:
+    """Return the purposes that are offered, or consented to, each with its options.
+
+    An option is a value, its label, and whether it is chosen now.
+    """
     active, text = active_consents(patient), current_text(patient.clinic)
     choices = []
-    listed = {*offered_purposes(patient.clinic), *map(Purpose, active)}
-    for purpose in (purpose for purpose in Purpose if purpose in listed):
+    for purpose in _listed_purposes(patient):
         consent = active.get(purpose)
         if purpose == Purpose.BOARDS:
             now = patient.boards if consent else BoardsConsent.OWN
@@ -104,14 +87,24 @@ def list_choices(patient: Patient) -> list[PurposeChoice]:
             options = [(level.value, str(LEVELS[level]), level == now) for level in levels]
         else:
             options = [("yes", _("Yes"), consent is not None), ("no", _("No"), consent is None)]
-        is_outdated = consent is not None and consent.text_id != text.pk
-        is_missing = purpose == Purpose.CARE and not is_care_allowed(patient)
         choices.append(
-            PurposeChoice(
-                purpose, str(MEANINGS[purpose]), consent, is_outdated, options, is_missing
-            )
+            {
+                "purpose": purpose,
+                "meaning": MEANINGS[purpose],
+                "consent": consent,
+                "is_outdated": consent is not None and consent.text_id != text.pk,
+                "options": options,
+                # Without it no session can be set up.
+                "is_missing": purpose == Purpose.CARE and not is_care_allowed(patient),
+            }
         )
     return choices
+
+
+def _listed_purposes(patient: Patient) -> list[Purpose]:
+    """Return what the clinic asks for, and what the patient consents to."""
+    listed = {*offered_purposes(patient.clinic), *active_consents(patient)}
+    return [purpose for purpose in Purpose if purpose in listed]
 
 
 @for_roles(Role.LEAD, patients=False)

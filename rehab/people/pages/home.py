@@ -1,12 +1,20 @@
-"""The front page."""
+"""The front page, the guide for therapists, and the catalog of the scripts' translations."""
 
 from django.conf import settings
-from django.http import HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
-from django.views.decorators.http import require_safe
+from django.utils import translation
+from django.views.decorators.cache import cache_control
+from django.views.decorators.http import conditional_page, require_safe
+from django.views.i18n import JavaScriptCatalog
 
-from rehab.people.access import public
+from rehab.people.access import for_roles, public
+from rehab.people.models import LANGUAGES
+from rehab.people.roles import Role
+from rehab.people.web.help_pages import using_guide
 from rehab.training.valences import VALENCES
+
+javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
 
 
 @public
@@ -16,3 +24,25 @@ def home(request: HttpRequest) -> HttpResponse:
     return render(
         request, "people/home.html", {"hosted": settings.HOSTED, "valences": VALENCES.values()}
     )
+
+
+@for_roles(*Role, patients=False)
+@require_safe
+def show_help(request: HttpRequest) -> HttpResponse:
+    """Show docs/using.md."""
+    guide = using_guide()
+    if not guide:
+        raise Http404
+    return render(request, "people/help.html", {"guide": guide})
+
+
+@public
+@require_safe
+@cache_control(public=True, max_age=600)
+@conditional_page
+def show_catalog(request: HttpRequest, language: str) -> HttpResponseBase:
+    """Show the translations of the scripts in a language."""
+    if language not in dict(LANGUAGES):
+        raise Http404
+    with translation.override(language):
+        return javascript_catalog(request)

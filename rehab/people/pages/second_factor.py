@@ -22,10 +22,10 @@ from rehab.people.models import User
 from rehab.people.networks import client_address
 from rehab.people.pages.confirm import ask_again
 from rehab.people.roles import Role
+from rehab.people.row_values import read_key
 from rehab.people.sign_in import flow, step_up
 from rehab.people.sign_in.factors import factors, passkeys, totp
 from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm
-from rehab.people.web.row_keys import read_key
 
 SECRET = "app_secret"  # noqa: S105 (key of the browser session, until the app has shown a code)
 

@@ -18,7 +18,6 @@ from django.conf import settings
 from django.contrib.sessions.backends import db
 from django.contrib.sessions.base_session import AbstractBaseSession
 from django.contrib.sessions.models import Session
-from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.utils import timezone
 
@@ -49,7 +48,7 @@ def expires_at(data: Mapping[str, Any], now: datetime) -> datetime:
 
 
 class SessionStore(db.SessionStore):
-    """Browser sessions in the database, each with its own expiry."""
+    """Browser sessions in the database, each with its own expiry. Nothing uses them async."""
 
     @classmethod
     def get_model_class(cls) -> type[Session]:
@@ -58,55 +57,31 @@ class SessionStore(db.SessionStore):
 
     def create_model_instance(self, data: dict[str, Any]) -> AbstractBaseSession:
         """Return the row to save."""
-        return self._as_stored(super().create_model_instance(data), data)
-
-    async def acreate_model_instance(self, data: dict[str, Any]) -> AbstractBaseSession:
-        """Return the row to save."""
-        return self._as_stored(await super().acreate_model_instance(data), data)
+        row = super().create_model_instance(data)
+        row.session_key = digest_of(row.session_key)
+        row.expire_date = expires_at(data, timezone.now())
+        return row
 
     def load(self) -> dict[str, Any]:
         """Return the session's data; without a stored session none, and forget its key."""
-        return self._data_of(self._stored().first())
-
-    async def aload(self) -> dict[str, Any]:
-        """Return the session's data; without a stored session none, and forget its key."""
-        return self._data_of(await self._stored().afirst())
+        digest = digest_of(self.session_key or "")
+        stored = Session.objects.filter(session_key=digest, expire_date__gt=timezone.now())
+        row = stored.first()
+        if row is None:
+            self._session_key = None  # Django draws a new one when data are stored
+            return {}
+        data: dict[str, Any] = self.decode(row.session_data)
+        return data
 
     def exists(self, session_key: str) -> bool:
         """Return whether there is a session with this key."""
         return super().exists(digest_of(session_key))
-
-    async def aexists(self, session_key: str) -> bool:
-        """Return whether there is a session with this key."""
-        return await super().aexists(digest_of(session_key))
 
     def delete(self, session_key: str | None = None) -> None:
         """Delete the session of a key; without one, this session."""
         key = session_key or self.session_key
         if key is not None:
             super().delete(digest_of(key))
-
-    async def adelete(self, session_key: str | None = None) -> None:
-        """Delete the session of a key; without one, this session."""
-        key = session_key or self.session_key
-        if key is not None:
-            await super().adelete(digest_of(key))
-
-    def _as_stored(self, row: AbstractBaseSession, data: dict[str, Any]) -> AbstractBaseSession:
-        row.session_key = digest_of(row.session_key)
-        row.expire_date = expires_at(data, timezone.now())
-        return row
-
-    def _stored(self) -> QuerySet[Session]:
-        digest = digest_of(self.session_key or "")
-        return Session.objects.filter(session_key=digest, expire_date__gt=timezone.now())
-
-    def _data_of(self, row: Session | None) -> dict[str, Any]:
-        if row is None:
-            self._session_key = None  # Django draws a new one when data are stored
-            return {}
-        data: dict[str, Any] = self.decode(row.session_data)
-        return data
 
 
 def record_activity(request: HttpRequest, now: datetime) -> None:

@@ -18,14 +18,19 @@ FIRST_USERNAME = "pt"
 FIRST_CLINIC = "My clinic"
 
 
+def count_pending_migrations() -> int:
+    """Return how many migrations the database lacks."""
+    executor = MigrationExecutor(connection)
+    return len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
+
+
 def prepare_database() -> None:
     """Apply pending migrations; on a hosted server, refuse to start while some are pending.
 
     Raises CommandError, with the cure, where the database cannot be reached or is not up to date.
     """
     try:
-        executor = MigrationExecutor(connection)
-        pending = executor.migration_plan(executor.loader.graph.leaf_nodes())
+        pending = count_pending_migrations()
     except DatabaseError as problem:
         raise CommandError(
             f"The database cannot be reached: {problem}. Check GARRY_DATABASE_URL."
@@ -34,8 +39,7 @@ def prepare_database() -> None:
         return
     if settings.HOSTED:
         raise CommandError(
-            f"The database lacks {len(pending)} migration(s). Back it up, then run "
-            "`manage.py migrate`."
+            f"The database lacks {pending} migration(s). Back it up, then run `manage.py migrate`."
         )
     call_command("migrate", verbosity=0, interactive=False)
 
@@ -49,7 +53,7 @@ def first_password() -> str | None:
     """Return the first account's generated password; None once it has been changed.
 
     Creates clinic and account where there is no account yet. Until the password is changed it is
-    kept in a file that only the server's user can read.
+    stored in a file that only the server's user can read.
     """
     file: Path = settings.DATA_DIR / "first_password"
     if not User.everywhere.exists():

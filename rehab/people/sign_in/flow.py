@@ -30,7 +30,7 @@ BACKEND = "rehab.people.sign_in.backends.PasswordBackend"
 def begin(request: HttpRequest, user: User, next_url: str, now: datetime) -> bool:
     """Sign in an account that needs its password alone; else wait for its second factor.
 
-    ``next_url`` is kept for `finish`. Returns whether the account is signed in now.
+    ``next_url`` is stored for `finish`. Return whether the account is signed in now.
     """
     if not factors.is_required(user) and not factors.authenticators_of(user).exists():
         finish(request, user, now, second_factor_verified=False)

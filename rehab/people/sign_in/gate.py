@@ -1,7 +1,7 @@
 """The gate before the sign-in: what a flood of attempts may cost the server.
 
 It stands before Django, so that an attempt which is refused costs next to nothing: training
-sessions run in the same process. It keeps its counts in memory; those that lock accounts are in the
+sessions run in the same process. Its counts are in memory; those that lock accounts are in the
 database (`attempts`).
 """
 

@@ -1,4 +1,4 @@
-"""Lockout after too many failed attempts: what is counted together, and what people are told.
+"""Lockout after too many failed attempts: what is counted together, and which message people get.
 
 Passwords are counted by name and address, so that nobody can lock another person out from
 elsewhere; by address, whatever the name; and by name, but not where the account has signed in

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, TypeVar
 
 from django.core.exceptions import ValidationError
 from django.db import models, transaction
+from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
@@ -62,10 +63,10 @@ def draw_token() -> str:
     return token
 
 
-def renew_token(holder: TokenModel, by: User, address: str, now: datetime) -> str:
+def renew_token(holder: TokenModel, request: HttpRequest, now: datetime) -> str:
     """Store and return a new token of a row, of a revoked one too; the old one stops at once."""
     with transaction.atomic():
-        record_security_change(Act.TOKEN, by, holder, address, now)
+        record_security_change(Act.TOKEN, request, holder, now)
         token = holder.new_token()
         holder.revoked_at = None
         holder.save()

@@ -13,6 +13,7 @@ from django.db.models import QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect
 from django.template.response import TemplateResponse
+from django.utils.decorators import method_decorator
 from django.utils.text import capfirst
 from django.utils.translation import gettext
 
@@ -20,12 +21,13 @@ from rehab.people.access import user_of
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
-from rehab.people.row_values import read_values, save_changes
+from rehab.people.row_values import read_key, read_values, save_changes
 from rehab.people.scope import ScopedModel, visible_rows
+from rehab.people.sign_in import step_up
 from rehab.people.web.row_forms import ClinicForm
-from rehab.people.web.row_keys import read_key
 
 AS_READ = "values of a row as they were read"
+asks_who_it_is = method_decorator(step_up.required)  # of a page or action
 
 
 def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:

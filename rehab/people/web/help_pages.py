@@ -11,60 +11,37 @@ from django.conf import settings
 from django.templatetags.static import static
 from markdown_it import MarkdownIt
 
-# The name of a page's address → the heading that it is told under, as GitHub writes its anchor.
-PARTS = {
-    "start": "today",
-    "new-patient": "today",
-    "edit-patient": "today",
-    "records": "today",
-    "consent": "today",
-    "patient": "start-three-taps",
-    "setup": "start-three-taps",
-    "monitor": "watch-and-steer",
+# The heading, as GitHub writes its anchor, and the pages that it helps on, by their addresses'
+# names; an admin's page has its model's.
+PAGES = {
+    "today": "start new-patient edit-patient records consent rehab_patient",
+    "start-three-taps": "patient setup rehab_preset rehab_protocol",
+    "watch-and-steer": "monitor",
     "scores": "scores",
-    "session": "the-session-and-its-report",
-    "replay": "the-session-again",
-    "report": "the-session-and-its-report",
-    "incident": "the-robot",
-    "correct": "what-to-do-when-",
-    "history": "progress",
+    "the-session-and-its-report": "session report rehab_trainingsession",
+    "the-session-again": "replay",
+    "the-robot": "incident rehab_composedgesture",
+    "what-to-do-when-": "correct",
+    "progress": "history take-home family-links",
     "insight": "insight",
-    "take-home": "progress",
-    "pair": "pair-the-tablet",
+    "pair-the-tablet": "pair",
     "first-steps": "first-steps",
-    "stations": "stations-and-devices",
-    "new-station": "stations-and-devices",
-    "edit-station": "set-the-pin",
-    "new-device": "connect-the-sensor",
-    "check-recording": "connect-the-sensor",
-    "screen": "the-patients-screen",
-    "family-links": "progress",
-    "studies": "studies",
-    "study": "studies",
-    "plan-study": "studies",
-    "new-study": "studies",
-    "enroll": "studies",
-    "participant": "studies",
+    "stations-and-devices": "stations new-station rehab_station rehab_device",
+    "set-the-pin": "edit-station",
+    "connect-the-sensor": "new-device check-recording",
+    "the-patients-screen": "screen",
+    "studies": "studies study plan-study new-study enroll participant",
+    "what-the-patient-sees": "rehab_feedbacktype",
+    "questions-after-a-session": "rehab_questionnaire",
+    "leaderboards": "rehab_leaderboard",
 }
-# Of the admin's models.
-ADMIN_PARTS = {
-    "patient": "today",
-    "trainingsession": "the-session-and-its-report",
-    "preset": "start-three-taps",
-    "feedbacktype": "what-the-patient-sees",
-    "protocol": "start-three-taps",
-    "composedgesture": "the-robot",
-    "questionnaire": "questions-after-a-session",
-    "leaderboard": "leaderboards",
-    "station": "stations-and-devices",
-    "device": "stations-and-devices",
-}
+PARTS = {name: heading for heading, names in PAGES.items() for name in names.split()}
 
 
 def find_part(name: str) -> str:
     """Return the heading that helps on a page, by its address's name; "" where none does."""
     if name.startswith("rehab_"):  # as Django's admin names them: rehab_protocol_change
-        return ADMIN_PARTS.get(name.split("_")[1], "")
+        name = name.rpartition("_")[0]
     return PARTS.get(name, "")
 
 

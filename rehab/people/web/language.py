@@ -1,13 +1,17 @@
-"""The language of each page, decided here alone.
+"""The language and the time zone of each page, decided here alone.
 
 Pages for people who work here are in the account's own language, else the clinic's; a tablet's in
 its clinic's; a stranger's in the browser's. Views that a patient reads call
 `activate_patient_language`. Programs are answered in English.
+
+Templates and the admin format times in the current time zone: that of the clinic of the person or
+tablet. A host's pages are in the server's (GARRY_TIME_ZONE); programs get times with their offset.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from zoneinfo import ZoneInfo
 
 from django.conf import settings
 from django.http import HttpRequest, HttpResponseBase
@@ -60,3 +64,24 @@ class LanguageMiddleware:
         if not known:
             patch_vary_headers(response, ["Accept-Language"])
         return response
+
+
+def request_time_zone(request: HttpRequest) -> ZoneInfo | None:
+    """Return the time zone of the clinic of a request; None where there is none."""
+    if request.path_info.startswith(API_PREFIX):
+        return None
+    user = request.user
+    clinic = getattr(user if isinstance(user, User) else tablet_of(request), "clinic", None)
+    return ZoneInfo(clinic.time_zone) if clinic else None
+
+
+class LocalTimeMiddleware:
+    """Formats times in the clinic's time zone. Sync and thread-safe: it keeps no state."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        """Pass the request on; then restore the time zone of this thread."""
+        with timezone.override(request_time_zone(request)):
+            return self.get_response(request)

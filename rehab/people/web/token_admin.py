@@ -12,11 +12,8 @@ from django.utils import timezone
 from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import user_of
-from rehab.people.networks import client_address
-from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import TokenModel, renew_token
-from rehab.people.web.admin_base import ScopedAdmin
+from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
 
 
 class TokenAdmin(ScopedAdmin):
@@ -25,12 +22,11 @@ class TokenAdmin(ScopedAdmin):
     readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
 
+    @asks_who_it_is
     def add_view(
         self, request: HttpRequest, form_url: str = "", extra_context: Any = None
     ) -> HttpResponse:
         """Show the form of a new row, whose token speaks for somebody; ask for the password."""
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
         return super().add_view(request, form_url, extra_context)
 
     def may_issue(self, request: HttpRequest, holder: Any) -> bool:
@@ -48,18 +44,16 @@ class TokenAdmin(ScopedAdmin):
         return self._show_tokens(request, [(obj, obj.token)])
 
     @admin.action(description=_("Give new tokens (old ones stop at once)"), permissions=["change"])
+    @asks_who_it_is
     def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> HttpResponse | None:
         """Replace the tokens of the chosen rows, and show the new ones; ask for the password."""
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
         if not all(self.may_issue(request, holder) for holder in holders):
             messages.error(request, gettext("Only its own person gives a program a new token."))
             return None
-        issued = []
-        for holder in holders:
-            by, address = user_of(request), client_address(request)
-            issued.append((holder, renew_token(holder, by, address, timezone.now())))
-        return self._show_tokens(request, issued)
+        now = timezone.now()
+        return self._show_tokens(
+            request, [(row, renew_token(row, request, now)) for row in holders]
+        )
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:

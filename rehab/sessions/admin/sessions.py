@@ -8,7 +8,7 @@ from django.contrib import admin
 from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
-from django.utils.html import format_html, format_html_join
+from django.utils.html import format_html_join
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -18,7 +18,7 @@ from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.incidents import RobotIncident
-from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.log import STEP_COLUMNS, SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.search import SessionSearchFilter
 from rehab.sessions.reports.trend import with_metrics
@@ -166,13 +166,14 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("log"))
     def log(self, session: TrainingSession) -> str:
         """Links to the session's steps, events and metrics."""
-        return format_html(
-            '<a href="{}?session__id__exact={}">{}</a> · '
-            '<a href="{}?session__id__exact={}">{}</a> · '
+        lists = {"step": _("Steps"), "sessionevent": _("Events"), "sessionmetric": _("Metrics")}
+        return format_html_join(
+            " · ",
             '<a href="{}?session__id__exact={}">{}</a>',
-            *(reverse("admin:rehab_step_changelist"), session.pk, gettext("Steps")),
-            *(reverse("admin:rehab_sessionevent_changelist"), session.pk, gettext("Events")),
-            *(reverse("admin:rehab_sessionmetric_changelist"), session.pk, gettext("Metrics")),
+            (
+                (reverse(f"admin:rehab_{model}_changelist"), session.pk, label)
+                for model, label in lists.items()
+            ),
         )
 
     @admin.display(description=_("corrections"))
@@ -207,20 +208,7 @@ class SessionLogAdmin(ReadOnlyAdmin):
 class StepAdmin(SessionLogAdmin):
     """A session's steps."""
 
-    list_display = (
-        "session",
-        "number",
-        "time_s",
-        "phase",
-        "value",
-        "shown",
-        "goal",
-        "performance",
-        "hit",
-        "points",
-        "valid",
-        "reasons",
-    )
+    list_display = ("session", *(column.field for column in STEP_COLUMNS))
     list_filter = ("valid", "hit", "side")
     list_select_related = ("session",)
 

@@ -1,4 +1,4 @@
-"""Events of changes: what each audience is told, by the control that was used."""
+"""Events of changes: the message for each audience, by the control that was used."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rehab.training.fold import SessionFold
 
 
 def change_event(fold: SessionFold, kind: str, value: ChangeValue = None) -> LiveEvent:
-    """Return the event of a change, with what its control tells each audience."""
+    """Return the event of a change, with its control's message for each audience."""
     control = CONTROLS[kind]
     messages = {
         audience.value: PAYLOADS[audience, payload](fold, control, value)
@@ -41,7 +41,7 @@ def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
 
 
 def source_message(fold: SessionFold, kind: str) -> Message | None:
-    """Return what a source is told of a change, as of now; None for nothing."""
+    """Return the message to a source about a change, as of now; None for none."""
     control = CONTROLS[kind]
     payload = control.tells.get(Audience.SOURCE)
     return None if payload is None else PAYLOADS[Audience.SOURCE, payload](fold, control, None)
@@ -71,9 +71,9 @@ def _cue(fold: SessionFold) -> Message:
     return {"type": "cue", "cue": describe_cue(fold), "valence": fold.valence.slug}
 
 
-def _marked(fold: SessionFold, control: Control, value: ChangeValue, told: Message) -> Message:
-    """Return a change as the PT's page hears it, with its mark where charts have one."""
-    message: Message = {"kind": str(control.kind), **told}
+def _marked(fold: SessionFold, control: Control, value: ChangeValue, payload: Message) -> Message:
+    """Return a change as sent to the PT's page, with its mark where charts have one."""
+    message: Message = {"kind": str(control.kind), **payload}
     if control.mark is not None:
         in_force = control.value_for_log(fold)
         shown = value if in_force is None else in_force
@@ -85,7 +85,7 @@ def _value(fold: SessionFold, control: Control) -> Message:
     return {control.event_field: control.value_in_force(fold)}
 
 
-# What each audience is told of a change (`Control.tells`).
+# The message of a change for each audience (`Control.tells`).
 PAYLOADS: dict[tuple[Audience, Payload], Callable[[SessionFold, Control, ChangeValue], Message]] = {
     (Audience.PATIENT, Payload.STATE): lambda fold, _control, _value: _state(fold),
     (Audience.PATIENT, Payload.PHASE): lambda fold, _control, _value: _phase_for_patient(fold),

@@ -1,4 +1,4 @@
-"""What a step or a change is told as: the same while a session runs and when it is played back."""
+"""The events of a step or a change, the same while a session runs and when it is replayed."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def events_of_step(
     *,
     live: bool,
 ) -> list[LiveEvent]:
-    """Return the events of a step that was just scored; see `step_event` for who is told."""
+    """Return the events of a step that was just scored; see `step_event` for the audiences."""
     events = [step_event(fold, before.context, step, audiences, live=live)]
     if before.is_still_so(fold):
         return events

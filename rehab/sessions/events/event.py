@@ -1,4 +1,4 @@
-"""An event, and those of who is there: presence, robot, remarks, the source's own goal."""
+"""An event; and the events of presence, robot, remarks and the source's own goal."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from rehab.sessions.payloads import (
-    Message,
-)
+from rehab.sessions.payloads import Message
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 
@@ -43,14 +41,14 @@ class LiveEvent:
 
 
 def presence_event(fold: SessionFold, presence: Message) -> LiveEvent:
-    """Return the event that a source, tablet or robot came or went."""
+    """Return the event that a source, tablet or robot connected or disconnected."""
     event = {"kind": "presence", "presence": presence}
     for_patient = {"kind": "presence", "presence": presence_for_patient(presence)}
     return event_for(fold, patient=for_patient, monitor=event)
 
 
 def presence_for_patient(presence: Message) -> Message:
-    """Return what a patient is told of who is there."""
+    """Return the part of the presence that a patient's page gets."""
     return {"source": presence["source"], "robot": presence["robot"]}
 
 
@@ -66,7 +64,7 @@ def robot_stopped_event(fold: SessionFold, stopped: bool) -> LiveEvent:
 
 
 def robot_state_event(fold: SessionFold, state: str) -> LiveEvent:
-    """Return the event that tells the robot alone which state to obey."""
+    """Return the event with the state that the robot must obey; for the robot alone."""
     return event_for(fold, robot={"type": "state", "state": state})
 
 
@@ -77,7 +75,7 @@ def remark_event(fold: SessionFold, what: str, value: float | None) -> LiveEvent
 
 
 def source_goal_event(fold: SessionFold, goal: float) -> LiveEvent:
-    """Return the event that a source believes in another goal than the PT's."""
+    """Return the event that a source has another goal than the PT's."""
     return event_for(fold, monitor={"kind": "source_goal", "goal": goal})
 
 

@@ -30,7 +30,7 @@ def history_entry(
 ) -> Message | None:
     """Return a past step as a chart needs it; None where this audience sees none.
 
-    ``told``: which of the latest steps the patient was told of, where the schedule leaves some out.
+    ``told``: the latest steps with feedback, where the schedule leaves some without.
     """
     if audience is Audience.PATIENT:
         if not plan.phases[step.phase].feedback:

@@ -109,7 +109,7 @@ def patient_step(
     live: bool,
     answer: Untold | None,
 ) -> Message | None:
-    """Return what the patient is told after a step; ``answer`` is None where that is nothing."""
+    """Return the patient's message about a step; ``answer`` is None where no feedback is due."""
     if step.side != plan.trained_side:
         return None
     if not context.phase.feedback:
@@ -152,7 +152,7 @@ def _summary(
     *,
     live: bool,
 ) -> Message:
-    """Return what the patient is told of a block of steps: their hits, their mean, their points."""
+    """Return the patient's message about a block of steps: their hits, mean and points."""
     valence, mean = context.valence, answer.mean_performance
     band = valence.band(mean)
     return {

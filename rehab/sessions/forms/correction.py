@@ -12,7 +12,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Patient, User
-from rehab.people.web.row_keys import read_key
+from rehab.people.row_values import read_key
 from rehab.sessions.corrections import (
     CorrectedField,
     Values,
@@ -28,7 +28,7 @@ class CorrectionForm(forms.Form):
     """The new values of a session, and the reason.
 
     The page sends each field with its initial value: only fields that differ from it are changed,
-    and none is where somebody else has corrected the session meanwhile.
+    and none is where another user has corrected the session meanwhile.
     """
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(

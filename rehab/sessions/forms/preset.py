@@ -45,7 +45,7 @@ def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
     try:
         with transaction.atomic():
             preset.save()
-    except IntegrityError as problem:  # stored by somebody else meanwhile
+    except IntegrityError as problem:  # another user has stored it meanwhile
         raise ValidationError(gettext(NAME_TAKEN)) from problem
     return preset
 

@@ -5,24 +5,17 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Protocol
 
-from rehab.sessions.payloads import Message
+from rehab.sessions.live.protocol.outgoing import Outbox
 
 
 class ConnectedDevice(Protocol):
     """A connected source or robot, with a session or without one."""
 
+    outbox: Outbox
+
     @property
     def device_id(self) -> int | None:
         """The device's key."""
-
-    def queue(self, message: Message) -> None:
-        """Queue a message."""
-
-    def queue_text(self, text: str) -> None:
-        """Queue a message that is a frame's text already."""
-
-    def acknowledge(self, number: int) -> None:
-        """Queue the acknowledgment of the steps up to this one."""
 
     def evict(self, code: int, error: str, message: str) -> None:
         """Close its connection with an error."""

@@ -52,7 +52,7 @@ class Recovery:
             await self.pause_orphaned(await self._host.session(session_id))
         except OwnedElsewhere:
             self._orphaned.discard(session_id)  # another server was faster
-        except Exception:  # one broken session must not keep the server from starting
+        except Exception:  # one broken session must not prevent the server from starting
             log.exception("Session %s could not be recovered", session_id)
 
     async def pause_orphaned(self, live: LiveSession, owned_before: str | None = None) -> None:

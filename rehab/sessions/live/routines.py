@@ -80,7 +80,7 @@ class Routines:
         self._part = (self._part + 1) % PARTS
         for live in self._host.sessions.values():
             if live.id % PARTS == self._part and live.robot is not None:
-                live.robot.queue_text(ROBOT_HEARTBEATS[live.is_watched])
+                live.robot.outbox.queue_text(ROBOT_HEARTBEATS[live.is_watched])
 
     async def _watch_storage(self) -> None:
         """Report to monitors, robots and the log when steps cannot be stored, and when they can."""

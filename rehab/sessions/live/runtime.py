@@ -242,7 +242,7 @@ class Runtime:
 async def _finish(*work: Awaitable[Any]) -> None:
     """Wait until work is done, for FINISH_S at most.
 
-    An unresponsive client or a hanging query must not keep sessions from being handed on.
+    An unresponsive client or a hanging query must not prevent sessions from being handed on.
     """
     await asyncio.wait([asyncio.gather(*work, return_exceptions=True)], timeout=FINISH_S)
 

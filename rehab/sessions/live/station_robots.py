@@ -75,7 +75,7 @@ class StationRobots:
         """Pass on that a person holds a button to drive the robot to its mark."""
         live = self._sessions.get(session_id)
         if live is not None and live.robot is not None:
-            live.robot.queue({"type": "drive", **drive})
+            live.robot.outbox.queue({"type": "drive", **drive})
 
     def restore_stops(self, live: LiveSession) -> None:
         """Apply robot stops that are not logged yet to a session that was just loaded."""

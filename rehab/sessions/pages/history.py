@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -41,31 +40,6 @@ PAGE_SIZE = 20
 PERIODS = {"4": _("4 weeks"), "12": _("12 weeks"), "52": _("a year")}  # by how many weeks
 
 
-@dataclass(frozen=True)
-class SessionRow:
-    """A session in the list, as text."""
-
-    session: TrainingSession
-    week: str
-    day: str
-    time: str
-    duration: str
-    goal: str
-    score: str
-    hit_rate: str
-    noted: str
-    state: str
-
-
-@dataclass(frozen=True)
-class FilterChip:
-    """A valence to narrow the list by, with its number of sessions."""
-
-    slug: str
-    label: str
-    count: int
-
-
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
@@ -89,7 +63,11 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
     ]
     chosen = request.GET.get("type", "")
     chips = [
-        FilterChip(slug, label, sum(g["pk__count"] for g in groups if slug in ("", g["valence"])))
+        {
+            "slug": slug,
+            "label": label,
+            "count": sum(g["pk__count"] for g in groups if slug in ("", g["valence"])),
+        }
         for slug, label in (("", gettext("All")), *((v.slug, v.label) for v in VALENCES.values()))
     ]
     if chosen in VALENCES:
@@ -133,19 +111,21 @@ def to_row(
     noted: str,
     patient: Patient,
     now: datetime,
-) -> SessionRow:
+) -> dict[str, Any]:
     """Return a session as a row of the list."""
     start = clinic_time(session.began_at, patient.clinic)
     monday = start.date() - timedelta(days=start.weekday())
-    return SessionRow(
-        session=session,
-        week=gettext("Week of %(day)s") % {"day": date_format(monday, "DATE_FORMAT")},
-        day=format_day(start.date(), now.date()).capitalize(),
-        time=f"{start:%H:%M}",
-        duration=format_duration(session.active_s),
-        goal=format_number(session.goal),
-        score=format_number(figures.get("score"), 0),
-        hit_rate=format_rate(figures.get("hit_rate")),
-        noted=noted,
-        state=gettext("imported") if session.legacy_id is not None else format_state(session.state),
-    )
+    return {
+        "session": session,
+        "week": gettext("Week of %(day)s") % {"day": date_format(monday, "DATE_FORMAT")},
+        "day": format_day(start.date(), now.date()).capitalize(),
+        "time": f"{start:%H:%M}",
+        "duration": format_duration(session.active_s),
+        "goal": format_number(session.goal),
+        "score": format_number(figures.get("score"), 0),
+        "hit_rate": format_rate(figures.get("hit_rate")),
+        "noted": noted,
+        "state": gettext("imported")
+        if session.legacy_id is not None
+        else format_state(session.state),
+    }

@@ -36,7 +36,7 @@ ICONS = {
 
 
 def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
-    """Redirect somebody outside the clinic to the page where remote view is consented to."""
+    """Redirect a user outside the clinic to the page where remote view is consented to."""
     message = _(
         "You are not in the clinic, and %(patient)s has not agreed to remote view. Ask first, and "
         "note it here."

@@ -106,15 +106,15 @@ def _entries(records: Sequence[Record], stopped_s: float) -> Iterator[Entry]:
             for hazard in sorted(hazards - felt):
                 yield Entry(at_s, gettext("felt"), hazard)
             felt = hazards
-        elif isinstance(heard := record.get("heard"), dict):
-            what = str(heard.get("type", ""))[:32]
+        elif isinstance(received := record.get("received"), dict):
+            what = str(received.get("type", ""))[:32]
             if what not in UNTOLD:
                 yield Entry(at_s, gettext("the server said: %(what)s") % {"what": what})
-        elif isinstance(said := record.get("said"), dict):
-            if str(said.get("kind")) not in UNTOLD:
-                yield _told(at_s, said)
-        elif "kept" in record:
-            yield Entry(at_s, gettext("stopped"), str(record["kept"])[:64])
+        elif isinstance(sent := record.get("sent"), dict):
+            if str(sent.get("kind")) not in UNTOLD:
+                yield _told(at_s, sent)
+        elif "retained" in record:
+            yield Entry(at_s, gettext("stopped"), str(record["retained"])[:64])
         elif "lost" in record:
             words = gettext("%(count)s records are missing: the disk was too slow")
             yield Entry(at_s, words % {"count": record["lost"]})
@@ -147,9 +147,9 @@ def _replay(records: Sequence[Record], ticks: Sequence[Record]) -> dict[str, Any
         if not poses or at_s - poses[-1][0] >= REPLAY_EVERY_S:
             poses.append([at_s, *one["tick"][2:5]])
     lights = [
-        [round(record["at_s"] - from_s, 2), *map(str, said["lights"][:2])]
+        [round(record["at_s"] - from_s, 2), *map(str, sent["lights"][:2])]
         for record in records
-        if isinstance(said := record.get("said"), dict) and isinstance(said.get("lights"), list)
+        if isinstance(sent := record.get("sent"), dict) and isinstance(sent.get("lights"), list)
     ]
     took_s = round(ticks[-1]["at_s"] - from_s, 2)
     return {"took_s": took_s, "poses": poses, "lights": lights, "notes": [], "mood": "calm"}

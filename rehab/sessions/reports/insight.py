@@ -21,40 +21,15 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import User
 from rehab.sessions.corrections import CorrectedField, SessionCorrection
 from rehab.sessions.formatting import clinic_time, format_number
-from rehab.sessions.log import FallSeverity, Remark, SessionEvent
+from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.intervals import MeanInterval, mean_interval
+from rehab.sessions.reports.noted import ADVERSE, Noted, load_noted
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.valences import VALENCES
 
 MAX_SESSIONS = 2000  # the newest
 EQUAL_WITHIN = 1.1  # goals of one measure count as equal up to so much of the lowest
-ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
-
-
-@dataclass(slots=True)
-class Adverse:
-    """Something that went wrong in a session: what, when; of a fall how badly somebody was hurt."""
-
-    kind: str
-    at: datetime
-    severity: int | None = None
-
-    @property
-    def words(self) -> str:
-        """What it was."""
-        label = str(ADVERSE_LABELS[self.kind])
-        if self.severity is None:
-            return label
-        return f"{label}, {FallSeverity(self.severity).label}"
-
-
-ADVERSE_LABELS: dict[str, str | Promise] = {
-    Remark.FALL: _("fall"),
-    Remark.NEAR_FALL: _("near fall"),
-    Remark.PAIN: _("pain"),
-    Remark.DIZZINESS: _("dizziness"),
-}
 
 
 @dataclass(slots=True)
@@ -64,7 +39,7 @@ class Walked:
     session: TrainingSession
     at: datetime  # by the clinic's clock
     hit_rate: float | None
-    adverse: list[Adverse] = field(default_factory=list)
+    adverse: list[Noted] = field(default_factory=list)
     exertion: float | None = None  # the highest that was noted, Borg CR10
     note: str = ""
     band: str = ""  # the goals that its goal is compared with (`goal_bands`)
@@ -117,29 +92,14 @@ def load_walked(user: User, sessions: QuerySet[TrainingSession]) -> list[Walked]
         )
         for row in rows
     }
-    kinds = [*ADVERSE, Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN, Remark.BORG]
-    events = SessionEvent.objects.visible_to(user).filter(session__in=list(walked), kind__in=kinds)
-    for event in events.order_by("pk").defer("data"):
-        _note(walked[event.session_id], event)
+    for key, noted in load_noted(user, walked).items():
+        walked[key].adverse = [one for one in noted if one.kind in ADVERSE]
+        borg = [one.value or 0.0 for one in noted if one.kind == Remark.BORG]
+        walked[key].exertion = max(borg, default=None)
     notes = SessionCorrection.objects.visible_to(user).filter(field=CorrectedField.NOTE)
     for correction in notes.filter(session__in=list(walked)).order_by("pk"):
         walked[correction.session_id].note = correction.new
     return list(walked.values())
-
-
-def _note(walked: Walked, event: SessionEvent) -> None:
-    falls = [one for one in walked.adverse if one.kind == Remark.FALL]
-    match event.kind:
-        case Remark.BORG:
-            walked.exertion = max(walked.exertion or 0.0, event.value or 0.0)
-        case Remark.FALL_SEVERITY:
-            if falls:
-                falls[-1].severity = int(event.value or 0)
-        case Remark.FALL_WITHDRAWN:
-            if falls:
-                walked.adverse.remove(falls[-1])
-        case _:
-            walked.adverse.append(Adverse(event.kind, event.at))
 
 
 def goal_bands(walked: Sequence[Walked]) -> list[tuple[str, str, int]]:
@@ -202,7 +162,7 @@ def _summarize(label: str, walked: Sequence[Walked]) -> Group:
         patients=len({one.session.patient_id for one in walked}),
         hit_rate=mean_interval(_independent(walked, lambda one: one.hit_rate), (0, 1)),
         minutes=sum(one.session.active_s for one in walked) / 60,
-        adverse=[(str(ADVERSE_LABELS[kind]), kinds[kind]) for kind in ADVERSE if kinds[kind]],
+        adverse=[(str(EVENTS[kind]), kinds[kind]) for kind in ADVERSE if kinds[kind]],
         exertion=mean_interval(_independent(walked, lambda one: one.exertion), (0, 10)),
     )
 
@@ -261,10 +221,9 @@ def read_view(user: User, query: Mapping[str, str], now: datetime) -> View:
 
 def to_table(walked: Sequence[Walked]) -> Iterator[list[object]]:
     """Yield a head and a line for each session; in English, as all files are."""
-    kinds = [str(kind) for kind in ADVERSE]
     yield [
         *("began", "code", "feedback_type", "measure", "unit", "goal", "hit_rate", "active_s"),
-        *kinds,
+        *map(str, ADVERSE),
         *("highest_borg", "note"),
     ]
     for one in walked:
@@ -274,6 +233,6 @@ def to_table(walked: Sequence[Walked]) -> Iterator[list[object]]:
         yield [
             *(one.at, session.patient.code, valences, session.measure.slug, session.measure.unit),
             *(session.goal, one.hit_rate, session.active_s),
-            *(counts[kind] for kind in kinds),
+            *(counts[kind] for kind in ADVERSE),
             *(one.exertion, one.note),
         ]

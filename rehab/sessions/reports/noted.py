@@ -1,45 +1,79 @@
-"""Falls and exertion that were noted in sessions, as text."""
+"""What was noted in sessions: falls and how badly they hurt, exertion, and other remarks."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 
 from django.utils.translation import gettext, ngettext
 
 from rehab.people.models import User
 from rehab.sessions.formatting import format_number
-from rehab.sessions.log import Remark, SessionEvent
+from rehab.sessions.log import EVENTS, FallSeverity, Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
-FALLS = {Remark.FALL: 1, Remark.FALL_WITHDRAWN: -1}
+ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
+ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # part of the fall, not of their own
+REMARKS = frozenset(Remark) - frozenset(ABOUT_A_FALL)
+
+
+@dataclass(slots=True, eq=False)
+class Noted:
+    """A remark: of exertion with its ``value`` (Borg CR10), of a fall with its ``severity``."""
+
+    kind: Remark
+    at: datetime
+    value: float | None
+    severity: FallSeverity | None = None
+
+    @property
+    def words(self) -> str:
+        """What it was, and how badly somebody was hurt."""
+        label = str(EVENTS[self.kind])
+        return label if self.severity is None else f"{label}, {self.severity.label}"
+
+
+def read_noted(events: Iterable[SessionEvent]) -> list[Noted]:
+    """Return the remarks among a session's events, in their order. A withdrawn fall was none."""
+    noted: list[Noted] = []
+    for event in events:
+        falls = [one for one in noted if one.kind == Remark.FALL]
+        if event.kind in REMARKS:
+            noted.append(Noted(Remark(event.kind), event.at, event.value))
+        elif event.kind == Remark.FALL_SEVERITY and falls:
+            falls[-1].severity = FallSeverity(int(event.value or 0))
+        elif event.kind == Remark.FALL_WITHDRAWN and falls:
+            noted.remove(falls[-1])
+    return noted
+
+
+def load_noted(user: User, sessions: Iterable[int]) -> dict[int, list[Noted]]:
+    """Return adverse events and exertion of sessions, by key; without those that have none."""
+    kinds = [*ADVERSE, *ABOUT_A_FALL, Remark.BORG]
+    rows = SessionEvent.objects.visible_to(user).filter(session__in=list(sessions), kind__in=kinds)
+    found: defaultdict[int, list[SessionEvent]] = defaultdict(list)
+    for event in rows.order_by("pk").defer("data"):
+        found[event.session_id].append(event)
+    return {key: read_noted(events) for key, events in found.items()}
 
 
 def describe_noted(user: User, sessions: Sequence[TrainingSession]) -> dict[int, str]:
     """Return how often a session's patient fell, and the exertion that was noted, by its key.
 
-    Sessions in which neither was noted are left out. A fall that was withdrawn was none.
+    Sessions in which neither was noted are left out.
     """
-    falls: defaultdict[int, int] = defaultdict(int)
-    borg: defaultdict[int, list[float]] = defaultdict(list)
-    rows = SessionEvent.objects.visible_to(user).filter(
-        session__in=[session.pk for session in sessions], kind__in=[*FALLS, Remark.BORG]
-    )
-    for session_id, kind, value in rows.order_by("pk").values_list("session_id", "kind", "value"):
-        if kind == Remark.BORG:
-            borg[session_id].append(value or 0)
-        else:
-            falls[session_id] += FALLS[Remark(kind)]
-    return {
-        key: " · ".join(_describe(falls.get(key, 0), borg.get(key, [])))
-        for key in falls.keys() | borg.keys()
-        if falls.get(key, 0) > 0 or key in borg
-    }
+    noted = load_noted(user, (session.pk for session in sessions))
+    found = {key: " · ".join(_describe(remarks)) for key, remarks in noted.items()}
+    return {key: text for key, text in found.items() if text}
 
 
-def _describe(falls: int, borg: Sequence[float]) -> list[str]:
+def _describe(noted: Sequence[Noted]) -> list[str]:
+    falls = sum(one.kind == Remark.FALL for one in noted)
+    borg = [one.value or 0 for one in noted if one.kind == Remark.BORG]
     parts = []
-    if falls > 0:
+    if falls:
         parts.append(ngettext("%(count)s fall", "%(count)s falls", falls) % {"count": falls})
     if borg:
         low, high = format_number(min(borg), 0), format_number(max(borg), 0)

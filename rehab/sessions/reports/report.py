@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import replace
 from typing import Any
 
@@ -16,23 +16,26 @@ from rehab.sessions.formatting import (
     format_change,
     format_number,
     format_quantity,
+    format_significant,
 )
-from rehab.sessions.log import EVENTS, FallSeverity, Remark, RobotEntry, SessionEvent
+from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.answers import list_answers
-from rehab.sessions.reports.extras import mean_extras
+from rehab.sessions.reports.noted import ADVERSE, read_noted
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
 from rehab.sessions.reports.summary import Figure, format_phases, format_summary
 from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
+from rehab.training.steps import SENT_VALUE
 
 # What one page has room for; omitted entries are counted, and are on the session's own page.
 MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 6
-ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
-ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # said with the fall, not beside it
-REMARKS = {kind.value for kind in Remark} - {kind.value for kind in ABOUT_A_FALL}
+# A line of the page of paper has room for so many.
+MAX_EXTRAS = 8
+# Moments and marks of single strides, of which a mean says nothing.
+WITHOUT_MEAN = ("initial_contact_s", SENT_VALUE)
 
 
 def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
@@ -106,25 +109,16 @@ def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:
 def _summarize_remarks(
     events: list[SessionEvent], session: TrainingSession
 ) -> list[dict[str, Any]]:
-    """Return each kind of remark with its times, adverse ones first; Borg with its values, falls
-    with how badly they hurt. A fall that was withdrawn was none.
-    """
+    """Return each kind of remark with its times, adverse ones first; Borg with its values."""
     times: defaultdict[Remark, list[str]] = defaultdict(list)
-    for event in events:
-        falls = times[Remark.FALL]
-        if event.kind == Remark.FALL_WITHDRAWN and falls:
-            falls.pop()
-        elif event.kind == Remark.FALL_SEVERITY and falls:
-            hurt = FallSeverity(int(event.value or 0)).label
-            falls[-1] = f"{falls[-1].partition(' ')[0]} ({hurt})"
-        elif event.kind in REMARKS:
-            text = f"{clinic_time(event.at, session.clinic):%H:%M}"
-            if event.kind == Remark.BORG:
-                text = f"{format_number(event.value, 0)} ({text})"
-            times[Remark(event.kind)].append(text)
-    order = sorted(
-        filter(times.get, times), key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind))
-    )
+    for one in read_noted(events):
+        text = f"{clinic_time(one.at, session.clinic):%H:%M}"
+        if one.kind == Remark.BORG:
+            text = f"{format_number(one.value, 0)} ({text})"
+        elif one.severity is not None:
+            text = f"{text} ({one.severity.label})"
+        times[one.kind].append(text)
+    order = sorted(times, key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind)))
     return [
         {
             "name": _("Exertion (Borg)") if kind == Remark.BORG else capfirst(EVENTS[kind]),
@@ -162,3 +156,27 @@ def _describe_robot(events: list[SessionEvent]) -> str:
     if stops:
         parts.append(ngettext("stopped once", "stopped %(count)s times", stops) % {"count": stops})
     return ", ".join(parts) + "."
+
+
+def mean_extras(user: User, session: TrainingSession) -> list[str]:
+    """Return "name mean" of the trained leg's valid strides, for what most of them have.
+
+    Names are those that the source sent.
+    """
+    sums: defaultdict[str, float] = defaultdict(float)
+    counts: Counter[str] = Counter()
+    extras = Step.objects.visible_to(user).filter(
+        session=session, side=session.trained_side, valid=True
+    )
+    for extra in extras.order_by("number").values_list("extra", flat=True).iterator():
+        for name, value in extra.items():
+            sums[name] += value
+            counts[name] += 1
+    names = [
+        name
+        for name, _count in counts.most_common()
+        if name not in WITHOUT_MEAN and not name.startswith("flag_")
+    ]
+    return [
+        f"{name} {format_significant(sums[name] / counts[name])}" for name in names[:MAX_EXTRAS]
+    ]

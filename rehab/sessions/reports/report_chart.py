@@ -26,6 +26,7 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
     known = [value for value in (*shown, *goals) if value is not None]
     highest: float = max(known, default=1.0)
     top = 1.08 * highest if highest > 0 else 1.0
+    levels = [value for value in round_steps(0, top, most=7) if 0 < value < top]
     first: int = numbers[0]
     span: int = max(1, numbers[-1] - first)
 
@@ -74,15 +75,17 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
             }
             for phase in chart["phases"]
         ],
-        "levels": [{"y": round(y(value), 1), "words": f"{value:g}"} for value in _axis_ticks(top)],
+        "levels": [{"y": round(y(value), 1), "words": f"{value:g}"} for value in levels],
         "first": numbers[0],
         "last": numbers[-1],
         "strides": len(numbers),
     }
 
 
-def _axis_ticks(top: float) -> list[float]:
-    """Return round values for the axis, three to seven of them below the top."""
-    size = 10.0 ** math.floor(math.log10(top))
-    step = next(step for step in (size / 5, size / 2, size, 2 * size) if top / step < 8)
-    return [round(step * count, 10) for count in range(1, math.ceil(top / step))]
+def round_steps(low: float, high: float, most: int = 6) -> list[float]:
+    """Return round numbers that span a range, at most so many steps apart."""
+    span = high - low if high > low else 1.0
+    size = 10.0 ** math.floor(math.log10(span / most))
+    step = next(n * size for n in (1, 2, 2.5, 5, 10, 20) if span / (n * size) <= most)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [round(step * count, 10) for count in range(first, last + 1)]

@@ -142,18 +142,6 @@ def install_defaults(using: str = "default", **_signal: Any) -> None:
             )
             if is_new:
                 ProtocolPhase.everywhere.using(using).bulk_create(
-                    ProtocolPhase(
-                        protocol=protocol,
-                        position=position,
-                        kind=phase.kind,
-                        name=phase.name,
-                        feedback=phase.feedback,
-                        gain=phase.gain,
-                        strides=phase.strides,
-                        seconds=phase.seconds,
-                        goal_percent=phase.goal_percent,
-                        robot=phase.robot,
-                        rest_s=phase.rest_s,
-                    )
+                    ProtocolPhase(protocol=protocol, position=position, **asdict(phase))
                     for position, phase in enumerate(template.phases, start=1)
                 )

@@ -96,8 +96,8 @@ class Option:
 
     name: str
     label: str | Promise
-    kind: type
     help: str
+    kind: type = str
     default: Any = None
     api_name: str = ""
     nullable: bool = False

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import fields
+from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
 from django.core.validators import RegexValidator
@@ -25,6 +26,11 @@ from robot.wire.frames import NAME
 def display_name(row: MeasureDefinition | Protocol) -> str:
     """Return the name of a row; that of a shared one is translated."""
     return row.name if row.clinic_id else gettext(row.name)
+
+
+def _values_for(rule: type, row: models.Model) -> dict[str, Any]:
+    """Return what a rule is made of: its fields, which the row has under the same names."""
+    return {field.name: getattr(row, field.name) for field in fields(rule)}
 
 
 class MeasureDefinition(ClinicModel):
@@ -94,18 +100,7 @@ class MeasureDefinition(ClinicModel):
 
     def to_rule(self) -> rules.Measure:
         """Return the measure in the form that the rules use."""
-        return rules.Measure(
-            slug=self.slug,
-            name=self.name,
-            unit=self.unit,
-            value_min=self.value_min,
-            value_max=self.value_max,
-            goal_min=self.goal_min,
-            goal_max=self.goal_max,
-            higher_is_better=self.higher_is_better,
-            channel=self.channel,
-            first_goal=self.first_goal,
-        )
+        return rules.Measure(**_values_for(rules.Measure, self))
 
     def clean(self) -> None:
         """Refuse what the rules refuse, with their message."""
@@ -174,7 +169,7 @@ class Protocol(ClinicModel):
         return tuple(phase.to_rule() for phase in phases)
 
     def close_steps(self, language: str) -> CloseSteps:
-        """Return which steps are told as close, with words in a language."""
+        """Return which steps count as close, with their words in a language."""
         part = None if self.close_percent is None else self.close_percent / 100
         return CloseSteps(part, translate(CLOSE_WORDS, language))
 
@@ -236,17 +231,7 @@ class ProtocolPhase(ScopedModel):
 
     def to_rule(self) -> Phase:
         """Return the phase in the form that the rules use. Raises InvalidSetting."""
-        return Phase(
-            kind=self.kind,
-            name=self.name,
-            feedback=self.feedback,
-            gain=self.gain,
-            strides=self.strides,
-            seconds=self.seconds,
-            goal_percent=self.goal_percent,
-            robot=self.robot,
-            rest_s=self.rest_s,
-        )
+        return Phase(**_values_for(Phase, self))
 
     def clean(self) -> None:
         """Refuse what the rules refuse, with their message."""

@@ -27,7 +27,7 @@ from robot.wire.limits import TIME_MAX_S
 BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
 PART_BYTES = 1024 * 1024
 WAIT_S = 90.0
-KEPT_S = 86_400.0  # an upload that nobody has stored
+RETAINED_S = 86_400.0  # an upload that was not stored as a recording
 _one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
 # What `rehab.gait.recordings.tables` reads; it is not imported, as servers do without numpy.
 ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".txt")
@@ -62,7 +62,7 @@ def recordings_folder() -> Path:
 
 
 def uploaded_file(person: int, ending: str) -> Path:
-    """Return where a person's upload is kept; another one replaces it.
+    """Return where a person's upload is stored; the next one replaces it.
 
     Raises UploadRefused for a kind of file that cannot be read.
     """
@@ -77,12 +77,12 @@ def discard_old_uploads(now: datetime) -> None:
     """Remove uploads that were not stored as a recording within a day."""
     folder = settings.DATA_DIR / "uploads"
     for file in folder.iterdir() if folder.is_dir() else ():
-        if now.timestamp() - file.stat().st_mtime >= KEPT_S:
+        if now.timestamp() - file.stat().st_mtime >= RETAINED_S:
             file.unlink(missing_ok=True)
 
 
 def add_part(file: Path, part: bytes, at: int) -> None:
-    """Add a part of an upload at its place; the first one begins the file anew.
+    """Add a part of an upload at its place; the first one starts a new file.
 
     Raises UploadRefused for a part that does not follow the one before, and beyond the largest
     file.

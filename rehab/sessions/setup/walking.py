@@ -1,4 +1,4 @@
-"""How somebody walked: device, belt speed, body-weight support. They change no score."""
+"""How a patient walked: device, belt speed, body-weight support. They change no score."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from rehab.gait import (
     StrideDetector,
     TwoLegDetector,
     check_signals,
+    make_detector,
 )
 from rehab.gait.recordings.columns import CHANNELS, REQUIRED, SIDES
 from rehab.gait.settings import check_rate
@@ -121,10 +122,7 @@ class SignalPipeline:
             )
             check_rate(rate_hz)
             self._sides, self.rate_hz = sides, rate_hz
-            if len(sides) == 2:
-                self._detector = TwoLegDetector(rate_hz, self.mass_kg, **self._how)
-            else:
-                self._detector = StrideDetector(rate_hz, self.mass_kg, side=sides[0], **self._how)
+            self._detector = make_detector(sides, rate_hz, self.mass_kg, **self._how)
         except GaitInputError as problem:
             self._notify(f"{problem} Times have to be the device's own, in seconds.")
             return []
@@ -135,14 +133,13 @@ class SignalPipeline:
     def _feed(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
         if values.keys() != self._fed:
             self._fed = set(values)
-            self._tell_late_legs()
+            self._report_late_legs()
         frames = values.get(FRAME)
-        if isinstance(self._detector, TwoLegDetector):
-            return self._detector.feed(t_s, *(_leg(values, s, t_s) for s in SIDES), frame=frames)
         assert self._detector is not None  # noqa: S101 (set by _begin)
-        return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s), frame=frames)
+        legs = {side: _leg(values, side, t_s) for side in self._sides}
+        return self._detector.feed_legs(t_s, legs, frame=frames)
 
-    def _tell_late_legs(self) -> None:
+    def _report_late_legs(self) -> None:
         late = {side for side, _ in self._fed - {FRAME}} - set(self._sides) - self._others
         if late:
             self._others |= late

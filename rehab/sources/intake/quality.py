@@ -10,7 +10,7 @@ import numpy as np
 
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.frames import FrameClock, read_frames
-from rehab.gait.stances.timing import GAP_S, LATE_S
+from rehab.gait.stances.gaps import GAP_S, LATE_S
 from rehab.sources.intake.alignment import Floats
 from rehab.training.steps import Measurement
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rehab.gait import check_signals, measure_both_legs, measure_strides
+from rehab.gait import check_signals, measure_strides
 from rehab.gait.recordings.csv_files import read_mass
 from rehab.gait.recordings.tables import read_signals
 from rehab.gait.signals.clock import estimate_rate
@@ -22,6 +22,8 @@ def measure_file(
     rate_hz: float | None,
     look_ahead_s: float,
     side: Side | None,
+    *,
+    is_overground: bool,
 ) -> tuple[list[Measurement], list[str]]:
     """Return the strides of a file in the order walked, and the messages of its self-check.
 
@@ -34,27 +36,15 @@ def measure_file(
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
     rate_hz = estimate_rate(t_s) if rate_hz is None else rate_hz
     mass_kg = read_mass(path) if mass_kg is None else mass_kg
-    if len(legs) == 2:
-        found = measure_both_legs(
-            t_s,
-            legs["left"],
-            legs["right"],
-            rate_hz=rate_hz,
-            mass_kg=mass_kg,
-            look_ahead_s=look_ahead_s,
-            frame=frames,
-        )
-    else:
-        ((only, leg),) = legs.items()
-        found = measure_strides(
-            t_s,
-            *leg,
-            rate_hz=rate_hz,
-            mass_kg=mass_kg,
-            look_ahead_s=look_ahead_s,
-            side=only,
-            frame=frames,
-        )
+    found = measure_strides(
+        t_s,
+        legs,
+        rate_hz=rate_hz,
+        mass_kg=mass_kg,
+        look_ahead_s=look_ahead_s,
+        is_overground=is_overground,
+        frame=frames,
+    )
     check = check_signals(
         t_s, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
     )

@@ -35,6 +35,11 @@ class RecordingSource(PlayedSource):
         signals.add_argument("--rate", type=float, metavar="HZ", help="default: by the times")
         signals.add_argument("--look-ahead", type=float, default=0.05, metavar="S")
         signals.add_argument("--columns", nargs="+", metavar="CHANNEL=COLUMN")
+        signals.add_argument(
+            "--overground",
+            action="store_true",
+            help="over plates in a floor, a step or two at a time",
+        )
 
     def __init__(self, options: Namespace, notify: Notify) -> None:
         """Read the whole file. Raises RecordingError, GaitInputError or UnsendableStride."""
@@ -71,7 +76,13 @@ class RecordingSource(PlayedSource):
         from rehab.sources.recording.signals import measure_file
 
         strides, findings = measure_file(
-            options.file, options.columns, options.mass, options.rate, options.look_ahead, wanted
+            options.file,
+            options.columns,
+            options.mass,
+            options.rate,
+            options.look_ahead,
+            wanted,
+            is_overground=options.overground,
         )
         for finding in findings:
             self._notify(f"{options.file.name}: {finding}")

@@ -14,8 +14,8 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import actor_of, clinic_of, for_roles, tablet_of, user_of
 from rehab.people.roles import Role
+from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
-from rehab.people.web.row_keys import read_key
 from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station

@@ -13,7 +13,6 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.people.access import clinic_of, for_roles, user_of
-from rehab.people.networks import client_address
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import renew_token
@@ -86,7 +85,7 @@ def change_device(request: HttpRequest, device_id: int) -> HttpResponse:
         device.save(update_fields=["revoked_at"])
         messages.success(request, _("%(device)s is revoked.") % {"device": device})
         return redirect("stations")
-    token = renew_token(device, user, client_address(request), now)
+    token = renew_token(device, request, now)
     return show_token(request, device, token)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
@@ -128,15 +127,6 @@ class Canvas:
 
 def _text(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
-
-
-def ticks(low: float, high: float, most: int = 6) -> list[float]:
-    """Return round numbers that span a range, at most so many steps apart."""
-    span = high - low if high > low else 1.0
-    size = 10.0 ** math.floor(math.log10(span / most))
-    step = next(n * size for n in (1, 2, 2.5, 5, 10, 20) if span / (n * size) <= most)
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [round(step * count, 10) for count in range(first, last + 1)]
 
 
 def number(value: float) -> str:

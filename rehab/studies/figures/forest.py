@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.comparison import Difference
 from rehab.studies.figures.canvas import (
     GRID,
@@ -14,7 +15,6 @@ from rehab.studies.figures.canvas import (
     Canvas,
     number,
     shorten,
-    ticks,
 )
 
 WIDTH, ROW, TOP, FOOT = 1000.0, 30.0, 44.0, 46.0
@@ -43,7 +43,7 @@ def draw_forest(rows: Sequence[ForestRow], title: str, x_axis: str) -> str:
         if value is not None
     ]
     far = min(FAR, max([0.8, *(abs(end) for end in ends)]))
-    levels = ticks(-far, far)
+    levels = round_steps(-far, far)
     bottom = TOP + ROW * len(rows)
 
     def x(value: float) -> float:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.curves import Point
-from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, QUIET, Canvas, number, ticks
+from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, QUIET, Canvas, number
 
 WIDTH, HEIGHT = 1000.0, 450.0
 LEFT, RIGHT, BOTTOM, BETWEEN = 62.0, 16.0, 54.0, 18.0
@@ -44,7 +45,7 @@ def draw_curves(
     if not everything:
         return canvas.to_text()
     seen = [value for point in everything for value in (point.mean, point.low, point.high) if value]
-    levels = ticks(min(*seen, 95.0), max(*seen, 105.0))
+    levels = round_steps(min(*seen, 95.0), max(*seen, 105.0))
     top, bottom = foot + 62, HEIGHT - BOTTOM
     places = _lay_out(everything, words)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.participants import OutcomeResult
-from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, Canvas, number, shorten, ticks
+from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, Canvas, number, shorten
 
 WIDTH, HEIGHT = 1000.0, 400.0
 LEFT, RIGHT, TOP, BOTTOM = 62.0, 16.0, 44.0, 62.0
@@ -29,7 +30,7 @@ def draw_people(
         return canvas.to_text()
     means = [figure.mean for figure in finding.arms if figure.mean is not None]
     everything += [end for mean in means for end in (mean.low, mean.high) if end is not None]
-    levels = ticks(min(*everything, 0.0), max(*everything, 0.0))
+    levels = round_steps(min(*everything, 0.0), max(*everything, 0.0))
     bottom = HEIGHT - BOTTOM
 
     def y(value: float) -> float:

@@ -25,8 +25,8 @@ from django.views.decorators.http import (
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
+from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
-from rehab.people.web.row_keys import read_key
 from rehab.studies.blinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark

@@ -1,4 +1,4 @@
-"""Serves the avatar's page and tells every open one what to show. It takes no orders from them."""
+"""Serves the avatar's page, and sends every open one what to show. It takes no orders from them."""
 
 from __future__ import annotations
 
@@ -86,29 +86,29 @@ class PageServer:
         return _respond(HTTPStatus.OK, kind, files(__package__).joinpath(name).read_bytes())
 
     def _serve_page(self, socket: ServerConnection) -> None:
-        """Tell one page what to show until it is gone."""
+        """Send one page what to show until it is gone."""
         with self._changed:
             if self._pages >= MAX_PAGES:
                 return
             self._pages += 1
         try:
             with suppress(ConnectionClosed):
-                self._tell(socket)
+                self._send_states(socket)
         finally:
             with self._changed:
                 self._pages -= 1
 
-    def _tell(self, socket: ServerConnection) -> None:
-        told = -1
+    def _send_states(self, socket: ServerConnection) -> None:
+        sent = -1
         while True:
             with self._changed:
-                while told == self._version and not self._is_closing:
+                while sent == self._version and not self._is_closing:
                     self._changed.wait(1.0)
                     if socket.close_code is not None:
                         return
                 if self._is_closing:
                     return
-                told, text = self._version, json.dumps(self._state)
+                sent, text = self._version, json.dumps(self._state)
             socket.send(text)
 
 

@@ -76,18 +76,6 @@ class RequestExtra(NamedTuple):
     flags: int
 
 
-class ChangeFrame(NamedTuple):
-    """A legacy command; known so that it is not mistaken for damage."""
-
-    frame_id: int
-
-
-class RequestEeprom(NamedTuple):
-    """A legacy command, likewise."""
-
-    frame_id: int
-
-
 class GpOutput(NamedTuple):
     """All outputs, power rails and LEDs in one word: see ``Output``."""
 
@@ -109,25 +97,13 @@ class GetGain(NamedTuple):
     unused: int = 0
 
 
-Command = (
-    BaseControl
-    | Sound
-    | SoundSequence
-    | RequestExtra
-    | ChangeFrame
-    | RequestEeprom
-    | GpOutput
-    | SetGain
-    | GetGain
-)
+Command = BaseControl | Sound | SoundSequence | RequestExtra | GpOutput | SetGain | GetGain
 
 COMMANDS: dict[int, tuple[type[Command], Struct]] = {
     1: (BaseControl, Struct("<hh")),
     3: (Sound, Struct("<HB")),
     4: (SoundSequence, Struct("<B")),
     9: (RequestExtra, Struct("<H")),
-    10: (ChangeFrame, Struct("<B")),
-    11: (RequestEeprom, Struct("<B")),
     12: (GpOutput, Struct("<H")),
     13: (SetGain, Struct("<BIII")),
     14: (GetGain, Struct("<B")),

@@ -117,13 +117,6 @@ class GyroRaw(NamedTuple):
     samples: tuple[tuple[int, int, int], ...]
 
 
-class Eeprom(NamedTuple):
-    """A legacy reply."""
-
-    frame_id: int
-    data: bytes
-
-
 class GpInput(NamedTuple):
     """Digital inputs (bits 0 to 3) and four analog ones (12 bit)."""
 
@@ -162,7 +155,6 @@ class Feedback(NamedTuple):
     hardware: Version | None = None
     firmware: Version | None = None
     gyro: GyroRaw | None = None
-    eeprom: Eeprom | None = None
     gp: GpInput | None = None
     udid: Udid | None = None
     controller: ControllerInfo | None = None
@@ -174,7 +166,6 @@ _LAYOUTS: dict[int, tuple[str, Any, Struct]] = {
     4: ("inertia", Inertia, Struct("<hh3x")),
     5: ("cliff", CliffRaw, Struct("<HHH")),
     6: ("current", MotorCurrent, Struct("<BB")),
-    15: ("eeprom", Eeprom, Struct("<B16s")),
     16: ("gp", GpInput, Struct("<HHHHH6x")),
     19: ("udid", Udid, Struct("<III")),
     21: ("controller", ControllerInfo, Struct("<BIII")),
@@ -183,7 +174,7 @@ _HARDWARE, _FIRMWARE, _GYRO = 10, 11, 13
 _SAMPLE = Struct("<hhh")
 # What firmware 1.0.0 reports as its version, in two bytes (docs/reference/kobuki.md#feedback).
 FIRST_FIRMWARE = Version(1, 2, 3)
-_NUMBERS = (1, 3, 4, 5, 6, _HARDWARE, _FIRMWARE, _GYRO, 15, 16, 19, 21)  # of Feedback's fields
+_NUMBERS = (1, 3, 4, 5, 6, _HARDWARE, _FIRMWARE, _GYRO, 16, 19, 21)  # of Feedback's fields
 
 
 def encode_feedback(feedback: Feedback, *, short_versions: bool = False) -> bytes:

@@ -45,8 +45,6 @@ class Estimate:
         Bits as in ``CoreSensors``: set, and cleared, by two frames in a row.
     buttons
         Bits of the buttons that are held.
-    pressed
-        Bits of the buttons that came to be held with this frame.
     current_a
         Current of both motors together [A], the lesser of two frames in a row; 0 where unknown.
     battery_v
@@ -69,7 +67,6 @@ class Estimate:
     cliff: int = 0
     over_current: int = 0
     buttons: int = 0
-    pressed: int = 0
     current_a: float = 0.0
     battery_v: float = math.nan
     is_charging: bool = False
@@ -89,14 +86,13 @@ class FrameFilter:
     ----------
     doubted
         How many frames were held back.
-    firmware, hardware, udid
+    firmware, udid
         As the base reports them, once confirmed.
     """
 
     def __init__(self) -> None:
         self.doubted = 0
         self.firmware: Version | None = None
-        self.hardware: Version | None = None
         self.udid: Udid | None = None
         self._estimate = Estimate()
         self._accepted: list[_Frame] = []  # the last two, the newest first
@@ -108,7 +104,7 @@ class FrameFilter:
         """Start over with the next frames, as after the port was opened again."""
         self._accepted, self._doubted_frame = [], None
         self._unconfirmed.clear()
-        self.firmware = self.hardware = self.udid = None
+        self.firmware = self.udid = None
 
     def update(self, feedback: Feedback, now_s: float) -> Estimate | None:
         """Add the next frame, and return the estimate, or None where the frame is not confirmed.
@@ -145,7 +141,7 @@ class FrameFilter:
         return None
 
     def _confirm_versions(self, feedback: Feedback) -> None:
-        for name in ("firmware", "hardware", "udid"):
+        for name in ("firmware", "udid"):
             version = getattr(feedback, name)
             if version is not None:
                 if self._unconfirmed.get(name) == version:
@@ -154,8 +150,7 @@ class FrameFilter:
 
     def _accept(self, feedback: Feedback, before: _Frame, now: _Frame) -> Estimate:
         self._confirm_versions(feedback)
-        seen, held = now.since(before), self._estimate.buttons
-        self._estimate = replace(seen, pressed=seen.buttons & ~held)
+        self._estimate = now.since(before)
         self._accepted = [replace(now, estimate=self._estimate), before]
         self._doubted_frame = None
         return self._estimate

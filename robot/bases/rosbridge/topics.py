@@ -58,11 +58,6 @@ class Topics:
         return Topic(RELAY_INPUT, self.order.kind) if self.own_timeout_s is None else None
 
     @property
-    def input(self) -> Topic:
-        """Where orders to move go."""
-        return self.relay or self.order
-
-    @property
     def published(self) -> list[Topic]:
         """All that we publish on."""
         topics = [self.order, self.relay, self.light, self.sound]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import random
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
 
 from robot.bases.drive_train import (
     DEAD_TIME_S,
@@ -14,10 +13,18 @@ from robot.bases.drive_train import (
     LAG_S,
     STICTION_M_S,
 )
+from robot.wire.frames import to_number
+
+T = TypeVar("T", int, float)
 
 
 class BadFault(ValueError):
     """A fault that does not exist, or a value outside its limits."""
+
+
+def _fault(default: T, least: float, most: float) -> T:
+    bounded: T = field(default=default, metadata={"bounds": (least, most)})
+    return bounded
 
 
 @dataclass
@@ -48,33 +55,32 @@ class Faults:
         How probable it is that AA 55 comes before a frame.
     """
 
-    bumper: int = 0
-    cliff: int = 0
-    wheel_drop: int = 0
-    over_current: int = 0
-    buttons: int = 0
-    charger: int = 0
-    battery_v: float = 16.7
-    left_scale: float = 1.0
-    right_scale: float = 1.0
-    drift_deg_min: float = DRIFT_DEG_MIN
-    gyro_noise_deg_s: float = GYRO_NOISE_DEG_S
-    dead_time_s: float = DEAD_TIME_S
-    lag_s: float = LAG_S
-    stiction_m_s: float = STICTION_M_S
-    held: float = 0.0
-    drop: float = 0.0
-    flip: float = 0.0
-    duplicate: float = 0.0
-    false_header: float = 0.0
+    bumper: int = _fault(0, 0, 7)
+    cliff: int = _fault(0, 0, 7)
+    wheel_drop: int = _fault(0, 0, 3)
+    over_current: int = _fault(0, 0, 3)
+    buttons: int = _fault(0, 0, 7)
+    charger: int = _fault(0, 0, 22)
+    battery_v: float = _fault(16.7, 0, 25.5)
+    left_scale: float = _fault(1.0, 0.5, 1.5)
+    right_scale: float = _fault(1.0, 0.5, 1.5)
+    drift_deg_min: float = _fault(DRIFT_DEG_MIN, -600, 600)
+    gyro_noise_deg_s: float = _fault(GYRO_NOISE_DEG_S, 0, 10)
+    dead_time_s: float = _fault(DEAD_TIME_S, 0, 1)
+    lag_s: float = _fault(LAG_S, 0, 1)
+    stiction_m_s: float = _fault(STICTION_M_S, 0, 0.1)
+    held: float = _fault(0.0, 0, 1)
+    drop: float = _fault(0.0, 0, 1)
+    flip: float = _fault(0.0, 0, 1)
+    duplicate: float = _fault(0.0, 0, 1)
+    false_header: float = _fault(0.0, 0, 1)
 
     def change(self, name: str, value: Any) -> Any:
         """Set a fault, and return its value before. Raises BadFault."""
         if name not in LIMITS:
             raise BadFault(f"{name} is no fault. There are: {', '.join(LIMITS)}.")
         least, most = LIMITS[name]
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not is_number or not math.isfinite(value) or not least <= value <= most:
+        if to_number(value, least, most) is None:
             raise BadFault(f"{name} is a number from {least:g} to {most:g}.")
         was = getattr(self, name)
         if isinstance(was, int) and value != int(value):
@@ -101,23 +107,5 @@ class Faults:
 
 # Name: least and largest value.
 LIMITS: dict[str, tuple[float, float]] = {
-    "bumper": (0, 7),
-    "cliff": (0, 7),
-    "wheel_drop": (0, 3),
-    "over_current": (0, 3),
-    "buttons": (0, 7),
-    "charger": (0, 22),
-    "battery_v": (0, 25.5),
-    "left_scale": (0.5, 1.5),
-    "right_scale": (0.5, 1.5),
-    "drift_deg_min": (-600, 600),
-    "gyro_noise_deg_s": (0, 10),
-    "dead_time_s": (0, 1),
-    "lag_s": (0, 1),
-    "stiction_m_s": (0, 0.1),
-    "held": (0, 1),
-    "drop": (0, 1),
-    "flip": (0, 1),
-    "duplicate": (0, 1),
-    "false_header": (0, 1),
+    fault.name: fault.metadata["bounds"] for fault in fields(Faults)
 }

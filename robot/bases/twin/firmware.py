@@ -154,11 +154,6 @@ class Firmware:
         frame = encode_feedback(self._feedback(left_m_s, right_m_s), short_versions=short)
         return faults.damage(frame, self._chance)
 
-    @property
-    def wheels_m_s(self) -> tuple[float, float]:
-        """Speeds that the wheels are held at, left and right [m/s]; none is above its largest."""
-        return self.drive_train.wheels_m_s
-
     def _order(self, control: BaseControl, now_s: float) -> None:
         self.control = control
         self.drive_train.order(slow_to_wheels(control_to_twist(control)).wheels_m_s, now_s)
@@ -237,13 +232,8 @@ class Firmware:
 
 
 def _cliff(floor_m: tuple[float, float, float]) -> int:
-    right_m, center_m, left_m = floor_m
-    cliff = SensorSide.RIGHT if right_m > CLIFF_M else 0
-    if center_m > CLIFF_M:
-        cliff |= SensorSide.CENTER
-    if left_m > CLIFF_M:
-        cliff |= SensorSide.LEFT
-    return cliff
+    sides = (SensorSide.RIGHT, SensorSide.CENTER, SensorSide.LEFT)
+    return sum(side for side, away_m in zip(sides, floor_m, strict=True) if away_m > CLIFF_M)
 
 
 def _voltage(away_m: float) -> int:

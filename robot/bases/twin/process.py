@@ -7,6 +7,7 @@ import math
 import queue
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -15,6 +16,7 @@ from robot.bases.twin.faults import BadFault
 from robot.bases.twin.firmware import Firmware
 from robot.bases.twin.lines import Line
 from robot.motion.pose import HOME
+from robot.wire.frames import to_number
 
 HELD_BYTES = 4096  # of a stalled line, as many as a pty keeps; the oldest are lost
 LATE_S = 0.1  # a twin that is later than this skips the time instead of catching up
@@ -139,15 +141,15 @@ class Twin:
 
     def _describe(self, now_s: float) -> dict[str, Any]:
         firmware = self.firmware
-        pose, control, reader = firmware.body.pose, firmware.control, firmware.reader
+        reader = firmware.reader
         seen = {
             "at_s": now_s,
             "body": type(firmware.body).__name__,
-            "pose": {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad},
+            "pose": asdict(firmware.body.pose),
             "farthest_m": self.farthest_m,
             "rolled_m": firmware.body.rolled_m,
-            "wheels_m_s": firmware.wheels_m_s,
-            "setpoint": control,
+            "wheels_m_s": firmware.drive_train.wheels_m_s,
+            "setpoint": firmware.control,
             "orders": [
                 (order.at_s, *order.control)
                 for order in firmware.orders
@@ -165,10 +167,10 @@ class Twin:
 
 
 def _number(order: Mapping[str, Any], name: str, least: float, most: float) -> float:
-    value = order.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+    value = to_number(order.get(name), least, most)
+    if value is None:
         raise BadFault(f"{name} is a number from {least:g} to {most:g}.")
-    return float(value)
+    return value
 
 
 def _seconds(order: Mapping[str, Any]) -> float:

@@ -13,10 +13,9 @@ from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
 from robot.simulation import SIMULATED_BASES
-from tests.support.driven_ros import open_base
 from tests.support.fake_kobuki import FakeKobuki
-from tests.support.fake_ros import FakeBase, FakeRosbridge, ServedRos, Ticking, release
 from tests.support.robot_stage import IdealBase
+from tests.support.rosbridge_stage import Stage as RosStage
 
 TICK_S = 0.02
 SIMULATED = ["null", "kinematic"]
@@ -61,10 +60,8 @@ class Stage:
 
     def ready(self):
         """Order it to stand until it may be ordered to move."""
-        if isinstance(self.clock, RealClock):
+        if not isinstance(self.clock, Clock):
             self.drive(STILL, 0.2)
-        if self.base.name == "rosbridge":
-            release(self.base)
         return self
 
 
@@ -92,13 +89,28 @@ def kobuki():
         yield Stage(base, clock)
 
 
+class RosClock:
+    """The clock of a bridge and its base, over no socket (tests/robot/ros has those)."""
+
+    def __init__(self, ros):
+        self.ros = ros
+
+    def __call__(self):
+        return self.ros.now_s
+
+    def wait(self, span_s):
+        for _ in range(round(span_s / TICK_S)):
+            self.ros.now_s += TICK_S
+            self.ros.pass_on()
+
+
 @contextmanager
 def rosbridge():
-    clock = RealClock()
-    bridge = FakeRosbridge()
-    robot = FakeBase(bridge.graph, time.monotonic)
-    with ServedRos(bridge) as served, Ticking(robot):
-        yield Stage(open_base(served.url), clock)
+    ros = RosStage()
+    ros.lose()
+    base: Any = ros.base
+    base.open, base.close = ros.connect, lambda: None
+    yield Stage(base, RosClock(ros))
 
 
 def is_still(there):
@@ -112,7 +124,7 @@ STAGES: dict[str, Any] = {
     "kobuki": kobuki,
     "rosbridge": rosbridge,
 }
-REAL_TIME = ("twin", "kobuki", "rosbridge")
+REAL_TIME = ("twin", "kobuki")
 NAMES = [pytest.param(name, marks=[pytest.mark.realtime] * (name in REAL_TIME)) for name in STAGES]
 
 
@@ -137,7 +149,9 @@ def test_each_base_is_tried_here():
 def test_its_name_and_abilities_are_its_own(closed):
     base = closed.base
     assert isinstance(base, BASES[base.name])
-    assert base.abilities.simulated or base.abilities.real_time  # no real one runs on our clock
+    # No program arms a real one, and none runs on our clock.
+    assert base.abilities.simulated == (base.name not in ("kobuki", "rosbridge"))
+    assert base.abilities.simulated or base.abilities.real_time
     assert base.abilities.moves or not base.abilities.bumpers
 
 

@@ -4,17 +4,15 @@ import pytest
 
 from robot.behavior.manual_drive import HOLDS_S, SPEED_M_S
 from robot.motion.pose import HOME
-from tests.support.robot_stage import FeelingBase, Stage
+from tests.support.robot_stage import WELCOME, FeelingBase, Stage
 
 AHEAD = {"type": "drive", "ahead": 1, "left": 0}
 
 
-def placed(**session):
+def placed():
     """Return a stage with an armed real base, whose session does not run."""
     stage = Stage(FeelingBase)
-    welcome = {"type": "welcome", "session": 7, "state": "paused", "stopped": False}
-    cue = {"above": None, "below": None, "threshold": 0.9, "window_s": 5, "rest_s": 5}
-    stage.hear(**(welcome | {"watched": True, "cue": cue | {"intensity": 1}} | session))
+    stage.hear(**WELCOME | {"state": "paused"})
     stage.hear(type="arm")
     stage.wait(0.1)
     return stage

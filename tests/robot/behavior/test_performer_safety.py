@@ -54,12 +54,6 @@ def test_quiet_gestures_make_no_sound(felt):
     assert not felt.base.played
 
 
-def test_an_intensity_of_0_is_off(felt):
-    felt.hear(type="cue", cue=CUE | {"intensity": 0})
-    felt.walk(*[1.0] * 6)
-    assert felt.of("decision")[0]["reason"] == "off"
-
-
 @pytest.mark.parametrize("hazard", ["bump", "cliff", "wheel_drop", "over_current", "restarted"])
 def test_what_it_feels_halts_it_at_the_next_tick_and_holds(felt, hazard):
     felt.walk(*[1.0] * 6)

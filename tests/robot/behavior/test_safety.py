@@ -243,10 +243,6 @@ def test_obstacles_pass_by_themselves():
     assert not watch.safety.latch
 
 
-def test_nobody_need_watch_a_simulation():
-    assert Safety(SIMULATED).blocking_reason(FINE) == ""
-
-
 def test_home():
     assert Safety.is_at_home(replace(FINE, pose=Pose(0.03, 0.03, math.tau + 0.08)))
     assert not Safety.is_at_home(replace(FINE, pose=Pose(0.04, 0.04, 0)))

@@ -35,11 +35,11 @@ def test_messages_ticks_and_reports_are_recorded(tmp_path):
     for second in range(7):
         watched.hear(type="step", number=1 + second, time_s=second, performance=1.0)
         watched.run(0.3)
-    assert watched.noted("heard")[0] == WELCOME
-    assert {"decision", "gesture", "status"} <= {one["kind"] for one in watched.noted("said")}
+    assert watched.noted("received")[0] == WELCOME
+    assert {"decision", "gesture", "status"} <= {one["kind"] for one in watched.noted("sent")}
     moving = [tick for tick in watched.noted("tick") if any(tick[:2])]
     assert moving
-    assert watched.noted("kept") == []
+    assert watched.noted("retained") == []
 
 
 def test_at_ease_it_records_a_tick_a_second(tmp_path):
@@ -63,7 +63,7 @@ def test_each_stop_is_kept_once_with_its_session(tmp_path):
     watched.hear(type="stop")
     watched.hear(type="stop")
     watched.run(0.2)
-    assert watched.noted("kept") == ["bump", "stopped"]
-    assert watched.box._keeping.reason == "bump"
-    assert watched.box._keeping.session == WELCOME["session"]
+    assert watched.noted("retained") == ["bump", "stopped"]
+    assert watched.box._retention.reason == "bump"
+    assert watched.box._retention.session == WELCOME["session"]
     assert any("bump" in one for one in watched.noted("hazards"))

@@ -39,8 +39,8 @@ def test_what_was_before_and_after_a_stop_is_kept_and_sent(tmp_path, clock):
         clock.now_s = 1000 + 0.1 * tick
         box.note(tick=[tick, 0, 0, 0, 0, 0, 0])
         if tick == 500:
-            box.keep("bump", 7)
-            box.keep("tether", 7)  # what follows from it
+            box.retain("bump", 7)
+            box.retain("tether", 7)  # what follows from it
         if not tick % 5:
             box.write()
     box.write()
@@ -49,7 +49,7 @@ def test_what_was_before_and_after_a_stop_is_kept_and_sent(tmp_path, clock):
     records = read_lines(file.read_text())
     ticks = [one["tick"][0] for one in records if "tick" in one]
     assert ticks == list(range(500 - int(10 * BEFORE_S), 500 + int(10 * AFTER_S) + 1))
-    assert [one["kept"] for one in records if "kept" in one] == ["bump", "tether"]
+    assert [one["retained"] for one in records if "retained" in one] == ["bump", "tether"]
     (incident,) = box.incidents
     assert (incident.reason, incident.session, incident.at_s) == ("bump", 7, pytest.approx(1050))
     assert unpack(incident.recording) == records
@@ -58,7 +58,7 @@ def test_what_was_before_and_after_a_stop_is_kept_and_sent(tmp_path, clock):
 def test_bytes_of_a_base_stay_in_its_own_file(tmp_path, clock):
     box = begun(tmp_path, clock)
     box.note(bytes="aa55")
-    box.keep("bump", 7)
+    box.retain("bump", 7)
     clock.now_s += AFTER_S
     box.write()
     assert "aa55" in kept_files(tmp_path)[0].read_text()
@@ -79,10 +79,10 @@ def test_a_day_of_records_takes_two_files_of_bounded_size(tmp_path, clock):
 
 
 def test_the_files_of_incidents_are_bounded_and_the_newest_stay(tmp_path, clock, monkeypatch):
-    monkeypatch.setattr(recorder, "KEPT_FILES", 3)
+    monkeypatch.setattr(recorder, "MAX_FILES", 3)
     box = begun(tmp_path, clock)
     for number in range(6):
-        box.keep(f"reason{number}", 7)
+        box.retain(f"reason{number}", 7)
         clock.now_s += AFTER_S
         box.write()
     assert [one.stem.rsplit("-", 1)[1] for one in kept_files(tmp_path)] == [
@@ -162,7 +162,7 @@ def test_one_that_closed_leaves_no_incident_but_what_it_had_to_keep(tmp_path):
     with BlackBox(tmp_path) as box:
         box.note(number=1)
     with BlackBox(tmp_path) as box:
-        box.keep("stopped", None)
+        box.retain("stopped", None)
     (file,) = kept_files(tmp_path)
     assert file.name.endswith("-stopped.jsonl")
     assert CLOSED in Ring(tmp_path).read()

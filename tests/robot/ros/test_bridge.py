@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +15,13 @@ import pytest
 
 from robot.bases import BaseLost
 from robot.bases.rosbridge.orders import IN_FLIGHT
-from robot.bases.rosbridge.topics import PROFILES
 from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
-from robot.original_topics import OriginalTopics
+from robot.original_topics import OriginalTopicClient, OriginalTopics
 from robot.play_gesture import main, play_gesture
 from robot.ros.bridge import TIMING, Bridge
 from tests.support.driven_ros import (
-    PLAIN,
     come_back,
     lose_while_moving,
     open_base,
@@ -166,25 +163,6 @@ def test_garbage_from_a_bridge_moves_nothing_and_is_outlived(ros, text):
     wait_until(lambda: not ros.robot.is_moving, 0.4)  # not by its own timeout
 
 
-class Silent:
-    """Says nothing."""
-
-    def open(self, now_s):
-        return ()
-
-    def due(self, now_s):
-        return ()
-
-    def end(self, now_s):
-        return ()
-
-    def handle(self, incoming, now_s):
-        pass
-
-    def disconnect(self, now_s):
-        pass
-
-
 def test_pauses_between_attempts_grow_to_five_seconds_and_no_further():
     pauses, enough = [], threading.Event()
 
@@ -195,7 +173,7 @@ def test_pauses_between_attempts_grow_to_five_seconds_and_no_further():
 
     with socket.create_server(("127.0.0.1", 0)) as nobody:
         url = f"ws://127.0.0.1:{nobody.getsockname()[1]}"
-    bridge = Bridge(Silent(), sleep=sleep, jitter=lambda: 0.0)
+    bridge = Bridge(OriginalTopicClient(["data"]), sleep=sleep, jitter=lambda: 0.0)
     bridge.open(url)
     assert enough.wait(10)
     bridge.close()
@@ -223,12 +201,6 @@ def test_it_stands_still_by_itself_when_whoever_orders_hangs(ros):
         time.sleep(0.25)
         wait_until(lambda: not ros.robot.is_moving, 0.2)
         assert base.counters["lapsed"] == 1
-
-
-def test_a_bumper_that_nobody_publishes_keeps_it_from_moving(ros):
-    topics = replace(PLAIN, sensors=PROFILES["kobuki"].sensors)
-    with open_base(ros.url, topics) as base:
-        wait_until(lambda: base.read().sensors.refusal == "feeler_missing")
 
 
 # --- the original's topics, at the same bridge --------------------------------------------------

@@ -172,20 +172,6 @@ def test_an_orientation_of_length_0_is_none():
         read_odometry(message)
 
 
-@pytest.mark.parametrize(
-    ("kind", "message", "event"),
-    [
-        ("kobuki_msgs/BumperEvent", {"bumper": 1, "state": 1}, (1, True)),
-        ("kobuki_msgs/BumperEvent", {"bumper": 2, "state": 0}, (2, False)),
-        ("kobuki_msgs/CliffEvent", {"sensor": 0, "state": 1, "bottom": 900}, (0, True)),
-        ("kobuki_msgs/WheelDropEvent", {"wheel": 1, "state": 1}, (1, True)),
-        ("std_msgs/Bool", {"data": True}, (0, True)),
-    ],
-)
-def test_an_event_is_read(kind, message, event):
-    assert read_event(kind, message) == event
-
-
 @given(ANYTHING)
 def test_no_message_does_more_than_be_refused(message):
     readers: list[Any] = [read_twist, read_odometry, read_hazards]

@@ -9,7 +9,7 @@ import pytest
 from robot.bases.base import Indication
 from robot.motion.twist import STILL, Twist
 from tests.support.fake_ros import WATCHDOG, is_still_message, load_watchdog, twist_message
-from tests.support.rosbridge_stage import OPEN, WATCHED, Stage, moving
+from tests.support.rosbridge_stage import WATCHED, Stage, moving
 
 FORWARD, STAND = twist_message(0.2, 0.0), twist_message(0.0, 0.0)
 HOLDS_S = load_watchdog().HOLDS_S
@@ -136,13 +136,6 @@ def test_where_the_relay_dies_we_stop_the_base_past_it(watched):
         watched.wait(0.02)
         assert watched.now_s - since_s < 0.35
     assert watched.performer.body.safety.latch in ("base_silent", "nobody_watches")
-
-
-def test_who_says_that_the_base_stops_by_itself_needs_no_relay():
-    stage = Stage(OPEN)
-    stage.wait(0.3, Twist(0.1, 0))
-    assert stage.robot.is_moving
-    assert stage.base.read().sensors.refusal == ""
 
 
 # --- what else a base by ROS does -----------------------------------------------------------------

@@ -42,6 +42,6 @@ def test_any_other_text_is_refused(text):
 
 
 def test_lines_that_are_no_records_are_left_out():
-    lines = b'{"at_s":1,"kept":"bump"}\n[]\n{"at_s":"x"}\n{"at_s":tru\n' + b"[" * 5000
+    lines = b'{"at_s":1,"retained":"bump"}\n[]\n{"at_s":"x"}\n{"at_s":tru\n' + b"[" * 5000
     packed = base64.b64encode(zlib.compress(lines)).decode()
-    assert unpack(packed) == [{"at_s": 1, "kept": "bump"}]
+    assert unpack(packed) == [{"at_s": 1, "retained": "bump"}]

@@ -18,7 +18,15 @@ from rehab.sessions.live.session import commits
 from rehab.sessions.live.session import writer as writers
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from tests.support.callers import Caller, Place, build_place, change, open_session, remember
+from tests.support.callers import (
+    Caller,
+    Place,
+    SourceCaller,
+    build_place,
+    change,
+    open_session,
+    remember,
+)
 
 
 class Stall:
@@ -124,6 +132,19 @@ def begun(ready: OpenSession) -> OpenSession:
     return begin
 
 
+@pytest.fixture
+def sourced(begun: OpenSession) -> Callable[..., Awaitable[tuple[TrainingSession, SourceCaller]]]:
+    """Return a function that makes a session that runs, and connects its source."""
+
+    async def begin(
+        place: Place, *args: Any, **options: Any
+    ) -> tuple[TrainingSession, SourceCaller]:
+        session = await begun(place, *args, **options)
+        return session, await place.source().open()
+
+    return begin
+
+
 @pytest.fixture(autouse=True)
 def quiet(caplog: pytest.LogCaptureFixture) -> None:
     """Keep the log for a look at it."""
@@ -134,10 +155,8 @@ def quiet(caplog: pytest.LogCaptureFixture) -> None:
 async def bystander(place, elsewhere, begun):
     """Another session that goes on whatever happens in this test."""
     session = await begun(elsewhere)
-    source = await elsewhere.source().dial()
-    await source.hello()
-    tablet = elsewhere.tablet(session)
-    await tablet.watch()
+    source = await elsewhere.source().open()
+    tablet = await elsewhere.tablet(session).open()
     await source.walk(4.0)
     yield session
     await source.walk(4.0, 2.0)

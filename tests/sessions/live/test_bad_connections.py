@@ -19,12 +19,10 @@ from tests.support.callers import (
 # --- too much, too little -------------------------------------------------------------------------
 
 
-async def test_a_flood_of_frames(place, begun, bystander, monkeypatch):
+async def test_a_flood_of_frames(place, sourced, bystander, monkeypatch):
     monkeypatch.setattr(base, "FRAME_BURST", 50.0)
     monkeypatch.setattr(base, "FRAMES_PER_S", 1.0)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(4.0)
     for _ in range(60):
         await source.say(a_step(1))
@@ -34,10 +32,8 @@ async def test_a_flood_of_frames(place, begun, bystander, monkeypatch):
     assert await numbers(session) == [1]
 
 
-async def test_a_flood_of_unacknowledged_steps(place, begun, bystander, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_flood_of_unacknowledged_steps(place, sourced, bystander, stall):
+    session, source = await sourced(place)
     stall.begin()
     await source.say({"type": "steps", "steps": [a_step(n) for n in range(1, 257)]})
     assert await source.overhear() == []
@@ -46,8 +42,7 @@ async def test_a_flood_of_unacknowledged_steps(place, begun, bystander, stall):
     assert (code, error["code"]) == (4029, "flood")
     assert "256" in error["message"]
     stall.end()
-    again = await place.source().dial()
-    await again.hello()
+    again = await place.source().open()
     await again.acked(256)
     assert await numbers(session) == list(range(1, 257))
 
@@ -64,9 +59,7 @@ async def test_silence_after_the_connection(place, monkeypatch, bystander):
 async def test_hello_ends_the_wait_for_it(place, begun, monkeypatch):
     monkeypatch.setattr(base.Socket, "first_frame_s", 0.2)
     await begun(place)
-    source, robot = await place.source().dial(), await place.robot().dial()
-    await source.hello()
-    await robot.hello()
+    source, robot = await place.source().open(), await place.robot().open()
     await asyncio.sleep(0.3)
     await source.walk(4.0)
     await robot.hear("step")

@@ -85,10 +85,8 @@ BAD_FRAMES: dict[str, Any] = {
 }
 
 
-async def test_frames_that_are_not_the_protocol(place, begun, bystander):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_frames_that_are_not_the_protocol(place, sourced, bystander):
+    session, source = await sourced(place)
     await source.walk(4.0)
     for name, bad in BAD_FRAMES.items():
         await source.say(bad)
@@ -172,15 +170,12 @@ async def test_what_is_no_hello_of_a_robot(place, begun, bystander):
 
 async def test_a_robots_bad_report_does_not_reach_the_monitor(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     for bad in ("1e999", "[" * 900 + "]" * 900):
-        robot = await place.robot().dial()
-        await robot.hello()
+        robot = await place.robot().open()
         await robot.say('{"type": "report", "report": {"x": ' + bad + "}}")
         assert (await robot.sent_away())[0] == 4400
-    robot = await place.robot().dial()
-    await robot.hello()
+    robot = await place.robot().open()
     await robot.say({"type": "report", "report": {"pose": [0, 1, 0.5], "word": "ok"}})
     report = await monitor.until(lambda event: event["kind"] == "robot")
     assert report["report"] == {"pose": [0, 1, 0.5], "word": "ok"}
@@ -205,10 +200,10 @@ async def test_what_pages_may_not_say(place, begun, bystander):
             code, error = await page.sent_away()
             assert code == 4400, bad
             assert len(error["message"]) > 15, bad
-    tablet = place.tablet(session)
-    await tablet.watch()
-    for kind in ("start", "resume", "finish", "abort", "goal"):
-        value = {"value": 5} if kind == "goal" else {}
+    tablet = await place.tablet(session).open()
+    values = {"goal": 5, "words_shown": 0, "chart_style": "line", "robot_intensity": 0}
+    for kind in ("start", "resume", "finish", "abort", "valence", *values):
+        value = {"value": values.get(kind, "binary")} if kind in {"valence", *values} else {}
         await tablet.say({"type": "change", "kind": kind, "id": kind, **value})
         refusal = await tablet.hear("error")
         assert (refusal["code"], refusal["id"]) == ("refused", kind)
@@ -224,10 +219,13 @@ async def test_what_pages_may_not_say(place, begun, bystander):
         {"kind": ["goal"], "id": "x"},
         {"kind": None, "id": "x"},
         {"kind": "goal", "value": 4, "id": "two words"},
+        {"kind": "feedback_text", "value": "Go!", "id": "x"},
+        {"kind": "valence", "value": None, "id": "x"},
+        {"kind": "valence", "value": 3, "id": "x"},
+        {"kind": "chart_style", "value": {}, "id": "x"},
     )
     for bad in changes:
-        monitor = place.monitor(session)
-        await monitor.watch()
+        monitor = await place.monitor(session).open()
         await monitor.say({"type": "change", **bad})
         code, error = await monitor.sent_away()
         assert code == 4400, bad
@@ -236,8 +234,7 @@ async def test_what_pages_may_not_say(place, begun, bystander):
 
 async def test_changes_that_cannot_be_are_refused_in_words(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     for kind, value, words in (
         ("goal", 0, "above 0"),
         ("goal", None, "needs a value"),
@@ -257,14 +254,10 @@ async def test_changes_that_cannot_be_are_refused_in_words(place, begun):
     assert monitor.code is None
 
 
-async def test_pages_whose_session_fails_are_told_to_come_back(place: Place, begun, bystander):
+async def test_pages_whose_session_fails_are_told_to_come_back(place: Place, sourced, bystander):
     """A number that was written behind the server's back: the session is rebuilt from its log."""
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
-    tablet, robot = place.tablet(session), await place.robot().dial()
-    await tablet.watch()
-    await robot.hello()
+    session, source = await sourced(place)
+    tablet, robot = await place.tablet(session).open(), await place.robot().open()
     await source.walk(4.0)
     first = await Step.everywhere.aget(session=session)
     first.pk, first.number, first.value = None, 2, 9.0
@@ -280,10 +273,8 @@ async def test_pages_whose_session_fails_are_told_to_come_back(place: Place, beg
     assert await numbers(session) == [1, 2, 3]
 
 
-async def test_a_source_is_let_into_no_session_that_was_dropped_meanwhile(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_source_is_let_into_no_session_that_was_dropped_meanwhile(place, sourced, stall):
+    session, source = await sourced(place)
     await source.walk(4.0)
     live = await runtimes.current().session(session.pk)
     stall.begin()
@@ -307,9 +298,7 @@ async def test_a_source_is_let_into_no_session_that_was_dropped_meanwhile(place,
 
 async def test_whoever_is_in_a_dropped_session_hears_of_its_end(place, begun, stall):
     session = await begun(place)
-    source, tablet = await place.source().dial(), place.tablet(session)
-    await source.hello()
-    await tablet.watch()
+    source, tablet = await place.source().open(), await place.tablet(session).open()
     await source.walk(4.0)
     del runtimes.current().sessions[session.pk]
     stall.problem = OperationalError("database is locked")

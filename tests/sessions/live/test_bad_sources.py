@@ -63,20 +63,8 @@ async def test_a_token_that_is_no_text(place):
 # --- sessions -------------------------------------------------------------------------------------
 
 
-async def test_another_clinics_session(place, begun, bystander):
-    source = await place.source().dial()
-    await source.say(
-        {"type": "hello", "version": 1, "run": "r", "last": 0, "session": bystander.pk}
-    )
-    code, error = await source.sent_away()
-    assert (code, error["code"]) == (4004, "no_session")
-    assert str(bystander.pk) in error["message"]
-
-
-async def test_a_finished_session_takes_no_more_steps(place, begun, bystander):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_finished_session_takes_no_more_steps(place, sourced, bystander):
+    session, source = await sourced(place)
     await source.walk(4.0)
     await change(session, "finish")
     await source.say(a_step(1, 4.0))  # what it has already is still acknowledged
@@ -98,8 +86,7 @@ async def test_a_finished_session_that_is_named_in_hello(place, begun):
 
 async def test_a_second_source_is_told_that_the_session_is_busy(place, begun, bystander):
     session = await begun(place)
-    first = await place.source().dial()
-    await first.hello()
+    first = await place.source().open()
     second = await SourceCaller(place.tokens["source 0"]).dial()
     await second.say({"type": "hello", "version": 1, "run": "r", "last": 0})
     code, error = await second.sent_away()
@@ -141,17 +128,14 @@ async def test_a_session_of_another_process(place, ready):
 # --- numbers --------------------------------------------------------------------------------------
 
 
-async def test_a_gap(place, begun, bystander):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_gap(place, sourced, bystander):
+    session, source = await sourced(place)
     await source.walk(4.0)
     await source.say({"type": "steps", "steps": [a_step(2), a_step(4)]})
     code, error = await source.sent_away()
     assert (code, error["code"]) == (4400, "gap")
     assert "send 3 next" in error["message"]
-    again = await place.source().dial()
-    await again.hello()
+    again = await place.source().open()
     await again.acked(2)
     assert await numbers(session) == [1, 2]
 
@@ -167,18 +151,15 @@ CONFLICTS: list[Message] = [
 ]
 
 
-async def test_the_same_number_with_other_content(place, begun, bystander):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_the_same_number_with_other_content(place, sourced, bystander):
+    session, source = await sourced(place)
     await source.walk(4.0, extra={"x": 1})
     for other in CONFLICTS:
         await source.say(a_step(1, 4.0, extra={"x": 1}) | other)
         code, error = await source.sent_away()
         assert (code, error["code"]) == (4400, "conflict"), other
         assert "counts from 2" in error["message"]
-        source = await place.source().dial()
-        await source.hello()
+        source = await place.source().open()
     assert await numbers(session) == [1]
     assert (await Step.everywhere.aget(session=session)).value == 4.0
 
@@ -197,10 +178,8 @@ DOUBTED: dict[str, Message] = {
 
 @pytest.mark.parametrize("paused", [False, True], ids=["running", "paused"])
 @pytest.mark.parametrize("sent", DOUBTED.values(), ids=list(DOUBTED))
-async def test_the_same_number_with_fewer_or_other_reasons(place, begun, sent, paused):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_the_same_number_with_fewer_or_other_reasons(place, sourced, sent, paused):
+    session, source = await sourced(place)
     await source.walk(4.0)
     if paused:
         await change(session, "pause")
@@ -216,8 +195,7 @@ async def test_the_same_number_with_fewer_or_other_reasons(place, begun, sent, p
         await source.say(step | {"reasons": other})
         code, error = await source.sent_away()
         assert (code, error["code"]) == (4400, "conflict"), other
-        source = await place.source().dial()
-        await source.hello()
+        source = await place.source().open()
         before = len(source.heard)
         await source.say(step)  # as it was: acknowledged again
         while source.heard[before:].count({"type": "ack", "number": 2}) < 1:
@@ -225,10 +203,8 @@ async def test_the_same_number_with_fewer_or_other_reasons(place, begun, sent, p
     assert await numbers(session) == [1, 2]
 
 
-async def test_other_content_while_the_first_is_on_its_way_to_the_disk(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_other_content_while_the_first_is_on_its_way_to_the_disk(place, sourced, stall):
+    session, source = await sourced(place)
     stall.begin()
     await source.say(a_step(1, 4.0))
     await source.say(a_step(1, 2.0))
@@ -239,14 +215,11 @@ async def test_other_content_while_the_first_is_on_its_way_to_the_disk(place, be
     assert (await Step.everywhere.aget(session=session)).value == 4.0
 
 
-async def test_a_source_that_begins_anew_from_1_is_told_to_count_on(place, begun, bystander):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_source_that_begins_anew_from_1_is_told_to_count_on(place, sourced, bystander):
+    session, source = await sourced(place)
     await source.walk(4.0, 4.1)
     await source.hang_up()
-    again = await place.source().dial()
-    await again.hello(run="r2")
+    again = await place.source().open(run="r2")
     await again.say(a_step(1, 3.3))
     code, error = await again.sent_away()
     assert (code, error["code"]) == (4400, "conflict")

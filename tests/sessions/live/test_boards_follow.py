@@ -22,15 +22,13 @@ from tests.support.world import NOW
 pytestmark = pytest.mark.postgres
 
 
-async def test_a_session_that_ends_waits_for_nobody_and_is_on_the_board(place, begun):
+async def test_a_session_that_ends_waits_for_nobody_and_is_on_the_board(place, sourced):
     board = await sync_to_async(board_of)(place.clinic, types="all", metric="steps")
     place.patient.boards = "clinic"
     await place.patient.asave()
     await sync_to_async(record_consent)(place.patient, Purpose.BOARDS, None, NOW, "clinic")
     assert await sync_to_async(figures_of)(board) == {}
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(4.0, 4.0)
     locked, release = threading.Event(), threading.Event()
 
@@ -56,14 +54,12 @@ async def test_a_session_that_ends_waits_for_nobody_and_is_on_the_board(place, b
             await asyncio.to_thread(somebody.join)
 
 
-async def test_trouble_with_boards_loses_no_step(place, begun, monkeypatch, caplog):
+async def test_trouble_with_boards_loses_no_step(place, sourced, monkeypatch, caplog):
     def fail(*_: object) -> None:
         raise ValueError("no board today")
 
     monkeypatch.setattr("rehab.boards.signals.record_changes", fail)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(4.0, 4.0)
     await change(session, ChangeKind.FINISH)
     ended = await TrainingSession.everywhere.aget(pk=session.pk)

@@ -22,21 +22,15 @@ from tests.support.callers import (
     turns,
 )
 
-PHASES = (
-    make_phase("training", strides=4),
-    make_phase("catch", strides=2),
-    make_phase("training", gain=0.9),
-)
-
 
 async def test_a_patient_hears_no_values_where_there_is_no_feedback(place, begun):
     session = await begun(place, make_phase("catch", strides=3), make_phase("training"))
-    tablet, monitor, robot = place.tablet(session), place.monitor(session), place.robot()
-    await tablet.watch()
-    await monitor.watch()
-    await (await robot.dial()).hello()
-    source = await place.source().dial()
-    await source.hello()
+    tablet, monitor, robot = (
+        await place.tablet(session).open(),
+        await place.monitor(session).open(),
+        await place.robot().open(),
+    )
+    source = await place.source().open()
     await source.walk(4.017, 2.0)
     await source.walk(4.0, side="right")
     await source.walk(None)
@@ -59,6 +53,7 @@ async def test_a_patient_hears_no_values_where_there_is_no_feedback(place, begun
     assert (await monitor.until_step(6))["reasons"] == ["out_of_bounds"]
     heard = await robot.hear("step")
     assert (heard["number"], heard["performance"]) == (7, pytest.approx(1.1))
+    assert (heard["shown"], heard["goal"]) == (3.3, 3.0)
     everything = str(tablet.heard)
     for secret in ("4.017", "'goal'", "code-elm", "25.0", "value"):
         assert secret not in everything
@@ -76,10 +71,8 @@ FEEDBACK: dict[str, list[tuple[Any, ...]]] = {
 @pytest.mark.parametrize("valence", FEEDBACK)
 async def test_a_step_carries_the_feedback_of_its_valence(place, begun, valence):
     session = await begun(place, valence=valence)
-    tablet = place.tablet(session)
-    await tablet.watch()
-    source = await place.source().dial()
-    await source.hello()
+    tablet = await place.tablet(session).open()
+    source = await place.source().open()
     await source.walk(3.6, 2.0)
     await tablet.until_step(2)
     for number, (points, score, emblem, streak) in enumerate(FEEDBACK[valence], start=1):
@@ -97,10 +90,8 @@ async def test_how_long_a_step_took_is_counted(place, begun):
         return REGISTRY.get_sample_value("garry_delivery_seconds_count") or 0.0
 
     session = await begun(place)
-    tablet = place.tablet(session)
-    await tablet.watch()
-    source = await place.source().dial()
-    await source.hello()
+    tablet = await place.tablet(session).open()
+    source = await place.source().open()
     before = count()
     await source.walk(3.6, 2.0)
     await tablet.until_step(2)
@@ -114,8 +105,7 @@ async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monke
     welcome = await robot.hello()
     assert welcome["cue"]["above"] == "celebrate"
     assert welcome["cue"]["threshold"] == 0.9
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     await robot.hear("heartbeat")
     await change(session, "activation_threshold", 0.8)
     assert (await robot.hear("cue"))["cue"]["threshold"] == 0.8
@@ -140,14 +130,6 @@ async def test_a_robot_waits_for_a_session_at_its_station(place, ready):
     assert (await robot.hear("welcome"))["session"] == session.pk
 
 
-async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
-    session = await begun(place)
-    tablet = place.tablet(session)
-    await tablet.watch()
-    await tablet.hear("heartbeat")
-
-
 async def test_robots_hear_heartbeats_in_parts_one_after_the_other(live_path, monkeypatch):
     """A thousand at once would hold up each step meanwhile."""
     runtime = runtimes.current()
@@ -155,7 +137,8 @@ async def test_robots_hear_heartbeats_in_parts_one_after_the_other(live_path, mo
     heard: list[tuple[int, str]] = []
 
     def make_robot(number: int) -> SimpleNamespace:
-        return SimpleNamespace(queue_text=lambda text: heard.append((number, text)))
+        outbox = SimpleNamespace(queue_text=lambda text: heard.append((number, text)))
+        return SimpleNamespace(outbox=outbox)
 
     robots = range(21, 21 + 7 * routines.PARTS)
     for number in range(1, robots.stop):
@@ -190,9 +173,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
         await database.wait()
 
     session = await begun(place)
-    robot, tablet = await place.robot().dial(), place.tablet(session)
-    await robot.hello()
-    await tablet.watch()
+    robot, tablet = await place.robot().open(), await place.tablet(session).open()
     monkeypatch.setattr(routines, "move_database_log", move_log)
     monkeypatch.setattr(routines, "extend_sign_ins", extend_sign_ins)
     monkeypatch.setattr(owners, "release", release)
@@ -222,8 +203,7 @@ async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, mo
         return failing
 
     session = await begun(place)
-    robot = await place.robot().dial()
-    await robot.hello()
+    robot = await place.robot().open()
     for name in ("move_database_log", "extend_sign_ins"):
         monkeypatch.setattr(routines, name, fail(name))
     with monkeypatch.context() as patch:

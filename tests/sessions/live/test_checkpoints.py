@@ -23,11 +23,9 @@ async def reread(session: TrainingSession) -> Any:
 
 
 @pytest.mark.parametrize(("steps", "kept"), [(9, None), (10, 10), (14, 10), (15, 15), (24, 20)])
-async def test_checkpoints_are_stored_and_used(place, begun, monkeypatch, steps, kept):
+async def test_checkpoints_are_stored_and_used(place, sourced, monkeypatch, steps, kept):
     monkeypatch.setattr(aggregates, "CHECKPOINT_STEPS", 10)
-    session = await begun(place, make_phase("training", strides=15), make_phase("catch"))
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place, make_phase("training", strides=15), make_phase("catch"))
     for number in range(1, steps + 1):
         await source.walk((4.0, 2.0, None)[number % 3])
         if number in (10, 12):
@@ -41,11 +39,9 @@ async def test_checkpoints_are_stored_and_used(place, begun, monkeypatch, steps,
     assert vars(rebuilt.fold) == vars(whole.fold) == vars(fold)
 
 
-async def test_what_a_checkpoint_has_is_not_read_again(place, begun, monkeypatch):
+async def test_what_a_checkpoint_has_is_not_read_again(place, sourced, monkeypatch):
     monkeypatch.setattr(aggregates, "CHECKPOINT_STEPS", 10)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(*[4.0] * 12)
     await source.hang_up()
     await restart()
@@ -56,11 +52,9 @@ async def test_what_a_checkpoint_has_is_not_read_again(place, begun, monkeypatch
     assert (await runtimes.current().session(session.pk)).aggregate.fold.score == 13
 
 
-async def test_an_ended_session_has_none(place, begun, monkeypatch):
+async def test_an_ended_session_has_none(place, sourced, monkeypatch):
     monkeypatch.setattr(aggregates, "CHECKPOINT_STEPS", 2)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(4.0, 4.0)
     assert (await reread(session)).checkpoint is not None
     await change(session, "finish")

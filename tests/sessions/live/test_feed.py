@@ -80,8 +80,7 @@ async def test_pages_have_a_heartbeat_each_interval_unless_they_were_just_sent_a
     for tablet in tablets:
         await tablet.hear("heartbeat")
         await tablet.hear("heartbeat")
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     live = await runtimes.current().session(sessions[0])
     page = next(one for one in live.feed.subscribers if one.audience is Audience.PATIENT)
     queued: list[str] = []

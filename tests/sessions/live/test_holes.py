@@ -22,10 +22,8 @@ async def lose_steps(session: TrainingSession, after: int) -> None:
     await TrainingSession.everywhere.filter(pk=session.pk).aupdate(last_number=after)
 
 
-async def test_a_lagging_failover_tears_no_hole_into_the_log(place, begun, bystander, caplog):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_lagging_failover_tears_no_hole_into_the_log(place, sourced, bystander, caplog):
+    session, source = await sourced(place)
     await source.walk(*[4.0] * 5)
     await lose_steps(session, after=3)
     await source.say(a_step(6))
@@ -39,10 +37,8 @@ async def test_a_lagging_failover_tears_no_hole_into_the_log(place, begun, bysta
     assert await numbers(session) == [1, 2, 3, 4, 5]
 
 
-async def test_a_step_that_is_gone_alone_is_missed_at_the_next_commit(place, begun, caplog):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_step_that_is_gone_alone_is_missed_at_the_next_commit(place, sourced, caplog):
+    session, source = await sourced(place)
     await source.walk(*[4.0] * 5)
     await Step.everywhere.filter(session=session, number=5).adelete()
     await source.say(a_step(6))
@@ -51,10 +47,8 @@ async def test_a_step_that_is_gone_alone_is_missed_at_the_next_commit(place, beg
     assert f"the log of session {session.pk} ends with step 4, before step 6" in caplog.text
 
 
-async def test_nothing_is_folded_over_a_hole(place, begun, caplog):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_nothing_is_folded_over_a_hole(place, sourced, caplog):
+    session, source = await sourced(place)
     await source.walk(*[4.0] * 5)
     await source.hang_up()
     await restart()
@@ -71,10 +65,8 @@ async def test_nothing_is_folded_over_a_hole(place, begun, caplog):
     assert session.pk not in runtimes.current().sessions
 
 
-async def test_a_log_that_lost_its_end_is_not_continued(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_log_that_lost_its_end_is_not_continued(place, sourced):
+    session, source = await sourced(place)
     await source.walk(*[4.0] * 5)
     await source.hang_up()
     await restart()
@@ -83,13 +75,11 @@ async def test_a_log_that_lost_its_end_is_not_continued(place, begun):
     assert (await tablet.sent_away())[1]["code"] == "damaged_log"
 
 
-async def test_a_logs_end_is_noted_with_changes_and_at_a_stop_and_never_lowered(place, begun):
+async def test_a_logs_end_is_noted_with_changes_and_at_a_stop_and_never_lowered(place, sourced):
     async def noted() -> int:
         return (await TrainingSession.everywhere.aget(pk=session.pk)).last_number
 
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(4.0, 4.0)
     await change(session, "pause")
     assert await noted() == 2

@@ -28,9 +28,7 @@ def stored():
 
 async def test_it_is_stored_with_its_session_and_told_to_the_monitor(place, begun):
     session = await begun(place)
-    robot, monitor = await place.robot().dial(), place.monitor(session)
-    await robot.hello()
-    await monitor.watch()
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
     await robot.say(incident(session))
     event = await monitor.until(lambda event: event.get("report", {}).get("kind") == "incident")
     (row,) = await stored()
@@ -42,8 +40,7 @@ async def test_it_is_stored_with_its_session_and_told_to_the_monitor(place, begu
 
 async def test_one_of_another_session_is_dropped(place, begun):
     session = await begun(place)
-    robot = await place.robot().dial()
-    await robot.hello()
+    robot = await place.robot().open()
     await robot.say(incident(session, session=session.pk + 1))
     await robot.say({"type": "report", "report": {"kind": "stop", "reason": "bump"}})
     await robot.hear("stop")
@@ -61,8 +58,7 @@ async def test_one_of_another_session_is_dropped(place, begun):
 )
 async def test_a_bad_one_is_refused_and_not_kept(place, begun, wrong):
     session = await begun(place)
-    robot = await place.robot().dial()
-    await robot.hello()
+    robot = await place.robot().open()
     await robot.say(incident(session, **wrong))
     code, error = await robot.sent_away()
     assert (code, error["code"]) == (4400, "bad_frame")
@@ -87,9 +83,7 @@ async def test_a_disk_that_takes_none_changes_nothing_else(place, begun, monkeyp
 
     monkeypatch.setattr("rehab.sessions.live.consumers.robot.store_incident", fail)
     session = await begun(place)
-    robot, monitor = await place.robot().dial(), place.monitor(session)
-    await robot.hello()
-    await monitor.watch()
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
     await robot.say(incident(session))
     await robot.say({"type": "report", "report": {"kind": "stop", "reason": "bump"}})
     await monitor.until(lambda event: event["kind"] == "robot_stopped")

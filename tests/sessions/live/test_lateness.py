@@ -73,12 +73,12 @@ async def test_steps_resent_after_a_minute_offline(place, begun, monkeypatch, te
     clock = SimpleNamespace(monotonic=lambda: now.s, time=lambda: now.s)
     monkeypatch.setattr(source_module, "time", clock)
     session = await begun(place)
-    tablet, monitor, robot = place.tablet(session), place.monitor(session), place.robot()
-    await tablet.watch()
-    await monitor.watch()
-    await (await robot.dial()).hello()
-    source = await place.source().dial()
-    await source.hello(**({"clock_s": 0.0} if tells_its_clock else {}))
+    tablet, monitor, robot = (
+        await place.tablet(session).open(),
+        await place.monitor(session).open(),
+        await place.robot().open(),
+    )
+    source = await place.source().open(**({"clock_s": 0.0} if tells_its_clock else {}))
     for number in range(1, 4):
         now.s = 1000.0 + number
         await source.walk(4.0, time_s=float(number))
@@ -109,11 +109,8 @@ async def test_steps_resent_after_a_minute_offline(place, begun, monkeypatch, te
 
 async def test_a_device_that_begins_anew_is_live_again_at_once(place, begun):
     session = await begun(place)
-    tablet, robot = place.tablet(session), place.robot()
-    await tablet.watch()
-    await (await robot.dial()).hello()
-    source = await place.source().dial()
-    await source.hello(clock_s=1000.0)
+    tablet, robot = await place.tablet(session).open(), await place.robot().open()
+    source = await place.source().open(clock_s=1000.0)
     for time_s in (1000.1, 1000.2, 1000.3, 0.1, 0.2, 0.3):
         await source.walk(4.0, time_s=time_s)
     await tablet.until_step(6)
@@ -134,11 +131,8 @@ async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
     monkeypatch.setattr(source_module, "time", clock)
     monkeypatch.setattr(orders, "time", clock)
     session = await begun(place)
-    tablet, robot = place.tablet(session), place.robot()
-    await tablet.watch()
-    await (await robot.dial()).hello()
-    source = await place.source().dial()
-    await source.hello(clock_s=0.0, **told)
+    tablet, robot = await place.tablet(session).open(), await place.robot().open()
+    source = await place.source().open(clock_s=0.0, **told)
     await source.walk(4.0, time_s=0.0)
     now.s += 5.0
     await change(session, "pause")
@@ -156,11 +150,8 @@ async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
 async def test_what_a_source_calls_late_is_never_live_and_tells_nothing_of_its_clock(place, begun):
     """A source that started again sends what its journal kept, by a clock that is gone."""
     session = await begun(place)
-    tablet, robot = place.tablet(session), place.robot()
-    await tablet.watch()
-    await (await robot.dial()).hello()
-    source = await place.source().dial()
-    await source.hello()
+    tablet, robot = await place.tablet(session).open(), await place.robot().open()
+    source = await place.source().open()
     kept = [a_step(n, 4.0, time_s=5000.0 + n) | {"late": True} for n in range(1, 4)]
     await source.say({"type": "steps", "steps": kept})
     await source.say({"type": "step"} | a_step(4, 4.0, time_s=5004.0) | {"late": True})

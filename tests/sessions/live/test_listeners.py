@@ -16,46 +16,11 @@ from rehab.people.sign_in.browser_sessions import digest_of
 from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import (
-    Message,
     MonitorPage,
     PatientPage,
-    build_place,
     change,
     sign_in,
 )
-
-
-async def test_who_may_open_which_page(place, elsewhere, begun):
-    session = await begun(place)
-    neighbor = await sync_to_async(build_place)("neighbor", place.clinic)
-    tries: list[tuple[Message, int | None, int | None]] = [
-        ({}, 4001, 4001),
-        ({"token": "wrong"}, 4001, 4001),
-    ]
-    for role, user in place.people.items():
-        closed = None if role in (Role.LEAD, Role.PT) else 4004
-        tries.append(({"user": user}, closed, closed))
-    tries += [({"user": user}, 4004, 4004) for user in elsewhere.people.values()]
-    tries += [
-        ({"token": place.tokens["tablet"]}, None, 4004),
-        ({"token": place.tokens["source"]}, 4004, 4004),
-        ({"token": place.tokens["robot"]}, 4004, 4004),
-    ]
-    for other in (neighbor, elsewhere):
-        tries += [({"token": token}, 4004, 4004) for token in other.tokens.values()]
-    tries.append(({"user": neighbor.pt}, None, None))
-    for options, patient, monitor in tries:
-        for kind, expected in ((PatientPage, patient), (MonitorPage, monitor)):
-            page = kind(session.pk, **options)
-            if expected is None:
-                await page.watch()
-                await page.hang_up()
-            else:
-                await page.dial()
-                code, error = await page.sent_away()
-                assert code == expected, (options, kind)
-                assert error["message"]
-                assert len(page.heard) == 1
 
 
 async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(place, begun):
@@ -135,13 +100,9 @@ async def test_a_switched_off_account_opens_nothing(place, begun):
 async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkeypatch):
     monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
-    source, robot = await place.source().dial(), await place.robot().dial()
-    await source.hello()
-    await robot.hello()
-    tablet, monitor = place.tablet(session), place.monitor(session)
-    other = MonitorPage(session.pk, user=place.people[Role.LEAD])
-    for page in (tablet, monitor, other):
-        await page.watch()
+    source, robot = await place.source().open(), await place.robot().open()
+    tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
+    other = await MonitorPage(session.pk, user=place.people[Role.LEAD]).open()
     for name in ("source", "tablet"):  # one revoked, one renewed
         device = place.devices[name]
         if name == "source":
@@ -168,8 +129,7 @@ async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, rea
         await asyncio.sleep(0.001)
     assert (await runtime.session(session.pk)) is not live
     monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 60)
-    tablet = place.tablet(session)
-    await tablet.watch()
+    tablet = await place.tablet(session).open()
     await change(session, "start")
     await tablet.until(lambda event: event["kind"] == "state")
     await tablet.hang_up()

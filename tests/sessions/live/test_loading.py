@@ -73,7 +73,7 @@ def test_sessions_loaded_together_are_what_each_is_alone():
         stored = TrainingSession.everywhere.get(pk=session.pk)
         stored.checkpoint = None
         assert vars(one.aggregate.fold) == vars(SessionAggregate.load(stored).fold)
-        assert plain(one) == plain(loading.load(session.pk))
+        assert plain(one) == plain(loaded([session.pk])[session.pk])
         assert stored.owner == owners.own_name()
     assert [together[key].robot_stopped for key in keys] == [False, False, False, True]
     assert [len(together[key].recent) for key in keys] == [60, 5, 9, 0]

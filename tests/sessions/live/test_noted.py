@@ -42,9 +42,8 @@ async def noted(count: int) -> list[tuple[Any, ...]]:
 
 async def test_a_page_that_watches_is_noted_when_it_connects(place, begun):
     session = await begun(place)
-    monitor, tablet = place.monitor(session), place.tablet(session)
-    await monitor.watch()
-    await tablet.watch()
+    for page in (place.monitor(session), place.tablet(session)):
+        await page.open()
     by_person, by_tablet = sorted(await noted(2), key=lambda row: row[1] is None)
     about = f"/ws/session/{session.pk}/"
     assert by_person == (Act.VIEW, place.pt.pk, "", session.patient_id, f"{about}monitor/")
@@ -56,8 +55,7 @@ async def test_a_page_that_watches_is_noted_when_it_connects(place, begun):
 async def test_a_page_that_connects_again_is_not_noted_again(place, begun):
     session = await begun(place)
     for _ in range(3):
-        monitor = place.monitor(session)
-        await monitor.watch()
+        monitor = await place.monitor(session).open()
         await monitor.hang_up()
     await monitor.overhear()
     assert len(await noted(1)) == 1
@@ -65,8 +63,7 @@ async def test_a_page_that_connects_again_is_not_noted_again(place, begun):
 
 async def test_who_stops_and_arms_the_robot_is_noted_each_time(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     for order in (STOP, ARM, STOP):
         await monitor.say(order)
     acts = [row[0] for row in (await noted(4))]
@@ -75,8 +72,7 @@ async def test_who_stops_and_arms_the_robot_is_noted_each_time(place, begun):
 
 async def test_a_tablets_stops_in_some_minutes_are_one_entry_with_their_number(place, begun):
     session = await begun(place)
-    tablet = place.tablet(session)
-    await tablet.watch()
+    tablet = await place.tablet(session).open()
     for _ in range(3):
         for _ in range(20):
             await tablet.say(STOP)
@@ -89,8 +85,7 @@ async def test_a_tablets_stops_in_some_minutes_are_one_entry_with_their_number(p
 
 async def test_an_order_is_noted_though_its_page_is_gone_at_once(place, begun):
     session = await begun(place)
-    tablet = place.tablet(session)
-    await tablet.watch()
+    tablet = await place.tablet(session).open()
     await tablet.say(STOP)
     await tablet.hang_up()
     assert (await noted(2))[-1][0] == Act.ROBOT_STOP
@@ -103,10 +98,11 @@ async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, be
     monkeypatch.setattr(AuditEntry.everywhere, "bulk_create", fail)
     monkeypatch.setattr(audit_log.log, "exception", lambda *args: None)
     session = await begun(place)
-    robot, monitor, source = place.robot(), place.monitor(session), place.source()
-    await (await robot.dial()).hello()
-    await monitor.watch()
-    await (await source.dial()).hello()
+    robot, monitor, source = (
+        await place.robot().open(),
+        await place.monitor(session).open(),
+        await place.source().open(),
+    )
     await source.walk(4.0)
     await monitor.say(STOP)
     assert await robot.hear("stop") == {"type": "stop"}
@@ -126,8 +122,7 @@ async def test_entries_wait_while_the_database_is_away(place, begun, monkeypatch
     monkeypatch.setattr(notes_module, "RETRY_S", 0.001)
     monkeypatch.setattr(notes_module, "_store", try_to_store)
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     while len(tries) < 2:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     await monitor.say(STOP)
@@ -153,7 +148,6 @@ async def test_after_a_log_that_could_not_be_written_it_goes_on(place, begun, mo
         await place.monitor(session).watch()
         await runtimes.current().audit_queue.join()
     assert len(missed) == 1
-    tablet = place.tablet(session)
-    await tablet.watch()
+    tablet = await place.tablet(session).open()
     await tablet.say(STOP)
     assert [row[0] for row in await noted(2)] == [Act.VIEW, Act.ROBOT_STOP]

@@ -11,12 +11,11 @@ import subprocess
 import sys
 import threading
 from collections.abc import Collection
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
-from django.db import DatabaseError, connection
+from django.db import DatabaseError
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
@@ -95,38 +94,6 @@ async def test_of_two_that_claim_a_session_at_once_one_has_it(place, ready, monk
     assert refused
 
 
-async def test_of_many_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
-    process, count = call_processes(monkeypatch), 4
-    for _ in range(5):
-        session = await ready(place, at_station=False)
-        together = threading.Barrier(count)
-
-        def claim(
-            number: int, pk: int = session.pk, together: threading.Barrier = together
-        ) -> int | None:
-            process.name = f"process|{number}|0"
-            mine = TrainingSession.everywhere.get(pk=pk)
-            together.wait(10)
-            try:
-                owners.claim(mine)
-            except owners.OwnedElsewhere:
-                return None
-            else:
-                return mine.epoch
-            finally:
-                connection.close()
-
-        with ThreadPoolExecutor(count) as threads:
-            epochs = await asyncio.gather(
-                *(
-                    asyncio.get_running_loop().run_in_executor(threads, claim, n)
-                    for n in range(count)
-                )
-            )
-        assert [epoch for epoch in epochs if epoch is not None] == [session.epoch + 1]
-        await own(session, "")
-
-
 FAKE_PS = """#!/bin/sh
 test "$*" = "-o lstart= -p {pid}" || exit 1
 echo "$LC_ALL $TZ  {when}  "
@@ -185,8 +152,7 @@ async def test_a_session_is_claimed_from_the_dead_and_given_up_at_the_drain(plac
 async def left_running(place: Any, begun: Any, steps: int) -> TrainingSession:
     """Leave a session as a process that was killed leaves it."""
     session: TrainingSession = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     await source.walk(*[4.0] * steps)
     await source.hang_up()
     await runtimes.current().drain()
@@ -320,10 +286,8 @@ async def test_a_session_that_opens_again_while_it_is_closed_is_handed_on(
     assert (await reread(session)).owner == owners.HANDED_ON
 
 
-async def test_the_drain_commits_and_closes_every_socket_with_4012(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_the_drain_commits_and_closes_every_socket_with_4012(place, sourced, stall):
+    session, source = await sourced(place)
     callers = [place.tablet(session), place.monitor(session), place.robot()]
     for caller in callers:
         await caller.dial()

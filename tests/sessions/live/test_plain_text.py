@@ -70,8 +70,7 @@ async def test_the_time_of_plain_text_never_runs_backwards(place, begun, monkeyp
 
 async def test_a_robot_answers_plain_text(place, begun):
     await begun(place)
-    robot = await place.robot().dial()
-    await robot.hello()
+    robot = await place.robot().open()
     source = await place.source().dial()
     await source.say("4.02, 3.0")
     step = await robot.hear("step")
@@ -83,10 +82,8 @@ async def test_a_robot_answers_plain_text(place, begun):
 
 async def test_the_pts_goal_wins_and_another_one_is_shown_to_the_pt(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
-    tablet = place.tablet(session)
-    await tablet.watch()
+    monitor = await place.monitor(session).open()
+    tablet = await place.tablet(session).open()
     source = await place.source().dial()
     await source.say("3.5, 3.0")
     await source.acked(1)

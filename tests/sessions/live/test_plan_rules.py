@@ -65,9 +65,7 @@ async def test_a_close_step_is_told_to_people_and_not_to_the_robot(place, begun)
 
 async def test_a_phase_without_the_robot_sends_it_no_steps(place, begun):
     await begun(place, make_phase("training", strides=1, robot=False), TRAINING)
-    robot, source = await place.robot().dial(), await place.source().dial()
-    await robot.hello()
-    await source.hello()
+    robot, source = await place.robot().open(), await place.source().open()
     await source.walk(4.0, 5.0)
     assert (await robot.hear("step"))["number"] == 2
 
@@ -79,8 +77,7 @@ async def test_an_automatic_goal_is_told_logged_and_found_again(place, begun):
         adaptation=GoalAdaptation(AdaptationMode.AUTOMATIC, strides=5),
         target=Target(0.6),
     )
-    source, monitor = await place.source().dial(), place.monitor(session)
-    await source.hello()
+    source, monitor = await place.source().open(), place.monitor(session)
     assert (await monitor.watch())["goal_adaptation"] == "automatic"
     await source.walk(*[4.0] * 6)
     goal = 3.0 * (1 + 0.005 * 2)
@@ -121,8 +118,7 @@ async def test_a_baseline_tells_the_therapist_mean_sd_and_count(place, begun):
         TRAINING,
         goal=GoalRule(percent_of_baseline=110, asks=True),
     )
-    source, monitor = await place.source().dial(), place.monitor(session)
-    await source.hello()
+    source, monitor = await place.source().open(), place.monitor(session)
     assert (await monitor.watch())["baseline"]["count"] == 0
     await source.walk(3.0, None, 5.0)
     baseline = (await monitor.until_step(3))["baseline"]
@@ -146,12 +142,8 @@ async def test_a_baseline_tells_the_therapist_mean_sd_and_count(place, begun):
 async def test_a_planned_rest_pauses_everyone_until_the_therapist_goes_on(place, begun):
     rested = make_phase("training", strides=2, rest_s=90)
     session = await begun(place, rested, TRAINING)
-    source, robot = await place.source().dial(), await place.robot().dial()
-    monitor, tablet = place.monitor(session), place.tablet(session)
-    await source.hello()
-    await robot.hello()
-    await monitor.watch()
-    await tablet.watch()
+    source, robot = await place.source().open(), await place.robot().open()
+    monitor, tablet = await place.monitor(session).open(), await place.tablet(session).open()
     await source.walk(4.0, 4.0)
     paused = await monitor.until(lambda event: event.get("state") == "paused")
     assert (paused["pause_reason"], paused["rest_s"]) == ("rest", 90)
@@ -175,9 +167,7 @@ async def test_a_planned_rest_pauses_everyone_until_the_therapist_goes_on(place,
 
 async def test_every_third_step_is_told_and_the_score_counts_them_all(place, begun):
     session = await begun(place, TRAINING, schedule=Schedule(interval=3))
-    source, tablet = await place.source().dial(), place.tablet(session)
-    await source.hello()
-    await tablet.watch()
+    source, tablet = await place.source().open(), await place.tablet(session).open()
     await source.walk(4.0, 2.0, 4.0, 2.0)
     await tablet.until_step(4)
     told = [event for event in tablet.events if "number" in event]
@@ -190,9 +180,7 @@ async def test_every_third_step_is_told_and_the_score_counts_them_all(place, beg
 
 async def test_a_summary_tells_hits_mean_and_points_of_its_block(place, begun):
     session = await begun(place, TRAINING, schedule=Schedule(ScheduleKind.SUMMARY, 4))
-    source, tablet = await place.source().dial(), place.tablet(session)
-    await source.hello()
-    await tablet.watch()
+    source, tablet = await place.source().open(), await place.tablet(session).open()
     await source.walk(6.0, 3.0, None, 1.5, 6.0)
     told = await tablet.until_step(5)
     assert told["summary"] == {"hits": 3, "steps": 4, "close": 0}
@@ -204,10 +192,11 @@ async def test_a_summary_tells_hits_mean_and_points_of_its_block(place, begun):
 
 async def test_a_summary_over_a_change_of_type_tells_the_points_that_were_earned(place, begun):
     session = await begun(place, TRAINING, schedule=Schedule(ScheduleKind.SUMMARY, 4))
-    source, tablet, monitor = place.source(), place.tablet(session), place.monitor(session)
-    await (await source.dial()).hello()
-    await tablet.watch()
-    await monitor.watch()
+    source, tablet, monitor = (
+        await place.source().open(),
+        await place.tablet(session).open(),
+        await place.monitor(session).open(),
+    )
     await source.walk(6.0, 6.0)  # one point each
     await monitor.change("valence_now", "negative")
     await source.walk(1.5, 6.0)  # one is taken

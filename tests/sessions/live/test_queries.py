@@ -11,7 +11,7 @@ from django.test.utils import CaptureQueriesContext
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.protocol.backlog import PAGE_STEPS
 from rehab.sessions.live.session.aggregate import SessionAggregate
-from rehab.sessions.live.session.loading import find_newest_open, load
+from rehab.sessions.live.session.loading import LoadedSession, find_newest_open, load_together
 from rehab.sessions.log import RobotEntry, Step
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
@@ -19,6 +19,13 @@ from tests.support.callers import build_place, open_session
 from tests.support.world import NOW, store
 
 pytestmark = pytest.mark.django_db
+
+
+def load(session_id: int) -> LoadedSession:
+    found = load_together([session_id])[session_id]
+    assert isinstance(found, LoadedSession)
+    return found
+
 
 GROWING = {"rehab_step", "rehab_sessionevent", "rehab_trainingsession", "rehab_sessionmetric"}
 

@@ -146,7 +146,7 @@ def test_no_browser_is_sent_what_is_no_json():
     assert to_text({"value": math.nan}) == '{"value":null}'
 
 
-async def test_a_step_is_recorded_at_once_only_in_its_turn(place, begun, monkeypatch):
+async def test_a_step_is_recorded_at_once_only_in_its_turn(place, sourced, monkeypatch):
     """In its turn: the next number, nothing before it in the queue, nobody who subscribes."""
     taken: list[tuple[str, bool]] = []
     handle_now = SourceConsumer.handle_now
@@ -156,9 +156,7 @@ async def test_a_step_is_recorded_at_once_only_in_its_turn(place, begun, monkeyp
         return taken[-1][1]
 
     monkeypatch.setattr(SourceConsumer, "handle_now", note)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     await source.walk(4.0)
     assert taken[-1] == ("step", True)
     live = await runtimes.current().session(session.pk)
@@ -166,8 +164,7 @@ async def test_a_step_is_recorded_at_once_only_in_its_turn(place, begun, monkeyp
     await source.say({**step, "number": 1})  # stored with another time: a conflict, as ever
     assert taken[-1] == ("step", False)
     assert (await source.sent_away())[1]["code"] == "conflict"
-    source = await place.source().dial()
-    await source.hello(last=1)
+    source = await place.source().open(last=1)
     with live.gate.closed():
         await source.say({**step, "number": 2})
         await source.say({**step, "number": 3})

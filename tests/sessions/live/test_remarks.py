@@ -24,10 +24,8 @@ PHASES = (
 
 async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewhere):
     """In the thread and context of a request, as Django runs its views."""
-    source = await place.source().dial()
-    await source.hello()
-    robot = await place.robot().dial()
-    await robot.hello()
+    source = await place.source().open()
+    robot = await place.robot().open()
 
     def view():
         session = create_session(
@@ -54,14 +52,14 @@ async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewher
     assert runtimes.current().sessions[session.pk].aggregate.fold.goal == 4.0
 
 
-async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, sourced):
+    session, source = await sourced(place)
     await source.walk(4.0, 4.0)
-    monitor, other, tablet = place.monitor(session), place.monitor(session), place.tablet(session)
-    for page in (monitor, other, tablet):
-        await page.watch()
+    monitor, other, tablet = (
+        await place.monitor(session).open(),
+        await place.monitor(session).open(),
+        await place.tablet(session).open(),
+    )
     for index, what in enumerate(Remark):
         value = {"value": 3} if what in REMARK_RANGES else {}
         await monitor.say({"type": "remark", "what": what.value, "id": f"r{index}", **value})
@@ -87,9 +85,7 @@ async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, begun):
 
 async def test_what_cannot_be_noted(place, begun):
     session = await begun(place)
-    tablet, monitor = place.tablet(session), place.monitor(session)
-    for page in (tablet, monitor):
-        await page.watch()
+    tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
     await tablet.say({"type": "remark", "what": "pain", "id": "r"})
     assert (await tablet.hear("error"))["code"] == "refused"
     await change(session, "abort")
@@ -102,7 +98,6 @@ async def test_what_cannot_be_noted(place, begun):
         {"what": "fall_severity", "value": 4},
         {},
     ):
-        page = place.monitor(session)
-        await page.watch()
+        page = await place.monitor(session).open()
         await page.say({"type": "remark", "id": "r", **bad})
         assert (await page.sent_away())[0] == 4400

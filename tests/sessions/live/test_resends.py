@@ -15,10 +15,8 @@ STAMP = 1_760_000_000_123_456_789  # nanoseconds: more digits than a float has
 
 
 @pytest.mark.parametrize("value", [STAMP, float(STAMP), -STAMP, 1e300, 0.1, 5, 5.0])
-async def test_the_same_extra_is_the_same(place, begun, value):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_the_same_extra_is_the_same(place, sourced, value):
+    session, source = await sourced(place)
     await source.walk(4.0, extra={"x": value})
     stored = (await Step.everywhere.aget(session=session)).extra["x"]
     assert stored == value if isinstance(value, int) else float(stored) == value
@@ -33,17 +31,14 @@ async def test_the_same_extra_is_the_same(place, begun, value):
 
 async def test_a_neighbor_of_a_long_number_is_another_one(place, begun):
     await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     await source.walk(4.0, extra={"x": STAMP})
     await source.say(a_step(1, 4.0, extra={"x": STAMP + 1}))
     assert (await source.sent_away())[1]["code"] == "conflict"
 
 
-async def test_a_number_that_could_not_be_kept_is_refused_with_the_cure(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_number_that_could_not_be_kept_is_refused_with_the_cure(place, sourced):
+    session, source = await sourced(place)
     await source.say(a_step(1, 4.0, extra={"x": 2**63}))
     code, error = await source.sent_away()
     assert code == 4400

@@ -11,9 +11,7 @@ DRIVE: Message = {"type": "robot", "order": "drive", "ahead": 1, "left": -0.5}
 
 async def test_what_a_held_button_orders_reaches_the_robot(place, ready):
     session = await ready(place)
-    robot, monitor = await place.robot().dial(), place.monitor(session)
-    await robot.hello()
-    await monitor.watch()
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
     await monitor.say(DRIVE)
     told = await robot.hear("drive")
     assert told == {"type": "drive", "ahead": 1, "left": -0.5}
@@ -21,9 +19,7 @@ async def test_what_a_held_button_orders_reaches_the_robot(place, ready):
 
 async def test_the_patient_s_page_drives_nothing(place, ready):
     session = await ready(place)
-    robot, tablet = await place.robot().dial(), place.tablet(session)
-    await robot.hello()
-    await tablet.watch()
+    robot, tablet = await place.robot().open(), await place.tablet(session).open()
     await tablet.say(DRIVE)
     assert (await tablet.sent_away())[0] == 4400
     assert "drive" not in [message["type"] for message in await robot.overhear()]
@@ -34,7 +30,6 @@ async def test_the_patient_s_page_drives_nothing(place, ready):
 )
 async def test_a_drive_that_is_none_is_refused(place, ready, bad):
     session = await ready(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     await monitor.say(DRIVE | bad)
     assert (await monitor.sent_away())[0] == 4400

@@ -56,10 +56,8 @@ async def test_anyone_stops_the_robot_and_only_a_person_arms_it(place, begun):
 @pytest.mark.parametrize("message", [ARM, {"type": "robot"}, {"type": "robot", "order": "dance"}])
 async def test_a_patients_page_only_stops(place, begun, message):
     session = await begun(place)
-    robot = await place.robot().dial()
-    await robot.hello()
-    tablet = place.tablet(session)
-    await tablet.watch()
+    await place.robot().open()
+    tablet = await place.tablet(session).open()
     await tablet.say(message)
     code, error = await tablet.sent_away()
     assert (code, "stop" in error["message"]) == (4400, True)
@@ -68,8 +66,7 @@ async def test_a_patients_page_only_stops(place, begun, message):
 
 async def test_a_stop_holds_over_robots_servers_and_sessions(place, begun, ready):
     session = await begun(place)
-    tablet = place.tablet(session)
-    await tablet.watch()
+    tablet = await place.tablet(session).open()
     await tablet.say(STOP)  # nobody there to hear it
     await tablet.until(is_stopped(True))
     robot = await place.robot().dial()
@@ -98,8 +95,7 @@ async def test_a_stop_holds_over_robots_servers_and_sessions(place, begun, ready
 
 
 async def test_a_robot_at_another_station_is_another_robot(place, elsewhere, begun):
-    monitor = place.monitor(await begun(place))
-    await monitor.watch()
+    monitor = await place.monitor(await begun(place)).open()
     await monitor.say(STOP)
     await monitor.until(is_stopped(True))
     assert (await elsewhere.monitor(await begun(elsewhere)).watch())["robot_stopped"] is False
@@ -107,8 +103,7 @@ async def test_a_robot_at_another_station_is_another_robot(place, elsewhere, beg
 
 async def test_a_page_of_an_ended_session_stops_the_robot_all_the_same(place, begun, ready):
     old = await begun(place)
-    tablet = place.tablet(old)
-    await tablet.watch()
+    tablet = await place.tablet(old).open()
     await change(old, "finish")
     new = await ready(place)
     robot, monitor = await place.robot().dial(), place.monitor(new)
@@ -124,11 +119,8 @@ async def test_a_page_of_an_ended_session_stops_the_robot_all_the_same(place, be
 
 async def test_a_stop_waits_for_no_disk_and_overtakes_an_arming(place, begun, stall):
     session = await begun(place)
-    robot = await place.robot().dial()
-    await robot.hello()
-    tablet, monitor = place.tablet(session), place.monitor(session)
-    await tablet.watch()
-    await monitor.watch()
+    robot = await place.robot().open()
+    tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
     stall.begin()
     await tablet.say(STOP)
     await robot.hear("stop")  # before it is in the log
@@ -160,9 +152,7 @@ def break_disk(patch: pytest.MonkeyPatch, session_id: int | None = None) -> None
 
 async def test_a_stop_that_could_not_be_stored_holds_and_is_stored_later(place, begun, monkeypatch):
     session = await begun(place)
-    robot, tablet = await place.robot().dial(), place.tablet(session)
-    await robot.hello()
-    await tablet.watch()
+    robot, tablet = await place.robot().open(), await place.tablet(session).open()
     with monkeypatch.context() as patch:
         break_disk(patch)
         await tablet.say(STOP)
@@ -183,9 +173,7 @@ async def test_a_stop_that_could_not_be_stored_holds_and_is_stored_later(place, 
 
 async def test_a_stop_holds_where_it_and_the_arming_after_it_are_lost(place, begun, monkeypatch):
     session = await begun(place)
-    robot, monitor = await place.robot().dial(), place.monitor(session)
-    await robot.hello()
-    await monitor.watch()
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
     with monkeypatch.context() as patch:
         break_disk(patch)
         await monitor.say(STOP)
@@ -204,8 +192,7 @@ async def test_a_stop_holds_in_a_session_that_is_loaded_before_it_is_stored(
     place, begun, ready, stall
 ):
     first, second = await begun(place), await ready(place, beside=True)
-    tablet = place.tablet(first)
-    await tablet.watch()
+    tablet = await place.tablet(first).open()
     stall.begin()
     await tablet.say(STOP)
     await turns()
@@ -323,9 +310,7 @@ ASKED = [
 @pytest.mark.parametrize("asked", ASKED, ids=["goal", "pause", "remark"])
 async def test_a_stop_waits_for_nothing_that_its_page_asked_for_before(place, begun, stall, asked):
     session = await begun(place)
-    robot, monitor = await place.robot().dial(), place.monitor(session)
-    await robot.hello()
-    await monitor.watch()
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
     stall.begin()
     await monitor.say(asked)
     await turns()
@@ -345,9 +330,7 @@ async def test_a_stop_waits_for_no_source_that_ends_with_its_session(place, begu
         await ended.wait()
 
     monkeypatch.setattr(runtimes.current().supervisor, "stop", end_slowly)
-    robot, monitor = await place.robot().dial(), place.monitor(session)
-    await robot.hello()
-    await monitor.watch()
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
     await monitor.say({"type": "change", "kind": "finish", "id": "x"})
     await robot.hear("state")
     await monitor.say(STOP)

@@ -60,12 +60,10 @@ def connected_device(row):
 
 
 async def test_a_token_that_was_stored_and_not_said_back_is_good(place):
-    source = await place.source().dial()
-    await source.hello(rotates=True)
+    source = await place.source().open(rotates=True)
     token = (await source.hear("token"))["token"]
     await source.hang_up()
-    again = await SourceCaller(token).dial()
-    await again.hello(rotates=True)
+    again = await SourceCaller(token).open(rotates=True)
     assert not [m for m in await again.overhear() if m["type"] == "token"]
     assert await find(place.tokens["source"], timezone.now()) is None
 
@@ -93,8 +91,7 @@ def test_who_says_a_token_back_and_connects_by_it_at_once_is_let_in(place, monke
 
 async def test_a_token_that_was_not_stored_leaves_the_old_one_good(place):
     for _ in range(2):
-        source = await place.source().dial()
-        await source.hello(rotates=True)
+        source = await place.source().open(rotates=True)
         token = (await source.hear("token"))["token"]
         await source.hang_up()
     assert await find(token, timezone.now()) is not None
@@ -122,16 +119,13 @@ async def test_a_session_that_opens_meanwhile_brings_no_second_token(place, monk
 
 
 async def test_who_cannot_store_a_token_keeps_its_own(place):
-    source, robot = await place.source().dial(), await place.robot().dial()
-    await source.hello()
-    await robot.hello()
+    source, robot = await place.source().open(), await place.robot().open()
     assert not [m for m in await source.overhear() if m["type"] == "token"]
     assert not [m for m in await robot.overhear() if m["type"] == "token"]
 
 
 async def test_a_token_that_was_not_given_is_refused(place):
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     await source.say({"type": "token", "token": "mine"})
     code, error = await source.sent_away()
     assert (code, error["code"]) == (4400, "token")
@@ -156,14 +150,12 @@ async def test_one_that_nobody_used_for_long_has_expired(place):
     assert "expired" in await sync_to_async(format_device_state)(row, now)
     token = row.new_token()  # what the admin does
     await row.asave()
-    robot = await RobotCaller(token).dial()
-    await robot.hello()
+    await RobotCaller(token).open()
 
 
 async def test_who_stole_a_token_and_was_first_shuts_its_owner_out(place):
     """And so is found out: the owner's stops with 4001, and the state says why."""
-    thief = await place.source().dial()
-    await thief.hello(rotates=True)
+    thief = await place.source().open(rotates=True)
     await thief.say({"type": "token", "token": (await thief.hear("token"))["token"]})
     await thief.overhear()
     owner = await place.source().dial()

@@ -38,8 +38,7 @@ async def minutes_left(key: str) -> float:
 async def test_a_running_training_keeps_its_therapist_signed_in(place, begun, settings):
     settings.SESSION_MINUTES = 30
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     await end_in(sign_in(place.pt), 1)
     while await minutes_left(sign_in(place.pt)) < 29:
         await monitor.hear("heartbeat")
@@ -54,8 +53,7 @@ async def test_a_running_training_keeps_its_therapist_signed_in(place, begun, se
 async def test_a_working_day_ends_though_a_training_runs(place, begun, settings):
     session = await begun(place)
     store = await sync_to_async(_signed_in_since)(sign_in(place.pt), 11.9, settings)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    await place.monitor(session).open()
     await runtimes.current().routines.check_sign_ins()
     assert await minutes_left(store) <= 6
 
@@ -82,8 +80,7 @@ async def test_tablets_of_open_sessions_are_asked_for_together(place, begun, mon
 
 
 async def test_a_new_password_ends_open_sockets(place, begun):
-    monitor = place.monitor(await begun(place))
-    await monitor.watch()
+    monitor = await place.monitor(await begun(place)).open()
     place.pt.set_password("walk well again 2026")
     await place.pt.asave()
     assert (await monitor.sent_away())[0] == 4001
@@ -91,8 +88,7 @@ async def test_a_new_password_ends_open_sockets(place, begun):
 
 @pytest.mark.parametrize("change", ["role", "clinic"])
 async def test_other_rights_end_open_sockets(place, begun, change):
-    monitor = place.monitor(await begun(place))
-    await monitor.watch()
+    monitor = await place.monitor(await begun(place)).open()
     if change == "role":
         place.pt.role = Role.RESEARCHER
     else:
@@ -103,8 +99,7 @@ async def test_other_rights_end_open_sockets(place, begun, change):
 
 async def test_a_clinic_that_comes_to_ask_for_a_second_factor_closes_sockets(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     await Clinic.everywhere.filter(pk=place.clinic.pk).aupdate(second_factor_required=True)
     assert (await monitor.sent_away())[0] == 4001
     again = await place.monitor(session).dial()

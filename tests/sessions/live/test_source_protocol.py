@@ -54,10 +54,8 @@ async def test_a_token_may_come_in_the_first_frame(place, begun):
     await source.walk(4.0)
 
 
-async def test_several_steps_in_one_frame_are_acked_together(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_several_steps_in_one_frame_are_acked_together(place, sourced):
+    session, source = await sourced(place)
     steps = [a_step(n, None if n == 2 else 4.0, reasons=["slip"] * (n == 3)) for n in range(1, 257)]
     await source.say({"type": "steps", "steps": steps})
     await source.acked(256)
@@ -66,10 +64,8 @@ async def test_several_steps_in_one_frame_are_acked_together(place, begun):
     assert stored[1:3] == [(2, False, ["missing"]), (3, False, ["slip"])]
 
 
-async def test_an_ack_comes_after_the_commit(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_an_ack_comes_after_the_commit(place, sourced, stall):
+    session, source = await sourced(place)
     stall.begin()
     await source.say(a_step(1))
     assert await source.overhear() == []
@@ -108,10 +104,8 @@ async def test_the_server_says_start_pause_resume_goal_phase_and_stop(place, rea
     assert source.code is None
 
 
-async def test_stop_is_said_once_and_not_before_it_is_committed(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_stop_is_said_once_and_not_before_it_is_committed(place, sourced, stall):
+    session, source = await sourced(place)
     live = await runtimes.current().session(session.pk)
     stall.begin()
     goal = live.change(Change(ChangeKind.GOAL, 3.5), None, NOW)
@@ -145,8 +139,7 @@ async def test_a_source_hears_of_a_goal_and_a_phase_that_steps_brought_about(pla
 
 async def test_steps_before_start_are_refused_and_the_socket_stays_open(place, ready):
     session = await ready(place)
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     await source.say(a_step(1))
     error = await source.hear("error")
     assert (error["code"], "Wait for start" in error["message"]) == ("not_running", True)
@@ -155,10 +148,8 @@ async def test_steps_before_start_are_refused_and_the_socket_stays_open(place, r
     await source.walk(4.0)
 
 
-async def test_steps_of_a_paused_session_are_stored_as_invalid(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_steps_of_a_paused_session_are_stored_as_invalid(place, sourced):
+    session, source = await sourced(place)
     await source.walk(4.0)
     await change(session, "pause")
     await source.walk(4.0)
@@ -194,8 +185,7 @@ async def test_a_source_that_waits_at_its_station_is_welcomed_when_a_session_ope
 
 async def test_a_session_opened_before_the_last_one_ended_is_taken_up_after_it(place, begun, ready):
     first = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     second = await ready(place, beside=True)
     await turns()
     await source.walk(4.0)
@@ -212,10 +202,8 @@ async def test_a_source_may_name_one_of_its_stations_sessions(place, begun, read
     assert (await source.hello(session=named.pk))["session"] == named.pk
 
 
-async def test_the_same_step_again_is_acked_again(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_the_same_step_again_is_acked_again(place, sourced):
+    session, source = await sourced(place)
     await source.walk(4.0, 2.0, 3.0)
     await source.say(a_step(2, 2.0))
     assert await source.hear() == {"type": "ack", "number": 3}
@@ -243,10 +231,8 @@ async def test_a_measure_may_be_an_extra_value_of_the_steps(place, begun):
     assert (await source.hear())["code"] == "conflict"
 
 
-async def test_the_same_step_again_while_it_is_on_its_way_is_no_error(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_the_same_step_again_while_it_is_on_its_way_is_no_error(place, sourced, stall):
+    session, source = await sourced(place)
     stall.begin()
     for _ in range(3):
         await source.say(a_step(1))
@@ -257,10 +243,8 @@ async def test_the_same_step_again_while_it_is_on_its_way_is_no_error(place, beg
     assert await rows(session, "number") == [1]
 
 
-async def test_steps_are_sent_again_after_a_dropped_connection(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_steps_are_sent_again_after_a_dropped_connection(place, sourced, stall):
+    session, source = await sourced(place)
     await source.walk(4.0, 4.1)
     stall.begin()
     await source.say(a_step(3, 4.2))
@@ -286,8 +270,7 @@ async def test_presence_is_told_to_the_monitor(place, begun):
     session = await begun(place)
     monitor = place.monitor(session)
     assert (await monitor.watch())["presence"]["source"] is False
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["source"])
     await source.hang_up()
     await monitor.until(lambda e: e["kind"] == "presence" and not e["presence"]["source"])
@@ -307,10 +290,8 @@ async def test_a_client_that_sent_nothing_but_its_token_may_wait_for_the_patient
 
 async def test_who_changed_what_is_in_the_log(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
-    source = await place.source().dial()
-    await source.hello()
+    monitor = await place.monitor(session).open()
+    source = await place.source().open()
     await source.walk(4.0)
     assert (await monitor.change("goal", 4.5))["type"] == "done"
     refused = await monitor.change("goal", 99)

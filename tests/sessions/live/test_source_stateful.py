@@ -74,7 +74,7 @@ def acknowledge_before_the_commit(monkeypatch: pytest.MonkeyPatch) -> None:
     def take_and_acknowledge(self: LiveSession, measurement: Measurement, *args: Any, **more: Any):
         take(self, measurement, *args, **more)
         if self.source is not None:
-            self.source.acknowledge(measurement.number)
+            self.source.outbox.acknowledge(measurement.number)
 
     monkeypatch.setattr(LiveSession, "record_step", take_and_acknowledge)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 
-import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.people.models import Clinic, User
@@ -90,8 +89,7 @@ async def test_a_robot_that_was_silenced_stays_so_in_every_type(place, ready):
 
 async def test_without_a_further_phase_the_type_stays(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     answer = await monitor.change("valence", "negative")
     assert answer["code"] == "refused"
     assert "No phase with feedback follows" in answer["message"]
@@ -103,8 +101,7 @@ async def test_without_a_further_phase_the_type_stays(place, begun):
 async def test_a_refusal_is_said_in_the_language_of_its_page(place, begun):
     await Clinic.everywhere.filter(pk=place.clinic.pk).aupdate(language="es")
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     answer = await monitor.change("start")
     assert answer["message"] == (
         "Una sesión en marcha no admite el cambio «inicio»; debe estar lista."
@@ -112,8 +109,7 @@ async def test_a_refusal_is_said_in_the_language_of_its_page(place, begun):
     answer = await monitor.change("gain", 0.25)
     assert answer["message"] == "No se puede usar una ganancia de 0,25. Dé una de 0,5 a 1,5."
     await User.everywhere.filter(pk=place.pt.pk).aupdate(language="en")
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     assert "A gain of 0.25 cannot be used" in (await monitor.change("gain", 0.25))["message"]
 
 
@@ -155,32 +151,9 @@ async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place,
     ]
 
 
-@pytest.mark.parametrize(
-    ("kind", "value"),
-    [("feedback_text", "Go!"), ("valence", None), ("valence", 3), ("chart_style", {})],
-)
-async def test_what_is_no_change_of_a_page_is_not_the_protocol(place, begun, kind, value):
-    monitor = place.monitor(await begun(place))
-    await monitor.watch()
-    await monitor.say({"type": "change", "kind": kind, "value": value, "id": "x"})
-    code, _ = await monitor.sent_away()
-    assert code == 4400
-
-
-async def test_a_tablet_changes_none_of_it(place, begun):
-    session = await begun(place)
-    tablet = place.tablet(session)
-    await tablet.watch()
-    for kind, value in (("words_shown", 0), ("chart_style", "line"), ("valence", "binary")):
-        await tablet.say({"type": "change", "kind": kind, "value": value, "id": kind})
-        assert (await tablet.hear("error"))["code"] == "refused"
-
-
 async def test_pages_hear_who_paused_a_session(place, begun):
     session = await begun(place)
-    tablet, monitor = place.tablet(session), place.monitor(session)
-    await tablet.watch()
-    await monitor.watch()
+    tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
     await monitor.change("pause")
     heard = await tablet.until(lambda event: event["kind"] == "state")
     assert (heard["state"], heard["pause_reason"]) == ("paused", "therapist")
@@ -202,8 +175,7 @@ async def test_the_monitor_hears_how_long_sensor_and_tablet_are_silent(place, be
     monitor = place.monitor(session)
     there = (await monitor.watch())["presence"]
     assert (there["stride_ago_s"], there["tablets"], there["tablet_ago_s"]) == (None, 0, None)
-    source, tablet = await place.source().dial(), place.tablet(session)
-    await source.hello()
+    source, tablet = await place.source().open(), place.tablet(session)
     await source.walk(4.0)
     seen = await tablet.watch()
     assert seen["presence"] == {"source": True, "robot": False}  # no concern of the patient's
@@ -231,8 +203,7 @@ async def test_a_plan_from_before_today_runs_on(place, begun):
 
 async def test_what_a_page_asks_for_takes_effect_in_its_order(place, begun, stall):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     stall.begin()
     await monitor.say({"type": "change", "kind": "goal", "value": 2.0, "id": "first"})
     await turns()
@@ -285,8 +256,7 @@ async def take_frame(text):
 
 async def test_what_was_asked_is_done_though_the_page_goes_at_once(place, begun):
     session = await begun(place)
-    monitor = place.monitor(session)
-    await monitor.watch()
+    monitor = await place.monitor(session).open()
     await monitor.say({"type": "change", "kind": "pause", "id": "x"})
     await monitor.hang_up()
     await runtime.current().drain()

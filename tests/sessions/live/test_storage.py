@@ -56,8 +56,7 @@ async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeyp
     monitor, robot = place.monitor(session), await place.robot().dial()
     assert (await monitor.watch())["presence"]["storage"] == ""
     assert (await robot.hello())["state"] == "running"
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     monkeypatch.setattr(writers, "LATE_S", 0.05)
     stall.begin()
     await source.say(a_step(1))
@@ -76,11 +75,9 @@ async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeyp
     assert "Steps are stored again." in caplog.text
 
 
-async def test_a_full_disk_is_said_in_words(place, begun, stall, monkeypatch):
+async def test_a_full_disk_is_said_in_words(place, sourced, stall, monkeypatch):
     monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.01)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     stall.problem = OperationalError("database or disk is full")
     await source.say(a_step(1))
     code, error = await source.sent_away()
@@ -89,8 +86,7 @@ async def test_a_full_disk_is_said_in_words(place, begun, stall, monkeypatch):
     assert "Make room" in (await health())[1]
     assert (await place.monitor(session).watch())["presence"]["storage"] == "disk_full"
     stall.problem = None
-    again = await place.source().dial()
-    await again.hello()
+    again = await place.source().open()
     await again.walk(4.0)
     assert await health() == (200, "ok\n")
 
@@ -117,10 +113,8 @@ async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_th
     assert (await health("/readyz"))[0] == 503
 
 
-async def test_a_stride_counts_as_heard_when_it_is_stored(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_stride_counts_as_heard_when_it_is_stored(place, sourced, stall):
+    session, source = await sourced(place)
     live = await runtimes.current().session(session.pk)
     stall.begin()
     await source.say(a_step(1))
@@ -189,9 +183,7 @@ async def test_a_locked_session_holds_up_no_other_for_long(place, elsewhere, beg
     monkeypatch.setattr(writers, "LOCK_TIMEOUT_MS", 200)
     session = await begun(place)
     other = await begun(elsewhere)
-    mine, theirs = await place.source().dial(), await elsewhere.source().dial()
-    await mine.hello()
-    await theirs.hello()
+    mine, theirs = await place.source().open(), await elsewhere.source().open()
     with locked(session):
         await mine.say(a_step(1))
         await theirs.say(a_step(1))

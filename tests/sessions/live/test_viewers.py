@@ -71,9 +71,7 @@ async def test_a_tablet_hears_no_session_from_before_the_last_one(place, ready):
 async def test_a_tablet_hears_an_ended_session_until_the_next_one_starts(place, ready):
     session = await ready(place)
     await change(session, "start")
-    tablet, monitor = place.tablet(session), place.monitor(session)
-    for page in (tablet, monitor):
-        await page.watch()
+    tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
     await change(session, "finish")
     await runtimes.current().routines.check_sign_ins()
     await tablet.overhear()
@@ -89,8 +87,7 @@ async def test_a_tablet_hears_an_ended_session_until_the_next_one_starts(place, 
 async def test_snapshot_and_events_give_a_fresh_snapshot(place, ready, valence):
     chance = random.Random(f"live {valence}")
     session = await ready(place, *PHASES, valence=valence)
-    source = await place.source().dial()
-    await source.hello()
+    source = await place.source().open()
     pages = [place.tablet(session), place.monitor(session)]
     for page in pages:
         await page.watch()
@@ -127,10 +124,8 @@ async def test_snapshot_and_events_give_a_fresh_snapshot(place, ready, valence):
                 await fresh.hang_up()
 
 
-async def test_after_gives_exactly_the_missing_steps_once(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_after_gives_exactly_the_missing_steps_once(place, sourced):
+    session, source = await sourced(place)
     count = 600
     for first in range(1, count, 200):
         await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})
@@ -147,8 +142,7 @@ async def test_after_gives_exactly_the_missing_steps_once(place, begun):
         got = [step["number"] for frame in frames for step in frame["steps"]]
         assert got == list(range(after + 1, count + 1))
         assert [frame["frame"] for frame in frames] == list(range(1, len(frames) + 1))
-    up_to_date = place.tablet(session, f"?after={count}")
-    await up_to_date.watch()
+    up_to_date = await place.tablet(session, f"?after={count}").open()
     source.number = count
     await source.walk(4.0)
     await up_to_date.until_step(count + 1)
@@ -156,20 +150,16 @@ async def test_after_gives_exactly_the_missing_steps_once(place, begun):
 
 
 @pytest.mark.long
-async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
+async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, sourced):
     """A page asks for 5,000 steps and reads slowly; a page beside it notices nothing."""
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     count = 5_000
     for first in range(1, count, 200):
         await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})
         await source.acked(first + 199)
     source.number = count
-    beside = place.monitor(session)
-    await beside.watch()
-    slow = place.tablet(session, "?after=0")
-    await slow.watch()
+    beside = await place.monitor(session).open()
+    slow = await place.tablet(session, "?after=0").open()
     while len(frames_of_past(slow)) < hub.MAX_UNCONFIRMED_BACKLOG:
         await slow.hear("steps")
     await source.walk(*[4.0] * 20)
@@ -185,16 +175,13 @@ async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
     assert numbers_of(slow) == list(range(1, count + 21))
 
 
-async def test_a_page_that_reads_none_of_its_past_is_let_go(place, begun, monkeypatch):
+async def test_a_page_that_reads_none_of_its_past_is_let_go(place, sourced, monkeypatch):
     monkeypatch.setattr(hub, "CONFIRM_TIMEOUT_S", 0.05)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+    session, source = await sourced(place)
     for first in range(1, 2000, 200):
         await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})
         await source.acked(first + 199)
-    page = place.tablet(session, "?after=0")
-    await page.watch()
+    page = await place.tablet(session, "?after=0").open()
     code, error = await page.sent_away()
     assert (code, error["code"]) == (4008, "unseen")
     live = await runtimes.current().session(session.pk)
@@ -210,10 +197,8 @@ def numbers_of(page: Page) -> list[int]:
     return old + page.steps
 
 
-async def test_nothing_is_missed_or_doubled_when_a_page_joins_under_way(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_nothing_is_missed_or_doubled_when_a_page_joins_under_way(place, sourced):
+    session, source = await sourced(place)
     pages = []
     for number in range(1, 60):
         await source.say(a_step(number))
@@ -231,13 +216,9 @@ async def test_nothing_is_missed_or_doubled_when_a_page_joins_under_way(place, b
         assert old == list(range(1, snapshot["number"] + 1))
 
 
-async def test_nothing_is_shown_before_it_is_committed(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
-    tablet, robot = place.tablet(session), await place.robot().dial()
-    await tablet.watch()
-    await robot.hello()
+async def test_nothing_is_shown_before_it_is_committed(place, sourced, stall):
+    session, source = await sourced(place)
+    tablet, robot = await place.tablet(session).open(), await place.robot().open()
     await turns()
     stall.begin()
     await source.say(a_step(1))
@@ -253,10 +234,8 @@ async def test_nothing_is_shown_before_it_is_committed(place, begun, stall):
     assert (await late_comer.hear("snapshot"))["number"] == 1
 
 
-async def test_a_slow_page_gets_fewer_and_larger_frames(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_slow_page_gets_fewer_and_larger_frames(place, sourced):
+    session, source = await sourced(place)
     slow, quick = place.tablet(session), place.monitor(session)
     slow.confirms = False
     await slow.watch()
@@ -275,14 +254,10 @@ async def test_a_slow_page_gets_fewer_and_larger_frames(place, begun):
     assert slow.steps == quick.steps == list(range(1, source.number + 1))
 
 
-async def test_a_page_that_confirms_nothing_is_sent_away_alone(place, begun, monkeypatch):
+async def test_a_page_that_confirms_nothing_is_sent_away_alone(place, sourced, monkeypatch):
     monkeypatch.setattr(hub, "CONFIRM_TIMEOUT_S", 0.02)
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
-    deaf, quick = place.tablet(session), place.monitor(session)
-    await deaf.watch()
-    await quick.watch()
+    session, source = await sourced(place)
+    deaf, quick = await place.tablet(session).open(), await place.monitor(session).open()
     for _ in range(hub.MAX_UNCONFIRMED + 2):
         await source.walk(4.0)
         await quick.until_step(source.number)
@@ -295,10 +270,8 @@ async def test_a_page_that_confirms_nothing_is_sent_away_alone(place, begun, mon
     assert len(live.feed.subscribers) == 1
 
 
-async def test_a_page_that_lags_beyond_the_ring_begins_anew(place, begun):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
+async def test_a_page_that_lags_beyond_the_ring_begins_anew(place, sourced):
+    session, source = await sourced(place)
     slow = place.tablet(session)
     slow.confirms = False
     await slow.watch()

@@ -89,9 +89,9 @@ class DeviceSocket(Socket):
             raise CloseSocket(
                 CloseCode.UNAUTHORIZED,
                 "token",
-                f"This opens no {self.kind.value}. Take the {self.kind.value}'s token from the "
-                'admin, and send it in the header "Authorization: Bearer …" or as "token" in the '
-                "first frame.",
+                f"This is no valid token of a {self.kind.value}. Take the {self.kind.value}'s "
+                'token from the admin, and send it in the header "Authorization: Bearer …" or as '
+                '"token" in the first frame.',
             )
         self.actor = self.device = actor
         return actor
@@ -107,7 +107,9 @@ class DeviceSocket(Socket):
     async def join_station(self, session_id: int | None) -> None:
         """Attach the device to its station's open session, or wait for one."""
         if self.hello_received:
-            raise BadFrame("One hello a socket; connect again to begin anew.", "hello_again")
+            raise BadFrame(
+                "Send hello once per connection; reconnect to start over.", "hello_again"
+            )
         self.hello_received = True
         self._first_frame_timer.cancel()
         device = self._authorize(self.device)
@@ -162,18 +164,6 @@ class DeviceSocket(Socket):
         setattr(live, self.slot, self)
         live.announce_presence(timezone.now())
         await self.on_attach(live)
-
-    def queue(self, message: Message) -> None:
-        """Queue a message for the device."""
-        self.outbox.queue(message)
-
-    def queue_text(self, text: str) -> None:
-        """Queue a message that is a frame's text already."""
-        self.outbox.queue_text(text)
-
-    def acknowledge(self, number: int) -> None:
-        """Queue the acknowledgment of the steps up to this one."""
-        self.outbox.acknowledge(number)
 
     def evict(self, code: int, error: str, message: str) -> None:
         """Close soon, with an error."""

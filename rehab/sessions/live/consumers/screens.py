@@ -122,7 +122,7 @@ class ScreenConsumer(Socket):
                 raise CloseSocket(
                     CloseCode.UNCONFIRMED,
                     "unseen",
-                    "The page confirms nothing. Connect again with ?after=.",
+                    "The page does not confirm its frames. Reconnect with ?after=.",
                 ) from None
             except Lagged:
                 after = None

@@ -108,11 +108,11 @@ class SourceConsumer(DeviceSocket):
             }
         )
         if live.committed:
-            self.acknowledge(live.committed)
+            self.outbox.acknowledge(live.committed)
 
     async def _handle_steps(self, steps: list[tuple[Measurement, bool]]) -> None:
         if not self.hello_received:
-            raise BadFrame("Say hello first.", "no_hello")
+            raise BadFrame("Send hello first.", "no_hello")
         live = self.live
         if live is None:
             await self._send_error(
@@ -130,7 +130,7 @@ class SourceConsumer(DeviceSocket):
                 )
             elif live.aggregate.fold.state in ENDED_STATES:
                 raise CloseSocket(
-                    CloseCode.ENDED, "ended", "The session has ended; it takes no more steps."
+                    CloseCode.ENDED, "ended", "The session has ended; it accepts no more steps."
                 )
             elif live.aggregate.fold.state is State.READY:
                 await self._send_error(
@@ -146,11 +146,11 @@ class SourceConsumer(DeviceSocket):
             await live.wait_until_committed()
         if not await is_duplicate(live.id, measurement, live.aggregate.fold.plan.measure):
             raise BadFrame(
-                f"Step {measurement.number} is stored with other content. A source that begins "
-                f"anew takes a new run and counts from {live.next_number}.",
+                f"Step {measurement.number} is stored with other content. A source that starts "
+                f"over takes a new run and counts from {live.next_number}.",
                 "conflict",
             )
-        self.acknowledge(live.committed)
+        self.outbox.acknowledge(live.committed)
 
     async def _handle_plain(self, value: float | None, goal: float | None) -> None:
         """Record a plain-text step: the server numbers and times it; the PT's goal counts."""
@@ -191,5 +191,7 @@ def _check_open_steps(live: LiveSession) -> None:
     """Check that a source waits for its steps to be stored. Raises CloseSocket."""
     if live.next_number - live.committed > MAX_STEPS:
         raise CloseSocket(
-            CloseCode.TOO_MANY, "flood", f"Wait for acks: at most {MAX_STEPS} steps may be open."
+            CloseCode.TOO_MANY,
+            "flood",
+            f"Wait for acks: at most {MAX_STEPS} steps may be unacknowledged.",
         )

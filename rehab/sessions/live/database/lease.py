@@ -94,8 +94,8 @@ class Lease:
         Whether the server exchanges messages with others on its database (by Redis).
     on_excluded
         Called, on that thread, where another server has the database and one of them cannot share
-        it: this one must end. Steps are safe meanwhile: each session's epoch keeps an earlier owner
-        from writing.
+        it: this one must end. Steps are safe meanwhile: each session's epoch prevents an earlier
+        owner from writing.
     """
 
     def __init__(self, address: str, *, shares: bool, on_excluded: Callable[[], None]) -> None:

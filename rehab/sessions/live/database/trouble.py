@@ -1,4 +1,4 @@
-"""What keeps the log from being stored, in words: a full disk, a database that does not answer."""
+"""Why the log cannot be stored, in words: a full disk, a database that does not answer."""
 
 from __future__ import annotations
 

@@ -184,7 +184,7 @@ class Follower(Subscriber):
         return now_s - self._updated_s > self.EXPIRES_S
 
     def queue_heartbeat(self, text: str) -> None:
-        """Send a hint, which has who is there."""
+        """Send a hint, which includes who is connected."""
         self.wake()
 
     def flush(self) -> None:

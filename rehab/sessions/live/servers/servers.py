@@ -109,7 +109,7 @@ class Servers:
             raise NotStored(f"{problem} Look whether it took effect, then try again.") from None
 
     def drive_robot(self, owner: str, session_id: int, drive: Mapping[str, float]) -> None:
-        """Pass on that a person drives the robot; what is lost is as if the button was let go."""
+        """Pass on that a person drives the robot; a lost message counts as a released button."""
         asked = {"session": session_id, "drive": dict(drive)}
         self.intercom.send(owner, "drive", asked, within_s=RECEIPT_S)
 
@@ -170,7 +170,7 @@ class Servers:
         self._announce_lease()
         others = self._addresses.keys() - {self._own.id}
         was_isolated, is_silent = self.is_isolated, bool(self.silent_s)
-        # No client is let in before the sessions are dropped that others have taken meanwhile.
+        # No client is admitted before the sessions are dropped that others have taken meanwhile.
         is_behind = was_isolated and self._entered != self._own.entered
         self.is_isolated = is_behind or self._isolation.applies(others, is_silent=is_silent)
         if self.is_isolated and not was_isolated:

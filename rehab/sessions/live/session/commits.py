@@ -151,7 +151,7 @@ def _is_armed(station_id: int | None) -> bool:
 
 
 def _note_robot_orders(events: Sequence[SessionEvent]) -> None:
-    """Keep the latest order to each station's robot where a session finds it without a search."""
+    """Store the latest order to each robot with its station, where sessions find it at once."""
     orders = {
         event.session.station_id: event.kind == RobotEntry.STOP
         for event in events

@@ -1,8 +1,8 @@
 """Publishes committed events: a ring buffer for each session, a pump for each subscriber.
 
 Nothing that a subscriber does or fails to do holds up the session or other subscribers. A slow one
-gets fewer and larger frames; one that confirms nothing is let go. An event is retained until the
-slowest has it; the ring bounds the memory.
+gets fewer and larger frames; one that confirms nothing is disconnected. An event is retained
+until the slowest has it; the ring bounds the memory.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ class SubscriptionGate:
 
     @contextmanager
     def closed(self) -> Iterator[None]:
-        """Keep the gate closed in this block."""
+        """Close the gate for this block."""
         self._subscribing += 1
         self._is_idle.clear()
         try:

@@ -189,9 +189,9 @@ class LiveSession:
                 on_stored()
             if self.source is not None:
                 for message in for_source:  # before the ack, which a simulated patient waits for
-                    self.source.queue(message)
+                    self.source.outbox.queue(message)
                 if row is not None:
-                    self.source.acknowledge(row.step.number)
+                    self.source.outbox.acknowledge(row.step.number)
             if row is not None:
                 self.recent.append(row.step)
                 self.committed = row.step.number

@@ -87,21 +87,11 @@ class Loader:
         self._task = None
 
 
-def load(session_id: int) -> LoadedSession:
-    """Rebuild a session from its log, and become its writer if it is open.
-
-    Raises TrainingSession.DoesNotExist, OwnedElsewhere and DamagedLog.
-    """
-    found = load_together([session_id])[session_id]
-    if isinstance(found, Exception):
-        raise found
-    return found
-
-
 def load_together(session_ids: Collection[int]) -> dict[int, LoadResult]:
     """Rebuild sessions from their logs, and become the writer of those that are open.
 
-    For one that cannot be loaded its error is returned: what ``load`` raises, or the database's.
+    For one that cannot be loaded its error is returned: TrainingSession.DoesNotExist,
+    OwnedElsewhere, DamagedLog, or the database's.
     """
     try:
         return _load(session_ids)

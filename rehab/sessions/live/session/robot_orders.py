@@ -69,7 +69,7 @@ class RobotOrders:
         stopped already, the stop is stored all the same if another server has armed it meanwhile.
         """
         if self._live.robot is not None:
-            self._live.robot.queue({"type": "stop"})
+            self._live.robot.outbox.queue({"type": "stop"})
         is_repeated = self.is_stopped
         if is_repeated and (self.unlogged_stop is not None or not again):
             return
@@ -97,7 +97,7 @@ class RobotOrders:
         def notify_robot(result: asyncio.Future[None]) -> None:
             failed = result.cancelled() or result.exception() is not None
             if not failed and not self.is_stopped and self._live.robot is not None:
-                self._live.robot.queue({"type": "arm"})
+                self._live.robot.outbox.queue({"type": "arm"})
 
         stored.add_done_callback(notify_robot)
         row = self._live.aggregate.log_event(RobotEntry.ARM, by, at, {})

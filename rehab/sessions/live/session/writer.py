@@ -50,7 +50,7 @@ class Writer:
         self._next_commit_s = 0.0  # not before
         self._last_session: int | None = None  # of the last commit, if it was one session's
         self._failure = Trouble.NONE  # of the last batch
-        # A daemon: a database that never answers must not keep the process from ending.
+        # A daemon: a database that never answers must not prevent the process from ending.
         self._thread = threading.Thread(target=self._run, name="garry-writer", daemon=True)
         self._thread.start()
 

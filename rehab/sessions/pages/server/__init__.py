@@ -1,1 +1,1 @@
-"""Pages that tell programs how the server is."""
+"""Pages about the server's state, for programs."""

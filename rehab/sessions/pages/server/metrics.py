@@ -1,4 +1,4 @@
-"""What Prometheus asks for: counts and times of this process, no data of anybody."""
+"""What Prometheus asks for: counts and times of this process, no personal data."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ GCCollector(registry=REGISTRY)
 @never_cache
 @require_safe
 def metrics(request: HttpRequest) -> HttpResponse:
-    """Return all figures to who has GARRY_METRICS_TOKEN; without a token set, to nobody."""
+    """Return all figures to holders of GARRY_METRICS_TOKEN; 404 where no token is set."""
     given = request.headers.get("Authorization", "").removeprefix("Bearer ")
     token = settings.METRICS_TOKEN
     if not token or not hmac.compare_digest(given.encode(), token.encode()):

@@ -12,7 +12,16 @@ import pytest
 
 from robot.bases.base import Indication
 from robot.bases.kobuki import KobukiBase
+from robot.bases.kobuki_protocol.commands import (
+    GpOutput,
+    Output,
+    Sound,
+    SoundSequence,
+    decode_commands,
+)
+from robot.bases.kobuki_protocol.frames import FrameReader
 from robot.motion.pose import HOME, Pose
+from robot.motion.score import Color, Melody, Note
 from robot.motion.twist import STILL, Twist
 from tests.support.extent import EVERYTHING
 from tests.support.fake_kobuki import FakeKobuki
@@ -62,17 +71,6 @@ def owner_of(base):
     return base._client._process.pid
 
 
-@pytest.mark.realtime
-def test_it_begins_at_home_still_and_knows_its_battery(base):
-    state = base.read()
-    assert (state.pose, state.twist) == (HOME, STILL)
-    assert state.sensors.battery_v == 16.0
-    assert state.sensors.refusal == ""
-    assert state.sensors.hazards == frozenset()
-    assert state.sensors.silent_s < 0.1
-    assert base.problem == ""
-
-
 @pytest.mark.essential
 @pytest.mark.realtime
 @pytest.mark.parametrize(
@@ -102,13 +100,6 @@ def test_it_goes_where_it_is_told_over_wraps_of_all_counters(kobuki, base, twist
     assert state.twist == STILL
     base.set_home()
     assert base.read().pose == HOME
-
-
-def test_it_says_what_it_really_sends(base):
-    sent = base.drive(Twist(9.0, 0.0))
-    assert sent.v_m_s == pytest.approx(0.3)
-    assert base.drive(Twist(math.nan, 0.1)) == STILL
-    assert base.drive(Twist(0.1, math.inf)) == STILL
 
 
 @pytest.mark.parametrize("hazard", ["bump", "cliff", "wheel_drop", "over_current"])
@@ -186,6 +177,28 @@ def test_lights_and_sounds_never_cut_the_power(kobuki, base):
     assert kobuki.bad == 0
 
 
+def extras(base):
+    """Return what goes out beside the next order, but for requests."""
+    frames = FrameReader(decode_commands).feed(base._extra_commands())
+    kinds = (GpOutput, Sound, SoundSequence)
+    return [command for frame in frames for command in frame if isinstance(command, kinds)]
+
+
+def test_lights_notes_and_melodies_are_a_kobuki_s():
+    base = KobukiBase(lambda: 5.0)
+    extras(base)
+    base.light(Color.ORANGE, Color.GREEN)
+    base.play(Note(0.0, 440.0, 0.2))
+    assert extras(base) == [
+        Sound(826, 200),
+        GpOutput(Output.POWER | Output.LED1_ORANGE | Output.LED2_GREEN),
+    ]
+    base.play(Note(0.0, melody=Melody.CLEANING_END))
+    assert extras(base) == [SoundSequence(6)]
+    base.show(Indication.READY, aloud=False)
+    assert extras(base) == [GpOutput(Output.POWER | Output.LED1_GREEN)]
+
+
 @pytest.mark.parametrize(
     ("version", "refusal"),
     [
@@ -199,16 +212,6 @@ def test_firmware_that_it_was_not_made_for(version, refusal):
     with FakeKobuki(version=version) as kobuki, driving(kobuki.url) as base:
         until(base, lambda sensors: sensors.refusal != "firmware_unknown")
         assert base.read().sensors.refusal == refusal
-
-
-@pytest.mark.realtime
-def test_noise_is_counted_and_costs_nothing(kobuki, base):
-    for _ in range(10):
-        kobuki.noise = bytes.fromhex("AA554D010F") + os.urandom(40)
-        drive(base, Twist(0.1, 0), 0.06)
-    assert base.read().sensors.silent_s < 0.1
-    assert base.counters["skipped_bytes"] > 300
-    assert base.read().pose.x_m == pytest.approx(0.06, abs=0.03)
 
 
 def test_a_base_that_falls_silent(kobuki, base):

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from robot.bases.kobuki_protocol.feedback import Button, CoreSensors, Feedback, Inertia, Version
+from robot.bases.kobuki_protocol.feedback import CoreSensors, Feedback, Inertia, Version
 from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.kobuki_protocol.wheels import TICK_M
@@ -86,11 +86,6 @@ def test_bits_count_in_two_frames_running(line, field):
     assert getattr(line.hear(still(7, **{field: 1})), field) == 1
     assert getattr(line.hear(still(8)), field) == 1
     assert getattr(line.hear(still(9)), field) == 0
-
-
-def test_a_button_is_pressed_once(line):
-    pressed = [line.hear(still(2 + i, buttons=Button.B1)).pressed for i in range(5)]
-    assert pressed == [0, Button.B1, 0, 0, 0]
 
 
 @pytest.mark.parametrize(

@@ -6,48 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.bases import BASES
-from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.rosbridge.orders import IN_FLIGHT
 from robot.behavior.safety import BASE_SILENT_S
-from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, TICK_S
-from robot.motion.pose import HOME
+from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL, Twist
 from tests.support.extent import examples
 from tests.support.rosbridge_stage import Stage, moving
 
-# --- what every base promises -------------------------------------------------------------------
-
-
-def test_it_is_a_base_that_no_program_arms(stage):
-    assert BASES[stage.base.name] is RosbridgeBase
-    assert not RosbridgeBase.abilities.simulated
-    assert RosbridgeBase.abilities.closed_loop
-    assert RosbridgeBase.abilities.bumpers
-
-
-def test_it_begins_at_home_wherever_that_is(stage):
-    there = stage.base.read()
-    assert there.pose.distance_m(HOME) < 1e-9
-    assert there.twist == STILL
-    assert there.sensors.silent_s == 0
-
-
-@pytest.mark.parametrize("bad", [Twist(math.nan, 0), Twist(0.1, math.inf)])
-def test_an_order_that_is_not_finite_stops_it(stage, bad):
-    stage.wait(0.1, Twist(0.1, 0))
-    assert stage.robot.is_moving
-    assert stage.base.drive(bad) == STILL
-    stage.pass_on()
-    assert not stage.robot.is_moving
-
-
-def test_it_says_what_was_really_ordered(stage):
-    sent = stage.base.drive(Twist(9, -9))
-    assert abs(sent.v_m_s) <= CEILING_M_S
-    assert abs(sent.w_rad_s) <= CEILING_RAD_S
-    stage.pass_on()
-    assert stage.robot.orders[-1][1:] == (sent.v_m_s, sent.w_rad_s)
+# --- beside what every base promises (tests/robot/bases/test_contract.py) -------------------------
 
 
 def test_an_order_grows_old_and_does_not_go_on_by_itself(stage):

@@ -1,19 +1,11 @@
 """The rosbridge base's options on a command line."""
 
-from argparse import ArgumentParser
-
 import pytest
 
-from robot.base_options import add_base_arguments, make_base
 from robot.bases import BadOption
 from robot.bases.rosbridge.topics import PROFILES
 from robot.ros.frames import Topic
-
-
-def base_of(*words):
-    parser = ArgumentParser()
-    add_base_arguments(parser)
-    return make_base(parser.parse_args(["--base", "rosbridge", *words]), lambda: 0.0)
+from tests.support.rosbridge_stage import base_of
 
 
 def test_its_topics_are_chosen():

@@ -1,18 +1,16 @@
 """What a base by ROS says, and how it holds its head or arms."""
 
-from argparse import ArgumentParser
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
-from robot.base_options import add_base_arguments, make_base
 from robot.bases import Answer, BadOption
 from robot.bases.rosbridge.voice_and_joints import FASTEST_RAD_S, HOLD, LONGEST_S, Joints, Voice
 from robot.ros.frames import Topic
 from tests.support.robot_stage import CUE
-from tests.support.rosbridge_stage import CLOSED, Stage
+from tests.support.rosbridge_stage import CLOSED, Stage, base_of
 
 SPEECH = Topic("/speech", "std_msgs/String")
 HEAD = Topic("/head_controller/command", "trajectory_msgs/JointTrajectory")
@@ -102,12 +100,6 @@ def test_no_joint_is_too_fast_from_any_pose_to_any_other():
     assert JOINTS.takes_s <= LONGEST_S
     time = JOINTS.write_trajectory(REST)["points"][0]["time_from_start"]
     assert time["secs"] + time["nsecs"] * 1e-9 == pytest.approx(JOINTS.takes_s)
-
-
-def base_of(*words):
-    parser = ArgumentParser()
-    add_base_arguments(parser)
-    return make_base(parser.parse_args(["--base", "rosbridge", *words]), lambda: 0.0)
 
 
 HEAD_WORDS = [

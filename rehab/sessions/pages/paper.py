@@ -1,4 +1,4 @@
-"""The page with a session's report on paper."""
+"""The pages that are printed: a session's report, and what a patient takes home."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, user_of
+from rehab.people.models import Patient
 from rehab.people.roles import Role, may_see_names
+from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.patient_summary import describe_take_home
 from rehab.sessions.reports.report import report_context
 
 
@@ -31,3 +34,21 @@ def show_report(request: HttpRequest, session_id: int) -> HttpResponse:
         "report": report_context(user, session),
     }
     return render(request, "sessions/report.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_safe
+def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Show in plain words what a patient has walked; a person's simulated sessions do not count."""
+    user = user_of(request)
+    patient = get_object_or_404(
+        Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
+    )
+    activate_patient_language(patient)
+    sessions = TrainingSession.objects.visible_to(user).filter(
+        patient=patient, simulated=patient.simulated
+    )
+    now = clinic_time(timezone.now(), patient.clinic)
+    summary = describe_take_home(sessions, now)
+    context = {"patient": patient, "summary": summary, "today": now.date()}
+    return render(request, "sessions/takehome.html", context)

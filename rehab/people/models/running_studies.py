@@ -1,4 +1,4 @@
-"""Whose sessions an account must not see, since it would learn what a study hides from it."""
+"""Patients of running studies, and whose sessions these hide from an account."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RUNNING = "running"  # a study's state while it enrolls and walks
 
 
 def hidden_patients(user: User) -> QuerySet[Patient]:
-    """Return the patients whose sessions somebody must not see until their study is closed.
+    """Return the patients whose sessions an account must not see until their study is closed.
 
     Points, words and colors betray the feedback type. So an assessor of a study sees no session of
     its participants, and a researcher only with the mark that allows looks at unfinished studies.
@@ -31,13 +31,13 @@ def hidden_patients(user: User) -> QuerySet[Patient]:
 def is_in_running_study(patient: Patient) -> bool:
     """Return whether a study that is not closed has, or had, this patient.
 
-    Who has withdrawn counts: what the study hides would still tell an assessor which arm it was.
+    Who has withdrawn counts: what the study hides would still reveal the arm to an assessor.
     """
     return patient.enrollments.filter(study__state=RUNNING).exists()
 
 
 def _marked(user: User, task: str) -> QuerySet[Patient]:
-    """Return the participants of running studies in which somebody has a mark."""
+    """Return the participants of running studies in which an account has a mark."""
     return Patient.everywhere.filter(
         enrollments__study__state=RUNNING,
         enrollments__study__marks__user=user,

@@ -13,7 +13,7 @@ from rehab.gait.signals.filters import Floats, find_minimum
 
 
 @dataclass(slots=True, kw_only=True)
-class Patience:
+class ChunkWait:
     """While no valid stance can have ended in samples that wait.
 
     Only a foot that leaves and lands again within one chunk is told later, by the longest wait.
