@@ -8,9 +8,10 @@ from dataclasses import replace
 from types import ModuleType
 
 import pytest
+from django.apps import apps
 from django.db.models import UniqueConstraint
 
-from rehab import models
+from rehab.people.models import Clinic
 from tests.support.servers import ROOT
 
 PAGE = (ROOT / "docs" / "capacity.md").read_text("utf-8")
@@ -72,7 +73,7 @@ def test_needs_by_hand(capacity):
 
 
 def all_models():
-    return [getattr(models, name) for name in models.__all__ if name != "TRACKED"]
+    return [*apps.get_app_config("rehab").get_models()]
 
 
 def without_clinic() -> list[str]:
@@ -80,7 +81,7 @@ def without_clinic() -> list[str]:
     return sorted(
         model.__name__
         for model in all_models()
-        if model is not models.Clinic
+        if model is not Clinic
         and "clinic" not in {field.name for field in model._meta.concrete_fields}
     )
 
