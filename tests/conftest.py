@@ -257,6 +257,16 @@ def world(_amber: Callable[[], World], db: None) -> World:
     return _amber()
 
 
+@pytest.fixture
+def patient(world: World) -> Any:
+    """Return a patient of the world's clinic who has not walked yet."""
+    from rehab.people.models import Patient
+
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
 @pytest.fixture(scope="session")
 def shared_chromium() -> Any:
     from tests.support.browsers import SharedChromium
