@@ -17,7 +17,6 @@ import pyrage
 from pyrage.x25519 import Identity, Recipient
 
 AGE_MAGIC = b"age-encryption.org/"
-OLD_MAGIC = b"GARRY sealed"  # of development versions before 2026-11-22
 
 
 class InvalidKey(ValueError):
@@ -105,11 +104,6 @@ def decrypt(file: BinaryIO, identities: Sequence[Identity]) -> Iterator[BinaryIO
     """
     magic = file.read(len(AGE_MAGIC))
     file.seek(0)
-    if magic.startswith(OLD_MAGIC):
-        raise CannotDecrypt(
-            "It was made by a development version of GARRY from before 22 November 2026. Restore "
-            "it with that version."
-        )
     if magic != AGE_MAGIC:
         raise CannotDecrypt("It is no backup of GARRY. Choose another file.")
     problems: list[Exception] = []

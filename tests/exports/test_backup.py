@@ -171,7 +171,6 @@ def test_a_damaged_one_changes_nothing(file, key):
             data[:-70_000] + data[-60_000:] if len(data) > 70_000 else data[:-9] + bytes(9),
             "damaged",
         ),
-        (b"GARRY sealed 1\n" + data, "Restore it with that version"),
     ):
         file.write_bytes(damaged)
         with pytest.raises(CommandError, match=said):
