@@ -140,7 +140,7 @@ def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monke
     assert [line.state for line in told["today"]] == ["Running", *["Finished"] * 3]
     assert told["today"][0].session == left
     assert told["walking"] == 1
-    assert "The session of Rosa is open since Sep 15" in told["alerts"][0].message
+    assert "The session of Rosa has been open since Sep 15" in told["alerts"][0].message
 
 
 def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch):
@@ -199,7 +199,7 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
     told = dashboard_context(pt, NOW)
     words = [alert.message for alert in find_alerts(pt, told["today"], told["stations"], NOW)]
     assert len(words) == 3
-    assert words[0] == "The session of Rosa is open since 06:00. End it."
+    assert words[0] == "The session of Rosa has been open since 06:00. End it."
     assert words[1].startswith("never at ")
     assert "has never dialed in" in words[1]
     assert "revoked and shut out" in words[2]
