@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from rehab.sources.client.journal import Journal
-from rehab.sources.client.kept import Kept
+from rehab.sources.client.journal_state import JournalState
 from rehab.training.steps import InvalidReason, Measurement
 from robot.wire.clocks import LATE_S
 from robot.wire.frames import NAME
@@ -121,12 +121,12 @@ class StepQueue:
         self._kept: deque[_QueuedStep] = deque()
         self._sent = 0  # how many of the kept, from the oldest on, are in flight
         self._unsent_from: int | None = None
-        if journal is not None and journal.kept.session is not None:
-            kept = journal.kept
-            self.session, self.side, self.state = kept.session, kept.side, kept.state
-            self.last, self._next = kept.last, kept.last + 1
-            self._unsent_from = kept.unsent_from
-            self._keep(kept.steps, -math.inf)
+        if journal is not None and journal.saved.session is not None:
+            saved = journal.saved
+            self.session, self.side, self.state = saved.session, saved.side, saved.state
+            self.last, self._next = saved.last, saved.last + 1
+            self._unsent_from = saved.unsent_from
+            self._keep(saved.steps, -math.inf)
 
     @property
     def unacknowledged(self) -> int:
@@ -208,9 +208,11 @@ class StepQueue:
         if self._journal is not None:
             self._journal.note(entry, self._all)
 
-    def _all(self) -> Kept:
+    def _all(self) -> JournalState:
         steps = [kept.step for kept in self._kept]
-        return Kept(self.session, self.side, self.state, self.last, self._unsent_from, steps)
+        return JournalState(
+            self.session, self.side, self.state, self.last, self._unsent_from, steps
+        )
 
     def _keep(self, steps: list[Message], since_s: float) -> None:
         for step in steps:
