@@ -23,7 +23,7 @@ class RejectionReason(StrEnum):
     LONG_STANCE = "long_stance"  # standing
     CUT_OFF = "cut_off"  # the record ends before the foot leaves the floor
     IRREGULAR = "irregular"  # far from the usual stance: stumble, stop, both feet on one plate
-    CROSS_STEP = "cross_step"  # the other foot was not where a walker has it
+    CROSS_STEP = "cross_step"  # cross-talk of the plates: the other foot stood on this one too
     WEIGHT = "weight"  # the plates do not carry this person
     MOMENT_LOST = "moment_lost"  # not finite, frozen or jumping
     MOMENT_SIGN = "moment_sign"  # plantarflexion is not positive

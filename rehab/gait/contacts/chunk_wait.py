@@ -16,7 +16,7 @@ from rehab.gait.signals.filters import Floats, find_minimum
 class ChunkWait:
     """While no valid stance can have ended in samples that wait.
 
-    Only a foot that leaves and lands again within one chunk is told later, by the longest wait.
+    Only a foot that leaves and lands again within one chunk is reported later, by the longest wait.
 
     Attributes
     ----------

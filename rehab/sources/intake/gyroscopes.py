@@ -87,7 +87,7 @@ class GyroscopePipeline:
         return self._name(name, detector.feed(times, rates))
 
     def _name(self, name: str, strides: list[GyroscopeStride]) -> list[Sided]:
-        """Return strides with their leg; tell once how the rate is read."""
+        """Return strides with their leg; report once how the rate is read."""
         side, sign = self._gyroscopes[name].side, self._detectors[name].sign
         if sign is not None and self._signs.get(name) != sign:
             self._signs[name] = sign
