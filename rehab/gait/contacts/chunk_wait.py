@@ -1,7 +1,7 @@
 """How long samples of a force may wait for others before they are looked at.
 
 To look at a chunk costs as much as hundreds of samples do. While a foot swings, has just landed or
-still stands, no valid stance can have ended, and its newest sample tells which.
+still stands, no valid stance can have ended, and its newest sample shows which.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class ContactFinder:
 
     A contact is certain at 0.15 of the body weight, ``contact_n`` at least; its beginning and
     end are timed where the force crosses ``release_n``, by linear interpolation between samples.
-    Those of a foot that is dragged are told by ``drag.find_edge``.
+    Those of a foot that is dragged are found by ``drag.find_edge``.
 
     Parameters
     ----------

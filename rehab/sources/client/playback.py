@@ -16,7 +16,7 @@ NextStride = Callable[[Phase], Measurement | None]
 # No stride is shorter (docs/reference/gait.md#plausible-strides): there is time for the server to
 # announce a new phase.
 STRIDE_MIN_S = 0.5
-# Without a connection somebody may walk for hours (a whole day takes 80,000 strides).
+# Without a connection a person may walk for hours (a whole day takes 80,000 strides).
 KEPT_MAX = 80_000
 
 

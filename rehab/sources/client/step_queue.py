@@ -95,7 +95,7 @@ class StepQueue:
     journal
         Where steps are kept over the end of this program; only in memory by default.
     marks_late
-        Whether to tell the server which steps come long after they were measured, as one knows here
+        Whether to mark for the server which steps come long after they were measured, as one knows here
         whatever the server has learned of the source's clock.
     monotonic
         Our clock [s].
@@ -160,7 +160,7 @@ class StepQueue:
         numbers anew where the server has more than is known here: it had stored what the journal
         lost with the power. Where after a restart it has less than it had acknowledged, all that is
         kept is put aside: a server that was set back may have given the session's number again, to
-        somebody else's. Raises StepsLost where steps are wanted that were acknowledged since.
+        another one's. Raises StepsLost where steps are wanted that were acknowledged since.
         """
         if session != self.session:
             self.leave()

@@ -69,7 +69,7 @@ class GyroscopePipeline:
         ]
 
     def _begin(self, name: str, t_s: Floats, rate_rad_s: Floats) -> list[Sided]:
-        """Hold the first samples until they tell their rate."""
+        """Hold the first samples until their rate is known."""
         held = self._held.setdefault(name, [])
         held.append((t_s, rate_rad_s))
         times, rates = (np.concatenate(parts) for parts in zip(*held, strict=True))

@@ -49,7 +49,7 @@ class Requester(StrEnum):
 
     MONITOR = "monitor"  # the PT's page, and programs that call the API
     PATIENT_PAGE = "patient_page"  # a person who is signed in, on the patient's page
-    TABLET = "tablet"  # the station's paired tablet, with nobody signed in
+    TABLET = "tablet"  # the station's paired tablet, without a signed-in person
 
 
 class ValueKind(StrEnum):
@@ -100,7 +100,7 @@ class ControlledSession(Protocol):
         """Begin a phase."""
 
     def pause(self, reason: PauseReason | None) -> None:
-        """Note that nobody walks, and why."""
+        """Note that walking stopped, and why."""
 
     def resume(self) -> None:
         """Forget why the session was paused."""
@@ -163,7 +163,7 @@ class Control:
     snapshot_field, snapshot_for
         The name that snapshots give the value, and whose snapshots have it.
     requesters
-        Who may ask for it; nobody where only the server makes such changes.
+        Who may ask for it; empty where only the server makes such changes.
     value_format, choices, shows_old, joint
         How a review writes the value: ``choices`` are the labels of single values, ``shows_old``
         writes "old → new", ``joint`` stands between label and value.

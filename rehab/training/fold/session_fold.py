@@ -102,7 +102,7 @@ class SessionFold:
 
     @property
     def adaptation_mode(self) -> AdaptationMode:
-        """What becomes of the goal while somebody walks."""
+        """What becomes of the goal while the patient walks."""
         mode: AdaptationMode = self.settings[ChangeKind.GOAL_ADAPTATION]
         return mode
 
@@ -277,7 +277,7 @@ class SessionFold:
         self.state = state
 
     def pause(self, reason: PauseReason | None) -> None:
-        """Note that the time from here on is not walked, and why; None where nobody knows."""
+        """Note that the time from here on is not walked, and why; None where it is unknown."""
         self.was_walking, self.pause_reason = False, reason
 
     def resume(self) -> None:
