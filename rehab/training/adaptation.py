@@ -137,8 +137,8 @@ class Staircase:
     the goal becomes ``goal × (1 + step × (h − n × p))``, within ``limit`` of the anchor. Where
     lower is better the goal is divided instead.
 
-    A goal that was set in any other way is the new anchor, and a new block begins with it; another gain
-    begins a new block.
+    A goal that was set in any other way is the new anchor, and a new block begins with it; another
+    gain begins a new block.
 
     Attributes
     ----------

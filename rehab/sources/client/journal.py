@@ -1,7 +1,8 @@
 """A file with what the server has not stored yet, over ends of this program and power cuts.
 
 A line is the CRC-32 of a JSON object and the object: what a power cut tore or left blank at the
-end is distinguished from what was written. The file is written anew, beside itself, when it has grown.
+end is distinguished from what was written. When the file has grown it is written anew, beside
+itself.
 """
 
 from __future__ import annotations

@@ -95,8 +95,8 @@ class StepQueue:
     journal
         Where steps are kept over the end of this program; only in memory by default.
     marks_late
-        Whether to mark for the server which steps come long after they were measured, as one knows here
-        whatever the server has learned of the source's clock.
+        Whether to mark for the server which steps come long after they were measured, as is known
+        here whatever the server has learned of the source's clock.
     monotonic
         Our clock [s].
 
