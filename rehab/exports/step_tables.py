@@ -127,7 +127,7 @@ def _fold(fold: SessionFold, entry: Measurement | Change) -> Message | None:
         fold.change(entry)
         return None
     context, step = StepContext.of(fold), fold.step(entry)
-    score, streak, answer = fold.score, fold.feedback.streak, fold.telling.answer
+    score, streak, answer = fold.score, fold.feedback.streak, fold.delivery.answer
     return patient_step(fold.plan, context, step, score, streak, live=True, answer=answer)
 
 

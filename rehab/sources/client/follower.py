@@ -171,7 +171,7 @@ class SessionFollower:
                 gain=float(phase.get("gain", 1.0)),
             )
         except (InvalidSetting, KeyError, TypeError, ValueError) as problem:
-            self._notify(f"The server phase a phase that is not known here ({problem}).")
+            self._notify(f"The server announced a phase that is not known here ({problem}).")
             return self._feed.phase
 
 
