@@ -26,7 +26,7 @@ from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State
 from rehab.training.fold.tallies import Tally
 from tests.support.marks import mark
-from tests.support.walks import RIGHT, strides, walk
+from tests.support.walks import RIGHT, make_patient, strides, walk
 from tests.support.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -51,9 +51,7 @@ def world(world: World) -> World:
 
 @pytest.fixture
 def rosa(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
-    )
+    return make_patient(world.clinic, code="K-1")
 
 
 def ago(patient: Patient, valence: str, walked, moment: datetime, **how) -> TrainingSession:
@@ -286,9 +284,7 @@ def test_the_front_page_costs_the_same_however_much_was_walked(
     with django_assert_max_num_queries(15) as first:
         pt.get("/admin/")
     for number in range(8):
-        patient = Patient.everywhere.create(
-            clinic=world.clinic, code=f"M-{number}", nickname="M", paretic_side="left"
-        )
+        patient = make_patient(world.clinic, "M", code=f"M-{number}")
         ago(patient, "positive", strides(2, 1), now, end=None if number % 2 else ChangeKind.FINISH)
         station = Station.everywhere.create(clinic=world.clinic, name=f"S-{number}")
         Device(
