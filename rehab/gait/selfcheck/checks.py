@@ -85,6 +85,7 @@ def check_signals(
     rate_hz: float,
     mass_kg: float,
     own_deceleration_s: dict[str, float] | None = None,
+    strides: list[Stride] | None = None,
 ) -> SignalCheck:
     """Return the check of signs, units, weight and force–kinematics lag of half a minute or more.
 
@@ -96,6 +97,8 @@ def check_signals(
         As for ``TwoLegDetector``.
     own_deceleration_s
         ``deceleration_s`` of an earlier check of this person, by side.
+    strides
+        Those of the signals, where they are measured already.
 
     Raises
     ------
@@ -105,13 +108,12 @@ def check_signals(
     time = np.asarray(t_s, dtype=np.float64)
     legs = {"left": left, "right": right}
     given = {side: LegSamples(*leg) for side, leg in legs.items() if leg is not None}
-    if len(given) == 2:
+    if strides is None and len(given) == 2:
         both = TwoLegDetector(rate_hz, mass_kg)
         strides = both.feed(time, given["left"], given["right"])
-    else:
-        strides = []
-        for side, leg in given.items():
-            strides += StrideDetector(rate_hz, mass_kg, side=side).feed(time, *leg)
+    elif strides is None:
+        ((only, leg),) = given.items()
+        strides = StrideDetector(rate_hz, mass_kg, side=only).feed(time, *leg)
     findings = _check_rate(time, rate_hz)
     decelerations: dict[str, float | None] = {}
     for side, leg in given.items():
