@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,9 +20,10 @@ from rehab.gait.strides import GaitInputError
 
 # What parsers raise for files that are not what they say.
 DAMAGED = (
-    ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, TypeError,
-    ValueError, csv.Error, zlib.error,
+    ArithmeticError, AttributeError, EOFError, gzip.BadGzipFile, LookupError, MemoryError,
+    RuntimeError, TypeError, ValueError, csv.Error, zlib.error,
 )  # fmt: skip
+LARGEST = 1e30  # of what a sensor sends; beyond, it is damaged
 BYTES_MAX = 512 * 1024 * 1024
 
 READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
@@ -65,7 +67,10 @@ def read_any_table(*paths: Path) -> Table:
         raise
     except DAMAGED as problem:
         raise GaitInputError(f"{path.name} is damaged ({problem}). Export it again.") from None
-    return table if isinstance(table, Table) else Table(table)
+    table = table if isinstance(table, Table) else Table(table)
+    for name, values in table.items():
+        table[name] = np.where(np.abs(values) < LARGEST, values, np.nan)
+    return table
 
 
 def read_signals(

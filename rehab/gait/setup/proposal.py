@@ -358,7 +358,7 @@ def _find_force_unit(
     in a step over a plate, the foot bears four fifths of it.
     """
     own = [
-        float(np.nanmean(np.interp(np.linspace(begin, end, 50), time_s, columns[f.name] * f.sign)))
+        _compute_mean(time_s, columns[f.name] * f.sign, begin, end)
         for f in forces
         for begin, end in zip(f.stances.begin_s, f.stances.end_s, strict=True)
     ]
@@ -401,6 +401,11 @@ def _find_force_unit(
         f"The plates carry {load:.3g} of an unknown unit on average. Weigh the patient and give "
         f"the mass (--mass 75): forces by body mass, in kgf or in lbf are told by it."
     )
+
+
+def _compute_mean(time_s: Floats, values: Floats, begin_s: float, end_s: float) -> float:
+    at_s = np.linspace(begin_s, end_s, 50)
+    return float(np.interp(at_s, time_s, np.nan_to_num(values)).mean())
 
 
 def _find_channel(

@@ -10,7 +10,7 @@ from rehab.sources.client.client import SourceClient
 from rehab.sources.client.clock import PlaybackClock
 from rehab.sources.client.journal import Journal
 from rehab.sources.client.live import LiveFeed
-from rehab.sources.client.playback import NextStride, StridePlayback
+from rehab.sources.client.playback import Display, NextStride, StridePlayback
 from rehab.sources.client.step_queue import (
     StepQueue,
     StepsLost,
@@ -19,6 +19,7 @@ from rehab.sources.client.step_queue import (
 )
 
 __all__ = [
+    "Display",
     "Journal",
     "LiveFeed",
     "NextStride",
