@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +43,7 @@ def read_table(path: Path) -> Table:
         raise GaitInputError(
             "C3D files need ezc3d, which is not installed. Cure: pip install ezc3d, or export CSV."
         ) from None
+    _try_apart(path)
     try:
         file = ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError) as problem:
@@ -75,6 +78,19 @@ def read_table(path: Path) -> Table:
             table.units |= {column: of_kind[label]} if label in of_kind else {}
     _add_plates(file, table)
     return table
+
+
+def _try_apart(path: Path) -> None:
+    """Parse a file in a process of its own: ezc3d ends its process for some damaged files.
+
+    Raises GaitInputError where it does.
+    """
+    command = "import sys, ezc3d; ezc3d.c3d(sys.argv[1])"
+    tried = subprocess.run(
+        [sys.executable, "-c", command, str(path)], capture_output=True, check=False
+    )
+    if tried.returncode not in {0, 1}:
+        raise GaitInputError(f"{path.name} is a damaged C3D file. Export it again.")
 
 
 def _add_plates(file: Any, table: Table) -> None:
