@@ -85,6 +85,7 @@ def check_signals(
     rate_hz: float,
     mass_kg: float,
     own_deceleration_s: dict[str, float] | None = None,
+    strides: list[Stride] | None = None,
 ) -> SignalCheck:
     """Return the check of signs, units, weight and force–kinematics lag of half a minute or more.
 
@@ -96,6 +97,8 @@ def check_signals(
         As for ``TwoLegDetector``.
     own_deceleration_s
         ``deceleration_s`` of an earlier check of this person, by side.
+    strides
+        Those of the signals, where they are measured already.
 
     Raises
     ------
@@ -105,7 +108,8 @@ def check_signals(
     time = np.asarray(t_s, dtype=np.float64)
     legs = {"left": left, "right": right}
     given = {side: LegSamples(*leg) for side, leg in legs.items() if leg is not None}
-    strides = make_detector(given, rate_hz, mass_kg).feed_legs(time, given) if given else []
+    if strides is None:
+        strides = make_detector(given, rate_hz, mass_kg).feed_legs(time, given) if given else []
     findings = _check_rate(time, rate_hz)
     decelerations: dict[str, float | None] = {}
     for side, leg in given.items():

@@ -9,7 +9,7 @@ server. docs/protocol.md is the contract.
 from rehab.sources.client.client import SourceClient
 from rehab.sources.client.journal import Journal
 from rehab.sources.client.live import LiveFeed
-from rehab.sources.client.playback import NextStride, PlaybackClock, StridePlayback
+from rehab.sources.client.playback import Display, NextStride, PlaybackClock, StridePlayback
 from rehab.sources.client.step_queue import (
     StepQueue,
     StepsLost,
@@ -18,6 +18,7 @@ from rehab.sources.client.step_queue import (
 )
 
 __all__ = [
+    "Display",
     "Journal",
     "LiveFeed",
     "NextStride",

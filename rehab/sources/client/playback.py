@@ -5,13 +5,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_STEPS
 
-# Returns the next stride, walked in that phase; None at the end.
-NextStride = Callable[[Phase], Measurement | None]
+
+class Display(NamedTuple):
+    """What a stride is walked with: phase, goal (None until it is known) and feedback type."""
+
+    phase: Phase
+    goal: float | None
+    valence: str
+
+
+# Returns the next stride, walked with that; None at the end.
+NextStride = Callable[[Display], Measurement | None]
 
 # No stride is shorter (docs/reference/gait.md#plausible-strides): there is time for the server to
 # announce a new phase.
@@ -83,8 +93,8 @@ class StridePlayback:
 
     Attributes
     ----------
-    phase
-        The phase in which the next stride is walked.
+    phase, goal, valence
+        What the next stride is walked with: ``Display``.
     """
 
     clock_pauses = True  # with the session
@@ -100,6 +110,8 @@ class StridePlayback:
     ) -> None:
         self._resumes = resumes
         self.phase = make_phase("training")
+        self.goal: float | None = None
+        self.valence = "positive"
         self._open_walk = open_walk
         self._clock = PlaybackClock(speed, monotonic)
         self._max_unacknowledged = max_unacknowledged
@@ -107,6 +119,10 @@ class StridePlayback:
         self._stride: Measurement | None = None  # begun, not yet due
         self._last_s: float | None = None  # when the last one was, on the source's clock
         self._may_walk = False
+
+    @property
+    def _display(self) -> Display:
+        return Display(self.phase, self.goal, self.valence)
 
     @property
     def speed(self) -> float | None:
@@ -128,7 +144,7 @@ class StridePlayback:
         self.pause()
         self._walk = self._open_walk(trained_side)
         for _ in range(walked if self._resumes else 0):
-            self._walk(self.phase)
+            self._walk(self._display)
         self._stride = self._last_s = None
 
     def end_session(self) -> None:
@@ -173,7 +189,7 @@ class StridePlayback:
         return stride
 
     def _begin_stride(self, walk: NextStride) -> None:
-        self._stride = walk(self.phase)
+        self._stride = walk(self._display)
         if self._stride is None:
             self._walk = None
         elif self._last_s is None:

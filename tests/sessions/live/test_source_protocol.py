@@ -37,7 +37,13 @@ async def test_hello_welcome_step_ack(place, begun):
         "trained_side": "left",
         "measure": "a2",
         "unit": "W/kg",
-        "phase": {"kind": "training", "name": "Training", "feedback": True, "gain": 0.9},
+        "phase": {
+            "kind": "training",
+            "name": "Training",
+            "feedback": True,
+            "gain": 0.9,
+            "valence": "binary",
+        },
     }
     await source.say(a_step(1, 4.02, time_s=13.1, extra={"speed_m_s": 0.8}))
     assert await source.hear() == {"type": "ack", "number": 1}
@@ -97,7 +103,13 @@ async def test_the_server_says_start_pause_resume_goal_phase_and_stop(place, rea
         {"type": "resume"},
         {
             "type": "phase",
-            "phase": {"kind": "catch", "name": "Catch", "feedback": False, "gain": 1.0},
+            "phase": {
+                "kind": "catch",
+                "name": "Catch",
+                "feedback": False,
+                "gain": 1.0,
+                "valence": "binary",
+            },
         },
         {"type": "stop"},
     ]
