@@ -85,7 +85,7 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
     }
     if measure != A2:
         described["measure_rule"] = asdict(measure)
-    if not schedule.tells_all:
+    if not schedule.answers_all:
         described["schedule"] = asdict(schedule)
     if protocol.close_percent is not None:
         described["close_percent"] = protocol.close_percent
