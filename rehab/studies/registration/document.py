@@ -85,7 +85,7 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
     }
     if measure != A2:
         told["measure_rule"] = asdict(measure)
-    if not schedule.tells_all:
+    if not schedule.answers_all:
         told["schedule"] = asdict(schedule)
     if protocol.close_percent is not None:
         told["close_percent"] = protocol.close_percent
