@@ -98,11 +98,7 @@ def test_signals_over_plates_are_replayed_as_a_source(treadmill, tmp_path):
         )
         play = RecordingSource(options, lambda _text: None).open_walk(Side.LEFT)
         played[bool(mode)] = [
-            stride.value
-            for stride in iter(
-                partial(play, Display(make_phase("training"), None, "explicit")), None
-            )
-            if not stride.reasons
+            stride.value for stride in iter(partial(play, display), None) if not stride.reasons
         ]
 
     measured = passing.both_legs(is_overground=True, look_ahead_s=0.05)

@@ -72,7 +72,7 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
         goal=GoalRule(percent_of_baseline=study.goal_percent),
         schedule=schedule,
     )
-    described: dict[str, Any] = {
+    told: dict[str, Any] = {
         "code": arm.code,
         "name": arm.name,
         "weight": arm.weight,
@@ -84,25 +84,23 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
         "phases": [_describe_phase(phase) for phase in phases],
     }
     if measure != A2:
-        described["measure_rule"] = asdict(measure)
+        told["measure_rule"] = asdict(measure)
     if not schedule.answers_all:
-        described["schedule"] = asdict(schedule)
+        told["schedule"] = asdict(schedule)
     if protocol.close_percent is not None:
-        described["close_percent"] = protocol.close_percent
+        told["close_percent"] = protocol.close_percent
     asked = [find_instrument(slug, study.clinic_id, "en") for slug in protocol.questionnaires]
     if asked:
-        described["questionnaires"] = [_describe_questionnaire(one) for one in asked]
+        told["questionnaires"] = [_describe_questionnaire(one) for one in asked]
     edited = FeedbackType.everywhere.filter(clinic=study.clinic_id, slug=arm.valence).first()
     if edited is not None:
-        described["feedback"] = _describe_feedback(edited)
-    return described
+        told["feedback"] = _describe_feedback(edited)
+    return told
 
 
 def _describe_phase(phase: Phase) -> dict[str, Any]:
-    described = asdict(phase)
-    return {
-        name: described[name] for name in described if described[name] != USUAL_PHASE.get(name, ...)
-    }
+    told = asdict(phase)
+    return {name: told[name] for name in told if told[name] != USUAL_PHASE.get(name, ...)}
 
 
 def _describe_questionnaire(instrument: Instrument) -> dict[str, Any]:
