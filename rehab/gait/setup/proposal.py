@@ -284,7 +284,7 @@ def _name_sides(
     """
     moments = {
         label.side: name
-        for name, label in reversed(labels.items())
+        for name, label in reversed(list(labels.items()))
         if label and label.channel == "moment" and label.is_sagittal
     }
 
