@@ -17,13 +17,20 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 RATE_MOST_HZ = 100_000.0
-PLATE_TYPES = (2, 4)  # of the C3D manual: forces and moments, as they act on the plate
+# By the C3D manual's type of a plate, the rows of its channels that are vertical; of the fourth
+# after its calibration.
+CALIBRATED = 4
+VERTICAL = {1: slice(2, 3), 2: slice(2, 3), 3: slice(4, 8), CALIBRATED: slice(2, 3)}
 # Where Nexus, Qualisys, Visual3D and Motive store the body mass [kg].
 MASSES = (
     ("PROCESSING", "Bodymass"), ("PROCESSING", "BodyMass"), ("SUBJECTS", "MASS"),
     ("SUBJECTS", "WEIGHT"), ("SUBJECTS", "Bodymass"), ("SUBJECT", "MASS"), ("SUBJECT", "WEIGHT"),
 )  # fmt: skip
-ANKLE_MARKERS = ("ANK", "LM", "ANKL", "LMAL")  # lateral, after the letter of the side
+# Lateral malleoli, else heels, after the letter of the side.
+ANKLE_MARKERS = (
+    "ANK", "LM", "ANKL", "LMAL", "LANK", "ANKLE", "LMALL", "MALL", "_ANK", "_LM", "_LMAL", "_ANKLE",
+    "_FAL", "FAL", "HEE", "_HEE", "HEEL", "_HEEL", "_FCC", "FCC", "_CAL", "CAL",
+)  # fmt: skip
 
 
 def read_table(path: Path) -> Table:
@@ -101,26 +108,39 @@ def _add_plates(file: Any, table: Table) -> None:
     corners = np.asarray(_read_values(file, "FORCE_PLATFORM", "CORNERS"), dtype=np.float64)
     channels = np.asarray(_read_values(file, "FORCE_PLATFORM", "CHANNEL"), dtype=np.int64)
     types = np.asarray(_read_values(file, "FORCE_PLATFORM", "TYPE"), dtype=np.int64).ravel()
-    if corners.ndim != 3 or channels.ndim != 2 or not np.isin(types, PLATE_TYPES).all():
-        return
+    calibration = np.asarray(_read_values(file, "FORCE_PLATFORM", "CAL_MATRIX"), dtype=np.float64)
     labels = _read_labels(file, "ANALOG")
-    vertical = channels[2] - 1
-    if not ((vertical >= 0) & (vertical < len(labels))).all():
+    if corners.ndim != 3 or channels.ndim != 2 or not np.isin(types, tuple(VERTICAL)).all():
         return
+    if not ((channels >= 0) & (channels <= len(labels))).all() or not len(types):
+        return
+    markers = {name.rpartition(":")[2].upper(): name for name in _read_labels(file, "POINT")}
+    unit = _read_values(file, "POINT", "UNITS")
+    scale = {"m": 1000.0, "cm": 10.0}.get(str(unit[0]).strip(), 1.0) if len(unit) else 1.0
     ankles = {
-        side: np.array([table[f"{letter}{name}.{axis}"] for axis in "XYZ"])
+        side: scale * np.array([table[f"{markers[letter + name]}.{axis}"] for axis in "XYZ"])
         for side, letter in (("left", "L"), ("right", "R"))
         for name in reversed(ANKLE_MARKERS)
-        if f"{letter}{name}.Z" in table
+        if f"{markers.get(letter + name)}.Z" in table
     }
     if len(ankles) < 2:
         return
-    up_n = -np.array([table[labels[place]] for place in vertical.tolist()])
-    forces, unknown = assign_plates(up_n, corners.transpose(2, 1, 0)[:, :, :2], ankles)
+    up_n = []
+    for plate, kind in enumerate(types.tolist()):
+        rows = np.array([table[labels[place - 1]] for place in channels[:, plate] if place])
+        if kind == CALIBRATED and calibration.ndim == 3:
+            rows = calibration[:, :, plate] @ rows[: calibration.shape[1]]
+        force = rows[VERTICAL[kind]].sum(axis=0)
+        up_n.append(force if force.max() > -force.min() else -force)  # some store the reaction
+    forces, unknown = assign_plates(
+        np.array(up_n), scale * corners.transpose(2, 1, 0)[:, :, :2], ankles
+    )
     for side, force in forces.items():
         if force.any():
             table[f"plates.{side}"] = force
-            table.units[f"plates.{side}"] = table.units.get(labels[vertical[0]], "")
+            table.units[f"plates.{side}"] = (
+                "N" if CALIBRATED in types else table.units.get(labels[channels[2, 0] - 1], "")
+            )
     if unknown:
         table.notes = (
             f"{unknown} contacts of a plate are of both feet or of neither, and left out",

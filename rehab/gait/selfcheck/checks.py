@@ -168,13 +168,18 @@ def _check_force(force: Floats, strides: list[Stride], weight_n: float) -> list[
         return [("force_lost", "No vertical force arrives. Look at the plate and its channel.")]
     low, high = np.percentile(finite, [1, 99]).tolist()
     if -low > high and -low > 0.3 * weight_n:
-        return [("force_sign", "The vertical force has the wrong sign. Turn it: up is positive.")]
+        return [
+            (
+                "force_sign",
+                "The vertical force is negative; here up is positive. Give it a factor of -1.",
+            )
+        ]
     if high < 0.01 * weight_n and high - low > 0.0002 * weight_n:
-        return [("force_unit", f"The vertical force reaches only {high:.2g} N. Send newtons, not "
-                 "kilonewtons, and check that the plate is on.")]  # fmt: skip
+        return [("force_unit", f"The vertical force reaches only {high:.2g} N. Look up its "
+                 "unit, and check that the plate is on.")]  # fmt: skip
     if high > 5 * weight_n:
-        return [("force_unit", f"The vertical force reaches {high:.2g} N. Send newtons, not "
-                 "millinewtons, and check the body mass.")]  # fmt: skip
+        return [("force_unit", f"The vertical force reaches {high:.2g} N. Look up its unit, "
+                 "and check the body mass.")]  # fmt: skip
     if not strides:
         return [("no_strides", "No stride was seen. Walk for half a minute, and check that the "
                  "plate is on and zeroed.")]  # fmt: skip
