@@ -26,7 +26,8 @@ def with_values(form: Any, **values: Any) -> Any:
         def __init__(self, *args: Any, **kwargs: Any) -> None:
             super().__init__(*args, **kwargs)
             if self.instance.pk is None:
-                self.instance.__dict__.update(values)
+                for name, value in values.items():
+                    setattr(self.instance, name, value)
 
     return FormOfNewRow
 
