@@ -170,3 +170,22 @@ def test_damaged_files_are_told_with_the_cure(tmp_path, name, text, message):
     path.write_text(text)
     with pytest.raises(GaitInputError, match=message):
         read_any_table(path)
+
+
+@pytest.mark.parametrize(
+    ("heads", "column"),
+    [
+        ("FREQUENCY\t50\nMARKER_NAMES\tLANK\tRANK\nX\tY\tZ\tX\tY\tZ", "RANK.Z"),
+        ("FREQUENCY\t50\nMARKER_NAMES\tLANK\tRANK\nFrame\tTime\tLANK X\tY\tZ\tX\tY\tZ", "RANK.Z"),
+        ("NO_OF_SAMPLES\t2\nFREQUENCY\t50\nForce_X\tForce_Y\tForce_Z", "Force_Z"),
+    ],
+)  # fmt: skip
+def test_exports_of_qualisys(tmp_path, heads, column):
+    path = tmp_path / "walk.tsv"
+    width = len(heads.split("\n")[-1].split("\t"))
+    rows = [[n / 50 for n in range(row, row + width)] for row in range(2)]
+    path.write_text("\n".join([heads, *("\t".join(map(str, row)) for row in rows)]))
+    table = read_any_table(path)
+
+    assert table[column].tolist() == [row[-1] for row in rows]
+    assert np.diff(table["time"]).tolist() == pytest.approx([0.02])
