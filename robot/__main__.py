@@ -88,7 +88,15 @@ def make_parser() -> ArgumentParser:
 
 
 def find_black_box(named: str, own: str) -> Path | None:
-    """Return a robot's own folder in that of the option; None where it is off."""
+    """Return a robot's own folder in that of the option; None where it is off.
+
+    Parameters
+    ----------
+    named
+        The option: a folder, or off.
+    own
+        What stays the same of this robot: its token's file, or the token.
+    """
     if named in ("", "off"):
         return None
     return Path(named).expanduser() / sha256(own.encode()).hexdigest()[:12]
@@ -117,7 +125,15 @@ async def wait_for_end(is_child: bool) -> None:
 
 
 async def run_worker(make_worker: Callable[[], Worker], is_child: bool) -> None:
-    """Run a worker until the process is to end. Raises LinkRefused and BaseLost."""
+    """Run a worker until the process is to end. Raises LinkRefused and BaseLost.
+
+    Parameters
+    ----------
+    make_worker
+        Makes the worker, on the loop that it runs on.
+    is_child
+        Whether the end of standard input ends it.
+    """
     worker = make_worker()
     tasks = [asyncio.create_task(worker.run()), asyncio.create_task(wait_for_end(is_child))]
     try:

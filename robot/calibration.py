@@ -43,7 +43,15 @@ def apply_calibration(base: MobileBase) -> bool:
 
 
 def store_calibration(base: MobileBase, response: Response) -> Path:
-    """Store what was measured of a base, and return the file. Raises BadCalibration."""
+    """Store what was measured of a base, and return the file. Raises BadCalibration.
+
+    Parameters
+    ----------
+    base
+        An open base: its identity is the key.
+    response
+        How it was measured to answer.
+    """
     path = calibration_file()
     measured = _read(path) | {base.identity: asdict(response)}
     path.parent.mkdir(parents=True, exist_ok=True)

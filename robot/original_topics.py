@@ -103,7 +103,17 @@ class OriginalTopicClient:
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
     def publish_decision(self, above: bool, window_s: float, now_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above."""
+        """Publish a decision: whether the window, of a length [s], was above.
+
+        Parameters
+        ----------
+        above
+            Whether the window's mean reached the threshold.
+        window_s
+            Length of a window [s].
+        now_s
+            The time [s].
+        """
         if self._valence in WITH_GOOD_STEP and self.is_allowed:
             self._add(now_s, GOOD_STEP, {"data": above})
             self._falses = 0

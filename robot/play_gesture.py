@@ -66,7 +66,15 @@ def ending_by_signals() -> Iterator[None]:
 def wait_for_stop(
     base: MobileBase, monotonic: Callable[[], float], sleep: Callable[[float], object]
 ) -> bool:
-    """Order a base that does not answer to stand until it does; return whether it did."""
+    """Order a base that does not answer to stand until it does; return whether it did.
+
+    Parameters
+    ----------
+    base
+        An open base.
+    monotonic, sleep
+        The clock [s], and how to wait by it.
+    """
     until_s = monotonic() + LOST_S
     while base.read().sensors.silent_s > BASE_SILENT_S:
         if monotonic() >= until_s:

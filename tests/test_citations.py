@@ -230,10 +230,4 @@ def test_anchors_are_those_of_github():
         "# What to do when …\n## `/ws/<id>/`: *all* of it\n## All_of [it](x.md)\n## Twice\n"
         "```\n# no heading\n```\n### Twice ##\n"
     )
-    assert anchors(text) == {
-        "what-to-do-when-",
-        "wsid-all-of-it",
-        "all_of-it",
-        "twice",
-        "twice-1",
-    }
+    assert anchors(text) == {"what-to-do-when-", "wsid-all-of-it", "all_of-it", "twice", "twice-1"}

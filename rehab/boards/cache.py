@@ -32,7 +32,7 @@ Lists = dict[str, Standings]  # by the valence that a list is for; "" for all
 class _Cached:
     """The standings of one board, with the changes that they contain.
 
-    The lock makes other readers wait while somebody computes them.
+    The lock makes other readers wait while they are computed.
     """
 
     lists: Lists | None = None

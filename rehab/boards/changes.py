@@ -1,4 +1,4 @@
-"""What tells the servers' caches that a patient's rows on boards are out of date."""
+"""Changes by which servers' caches learn that a patient's rows on boards are out of date."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class BoardChange(ScopedModel):
 
     Rows are added in the transaction of the change and never altered, so that no commit waits for
     another. Tokens are random: an identifier that was rolled back is never issued again. No
-    constraint ties a row to its clinic or patient, whose rows somebody may have locked.
+    constraint ties a row to its clinic or patient, whose rows may be locked.
     """
 
     scope = Scope(clinic="clinic")

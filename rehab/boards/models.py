@@ -116,9 +116,7 @@ class Leaderboard(ClinicModel):
         _("rows"), max_length=16, choices=DisplayMode.choices, default=DisplayMode.NEIGHBORS
     )
     top_n = models.PositiveSmallIntegerField(
-        _("how many of the best"),
-        default=10,
-        validators=between(1, 50),
+        _("how many of the best"), default=10, validators=between(1, 50)
     )
     total_goal = models.PositiveIntegerField(
         _("goal of the total"),

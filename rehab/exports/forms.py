@@ -19,7 +19,9 @@ class ResearchExportForm(forms.Form):
         queryset=None, required=False, empty_label=_("all sessions")
     )
     shift_dates = forms.BooleanField(
-        label=_("Shift dates: whole weeks, for each patient others"), required=False, initial=True
+        label=_("Shift dates by whole weeks, differently for each patient"),
+        required=False,
+        initial=True,
     )
 
     def __init__(self, *args: Any, by: User, **options: Any) -> None:

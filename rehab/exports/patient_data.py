@@ -7,6 +7,7 @@ from datetime import datetime
 from itertools import chain
 from typing import Any
 
+from django.db.models import F
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -29,11 +30,11 @@ from rehab.training.scoring import RULES_VERSION
 FILES = {
     "README.txt": _("this page"),
     "patient.json": _("who it is, and how the pages are set"),
-    "consent.json": _("what was agreed to, to which words, and when"),
+    "consent.json": _("what was agreed to, in which words, and when"),
     "visits.json": _("the days on which a visit is or was planned"),
     "family.json": _("which links a family was given, and how often they were opened"),
     "boards.json": _("the rows on leaderboards, and the groups of boards"),
-    "studies.json": _("the part in studies; the arm once a study is closed"),
+    "studies.json": _("participation in studies; the arm once a study is closed"),
     "changes.json": _("when details were changed, each with its value before and after"),
     **{table.file: table.title for table in TABLES},
     "codebook.csv": _("what every column means, with its unit"),
@@ -57,7 +58,7 @@ does.
 
 def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
     """Return the files with everything stored of one patient, including the name."""
-    title = gettext("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
+    title = gettext("Everything that GARRY stores about %(patient)s") % {"patient": patient}
     # Translated now: the rest is written while it is sent, after the request's language has ended.
     readme = write_readme(title, list(FILES), now)
     return chain([("README.txt", [readme])], _patient_tables(user, patient, now))
@@ -108,25 +109,21 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
     ]
 
 
-def list_visits(user: User, patient: Patient) -> list[dict[str, Any]]:
+def list_visits(user: User, patient: Patient) -> list[Any]:
     """Return the visits that were planned."""
-    visits = Visit.objects.visible_to(user).filter(patient=patient)
-    return [{"day": visit.day, "at": visit.at} for visit in visits]
+    return list(Visit.objects.visible_to(user).filter(patient=patient).values("day", "at"))
 
 
-def list_family_links(user: User, patient: Patient) -> list[dict[str, Any]]:
+def list_family_links(user: User, patient: Patient) -> list[Any]:
     """Return the links that the family was given; who gave them is not named."""
-    return [
-        {
-            "created_at": link.created_at,
-            "valid_until": link.expires_at,
-            "ended_at": link.ended_at,
-            "with_the_nickname": link.shows_name,
-            "last_opened_at": link.opened_at,
-            "times_opened": link.opened,
-        }
-        for link in FamilyLink.objects.visible_to(user).filter(patient=patient)
-    ]
+    names = {
+        "valid_until": F("expires_at"),
+        "with_the_nickname": F("shows_name"),
+        "last_opened_at": F("opened_at"),
+        "times_opened": F("opened"),
+    }
+    links = FamilyLink.objects.visible_to(user).filter(patient=patient)
+    return list(links.values("created_at", "ended_at", **names))
 
 
 def list_boards(user: User, patient: Patient, now: datetime) -> list[dict[str, Any]]:
@@ -172,14 +169,11 @@ def list_studies(user: User, patient: Patient) -> list[dict[str, Any]]:
     ]
 
 
-def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
+def list_changes(user: User, patient: Patient) -> list[Any]:
     """Return the history of the details; erased values are null, and staff is not named."""
     model = Patient.__name__
     changes = HistoryEntry.objects.visible_to(user).filter(model_name=model, object_id=patient.pk)
-    return [
-        {"at": change.at, "kind": change.kind, "before_and_after": change.changes}
-        for change in changes.order_by("pk")
-    ]
+    return list(changes.order_by("pk").values("at", "kind", before_and_after=F("changes")))
 
 
 def write_readme(title: str, names: list[str], now: datetime) -> str:

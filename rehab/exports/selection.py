@@ -53,7 +53,7 @@ class Selection:
     ) -> Iterator[Any]:
         """Yield columns of a session's rows as named tuples, in the order of a unique key.
 
-        The column ``who`` tells who did it (their field ``by``).
+        The column ``who`` says who did it (their field ``by``).
         """
         rows = model.objects.visible_to(self.user).filter(session=session).order_by(key)
         if "who" in names:

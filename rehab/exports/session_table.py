@@ -22,7 +22,7 @@ from rehab.training.summary.metrics import METRICS
 
 
 class SessionRow:
-    """A session with its plan and metrics. ``source`` is empty where it may name somebody."""
+    """A session with its plan and metrics. ``source`` is empty where it may name a person."""
 
     def __init__(self, session: TrainingSession, source: str) -> None:
         self.session, self.source = session, source
@@ -87,9 +87,9 @@ SESSIONS = Table(
     _("a row for each session"),
     read_sessions,
     (
-        Column("created_at", "When it was set up.", "session.created_at", Type.TIME),
-        Column("started_at", "When the patient began to walk.", "session.started_at", Type.TIME),
-        Column("ended_at", "When it ended.", "session.ended_at", Type.TIME),
+        Column.time("created_at", "When it was set up.", "session.created_at"),
+        Column.time("started_at", "When the patient began to walk.", "session.started_at"),
+        Column.time("ended_at", "When it ended.", "session.ended_at"),
         Column(
             "state", "ready, running, paused, finished or aborted (ended early).", "session.state"
         ),
@@ -103,11 +103,10 @@ SESSIONS = Table(
             "Feedback types it was changed to, with commas between.",
             "session.changed_to",
         ),
-        Column(
+        Column.flag(
             "excluded",
             "true: a therapist left it out of figures (corrections.csv).",
             "session.excluded",
-            Type.BOOLEAN,
         ),
         Column("measure", "What was trained; a2 is ankle push-off power.", "session.measure.slug"),
         Column("unit", "Unit of values and goals of this session.", "session.measure.unit"),
@@ -126,12 +125,11 @@ SESSIONS = Table(
             "Part of a value's 95 % interval beyond the goal that makes a step close; empty: none.",
             "plan.close_steps.part",
         ),
-        Column("simulated", "true: no person walked.", "session.simulated", Type.BOOLEAN),
-        Column(
+        Column.flag("simulated", "true: no person walked.", "session.simulated"),
+        Column.flag(
             "imported",
             "true: from the original GARRY, which stored no steps.",
             lambda row: row.session.legacy_id is not None,
-            Type.BOOLEAN,
         ),
         Column("source", "Where its steps came from; empty for researchers.", "source"),
         *PARTICIPANT,

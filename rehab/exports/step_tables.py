@@ -93,12 +93,7 @@ STEPS = Table(
             "phase.kind",
         ),
         Column("phase_name", "Name of the phase.", "phase.name"),
-        Column(
-            "feedback",
-            "true: the patient got feedback in this phase.",
-            "phase.feedback",
-            Type.BOOLEAN,
-        ),
+        Column.flag("feedback", "true: the patient got feedback in this phase.", "phase.feedback"),
         Column(
             "feedback_type",
             "The type in force; empty in a phase without feedback.",
@@ -123,7 +118,7 @@ def read_feedback(_selection: Selection, session: TrainingSession) -> Iterator[M
                 continue
             if message is not None and message["kind"] in {"step", "missing"}:
                 yield message
-    except DamagedLog:  # `fold_log` has logged it; nobody knows what was shown behind a hole
+    except DamagedLog:  # `fold_log` has logged it; what was shown behind a hole is unknown
         return
 
 
@@ -132,7 +127,7 @@ def _fold(fold: SessionFold, entry: Measurement | Change) -> Message | None:
         fold.change(entry)
         return None
     context, step = StepContext.of(fold), fold.step(entry)
-    score, streak, answer = fold.score, fold.feedback.streak, fold.telling.answer
+    score, streak, answer = fold.score, fold.feedback.streak, fold.delivery.answer
     return patient_step(fold.plan, context, step, score, streak, live=True, answer=answer)
 
 
@@ -159,11 +154,10 @@ FEEDBACK = Table(
         _shown(
             "value_shown", "The value as a number, if shown.", Type.NUMBER, MEASURE_UNIT, "shown"
         ),
-        Column(
+        Column.integer(
             "summary_steps",
             "Of how many steps it was the summary.",
             lambda message: message.get("summary", {}).get("steps"),
-            Type.INTEGER,
             "steps",
         ),
     ),

@@ -31,6 +31,7 @@ class Type(StrEnum):
     JSON = "json"
 
 
+Source = str | Callable[[Any], Any]
 UNITS = {Type.TIME: "UTC", Type.JSON: "JSON"}  # of columns that name no other
 
 
@@ -45,7 +46,7 @@ class Column:
 
     name: str
     meaning: str
-    source: str | Callable[[Any], Any] = ""
+    source: Source = ""
     type: Type = Type.TEXT
     unit: str = ""
     is_channel: bool = False
@@ -54,11 +55,24 @@ class Column:
         object.__setattr__(self, "unit", self.unit or UNITS.get(self.type, ""))
 
     @classmethod
-    def number(
-        cls, name: str, unit: str, meaning: str, source: str | Callable[[Any], Any] = ""
-    ) -> Column:
+    def number(cls, name: str, unit: str, meaning: str, source: Source = "") -> Column:
         """Return a column of numbers with a unit."""
         return cls(name, meaning, source, Type.NUMBER, unit)
+
+    @classmethod
+    def integer(cls, name: str, meaning: str, source: Source = "", unit: str = "") -> Column:
+        """Return a column of whole numbers."""
+        return cls(name, meaning, source, Type.INTEGER, unit)
+
+    @classmethod
+    def flag(cls, name: str, meaning: str, source: Source = "") -> Column:
+        """Return a column of true and false."""
+        return cls(name, meaning, source, Type.BOOLEAN)
+
+    @classmethod
+    def time(cls, name: str, meaning: str, source: Source = "") -> Column:
+        """Return a column of moments."""
+        return cls(name, meaning, source, Type.TIME)
 
     @property
     def get(self) -> Callable[[Any], Any]:

@@ -33,8 +33,8 @@ EVENTS = Table(
     _("a row for each thing done or noted during a session"),
     _read_columns(SessionEvent, "at", "after_number", "kind", "old", "value", "who", "data"),
     (
-        Column("at", "When it happened.", type=Type.TIME),
-        Column("after_number", "Number of the last step before it; 0 for none.", type=Type.INTEGER),
+        Column.time("at", "When it happened."),
+        Column.integer("after_number", "Number of the last step before it; 0 for none."),
         Column("kind", "What was done, noted, or done by the robot."),
         Column("old", "Value before, where something was changed.", type=Type.NUMBER),
         Column("value", "Value after; of a remark its strength (Borg 0 to 10).", type=Type.NUMBER),
@@ -52,7 +52,7 @@ CORRECTIONS = Table(
     _("a row for each correction of a session after its end"),
     _read_columns(SessionCorrection, "at", "field", "old", "new", "reason", "who"),
     (
-        Column("at", "When it was corrected.", type=Type.TIME),
+        Column.time("at", "When it was corrected."),
         Column("field", "patient: who walked; counts: whether it counts; note: a note on it."),
         Column("old", "The value before; patients by pseudonym."),
         Column("new", "The value from then on."),
@@ -65,7 +65,7 @@ INCIDENTS = Table(
     _("what the robot recorded around its stops"),
     _read_columns(RobotIncident, "at", "reason", "recording"),
     (
-        Column("at", "When the robot was stopped.", type=Type.TIME),
+        Column.time("at", "When the robot was stopped."),
         Column("reason", "Why, as a code (docs/safety.md)."),
         Column("recording", "What it received, ordered and did: base64 of zlib of JSON lines."),
     ),
@@ -104,33 +104,20 @@ ANSWERS = Table(
             "response.slug",
         ),
         Column("title", "Its name.", "instrument.title"),
-        Column("asked_at", "When it was planned.", "response.asked_at", Type.TIME),
-        Column(
-            "finished_at", "When it was finished or stopped.", "response.finished_at", Type.TIME
-        ),
+        Column.time("asked_at", "When it was planned.", "response.asked_at"),
+        Column.time("finished_at", "When it was finished or stopped.", "response.finished_at"),
         Column("language", "The language that it was asked in.", "instrument.language"),
-        Column(
-            "validated",
-            "false: this translation was not validated.",
-            "instrument.validated",
-            Type.BOOLEAN,
+        Column.flag(
+            "validated", "false: this translation was not validated.", "instrument.validated"
         ),
-        Column("item", "Number of the question, from 1.", "number", Type.INTEGER),
+        Column.integer("item", "Number of the question, from 1.", "number"),
         Column("text", "The question as it was asked.", "item.text"),
-        Column("answer", "Empty: skipped, or not reached.", "answer", Type.INTEGER, "points"),
-        Column(
-            "lowest",
-            "First point of its scale.",
-            lambda row: row.item.values[0],
-            Type.INTEGER,
-            "points",
+        Column.integer("answer", "Empty: skipped, or not reached.", "answer", "points"),
+        Column.integer(
+            "lowest", "First point of its scale.", lambda row: row.item.values[0], "points"
         ),
-        Column(
-            "highest",
-            "Last point of its scale.",
-            lambda row: row.item.values[-1],
-            Type.INTEGER,
-            "points",
+        Column.integer(
+            "highest", "Last point of its scale.", lambda row: row.item.values[-1], "points"
         ),
         Column.number("score", "0 to 100", "Of the whole questionnaire, on each row.", "score"),
     ),
@@ -168,36 +155,27 @@ STUDY_VISITS = Table(
     (
         Column("study", "Short name of the study.", "enrollment.study.code"),
         Column("participant", "Code in the study.", "enrollment.code"),
-        Column("visit", "Number of the visit.", "visit.number", Type.INTEGER),
-        Column(
-            "attempt",
-            "2 and more after a session that was broken off.",
-            "visit.attempt",
-            Type.INTEGER,
+        Column.integer("visit", "Number of the visit.", "visit.number"),
+        Column.integer(
+            "attempt", "2 and more after a session that was broken off.", "visit.attempt"
         ),
-        Column("period", "Number of the period, from 0.", "visit.period", Type.INTEGER),
+        Column.integer("period", "Number of the period, from 0.", "visit.period"),
         Column("planned_day", "The day it was planned for.", "visit.day", Type.DATE),
-        Column(
+        Column.integer(
             "version",
             "Version of the study that the session follows.",
             lambda row: row.visit.version and row.visit.version.number,
-            Type.INTEGER,
         ),
         Column(
             "levels",
             "Levels of the study's factors, with commas between.",
             lambda row: ", ".join(row.enrollment.levels),
         ),
-        Column(
-            "enrolled_at", "When the participant was enrolled.", "enrollment.enrolled_at", Type.TIME
+        Column.time("enrolled_at", "When the participant was enrolled.", "enrollment.enrolled_at"),
+        Column.time(
+            "withdrawn_at", "When the participant left the study.", "enrollment.withdrawn_at"
         ),
-        Column(
-            "withdrawn_at",
-            "When the participant left the study.",
-            "enrollment.withdrawn_at",
-            Type.TIME,
-        ),
-        Column("after_withdrawal", "true: begun later, as care.", type=Type.BOOLEAN),
+        Column.flag("after_withdrawal", "true: begun later, as care."),
         Column("group", "What was allocated; sealed (empty) until the study is closed."),
         Column("arm", "The arm of this visit; sealed (empty) until the study is closed."),
     ),

@@ -100,13 +100,13 @@ def prepare_research(request: HttpRequest) -> HttpResponse:
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
 @require_POST
 def advance_research(request: HttpRequest) -> HttpResponse:
-    """Write some more sessions of the export that was begun; tell how far it is."""
+    """Write some more sessions of the export that was begun; return how far it is."""
     user = user_of(request)
     package = Package.find(research_folder(user), user, timezone.now())
     if package is None:
         return JsonResponse({"message": gettext("This export is not there any more.")}, status=404)
     reached = package.progress
-    for reached in package.advance(SECONDS_OF_A_CALL):  # noqa: B007 - the last one is told
+    for reached in package.advance(SECONDS_OF_A_CALL):  # noqa: B007 - the last one is returned
         pass
     return JsonResponse({"done": reached.done, "total": reached.total})
 

@@ -1,4 +1,4 @@
-"""Strides with A2 from raw signals, while somebody walks. Pure: no Django, no clock.
+"""Strides with A2 from raw signals, while a person walks. Pure: no Django, no clock.
 
 ``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` a whole
 recording with the same code. The comments of thresholds name their

@@ -25,6 +25,7 @@ from rehab.gait.recordings.limits import limit_resources
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
 from rehab.gait.recordings.tables import read_any_table, read_signals, require_columns
 from rehab.gait.selfcheck.checks import check_signals
+from rehab.gait.settings import check_mass
 from rehab.gait.setup.check import check_setup, compare_with_setup
 from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
@@ -55,10 +56,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.plot:
             load_pyplot()
-            if len(options.files) > 1:
+            if len(options.files) > 1 and not options.join:
                 raise GaitInputError("One plot shows one recording. Give one file with --plot.")
-        for path in options.files:
-            _measure_file(path, options)
+        walks = [options.files] if options.join else [[path] for path in options.files]
+        for paths in walks:
+            _measure_walk(paths, options)
     except (GaitInputError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
@@ -72,6 +74,9 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
         "are.",
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--join", action="store_true", help="the files are of one walk: join them by their times"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a file")
     parser.add_argument("--mass", type=float, help="body mass [kg]; moore2013 has it beside it")
     parser.add_argument("--rate", type=float, help="samples per second; else the median of times")
@@ -90,8 +95,9 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _measure_file(path: Path, options: argparse.Namespace) -> None:
-    time, legs, frames = read_signals(path, options.columns)
+def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
+    path = paths[0]
+    time, legs, frames = read_signals(paths, options.columns)
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     strides = measure_strides(
@@ -104,7 +110,12 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
         frame=frames,
     )
     check = check_signals(
-        time, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
+        time,
+        legs.get("left"),
+        legs.get("right"),
+        rate_hz=rate_hz,
+        mass_kg=mass_kg,
+        strides=strides,
     )
     if options.json:
         found = {
@@ -141,7 +152,7 @@ def _print_summary(path: Path, strides: list[Stride], messages: list[str]) -> No
 
 
 def check_files(arguments: Sequence[str]) -> int:
-    """Print what the columns of each file are thought to be, for a person to confirm.
+    """Print what the columns of a walk's files are thought to be, for a person to confirm.
 
     Returns
     -------
@@ -152,15 +163,17 @@ def check_files(arguments: Sequence[str]) -> int:
         prog="python -m rehab.gait check",
         description="What columns, units, signs, legs, mass and delays are, from walking.",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
-    parser.add_argument("--mass", type=float, help="body mass [kg]; else measured with the plates")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE",
+                        help="of one walk; several are joined by their times")  # fmt: skip
+    parser.add_argument("--mass", type=float,
+                        help="body mass [kg]; else by the file, or the plates")  # fmt: skip
     parser.add_argument(
         "--columns",
         nargs="+",
         metavar="CHANNEL=COLUMN",
         help="what you take them for: wrong ones are refused with what was seen",
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a file")
+    parser.add_argument("--json", action="store_true", help="as one JSON object")
     parser.add_argument("--save", type=Path, metavar="NEW.csv",
                         help="write the signals in SI units, if nothing is wrong")  # fmt: skip
     parser.add_argument("--bounded", action="store_true",
@@ -168,31 +181,32 @@ def check_files(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     if options.bounded:
         limit_resources()
-    status = 0
-    for path in options.files:
-        try:
-            status = max(status, _check_file(path, options))
-        except (GaitInputError, OSError) as error:
-            print(f"{path.name}: {error}", file=sys.stderr)
-            return 2
-    return status
+    try:
+        return _check_walk(options)
+    except (GaitInputError, OSError) as error:
+        print(f"{', '.join(path.name for path in options.files)}: {error}", file=sys.stderr)
+        return 2
 
 
-def _check_file(path: Path, options: argparse.Namespace) -> int:
-    """Print what a file's columns are; return the exit status."""
-    table = read_any_table(path)
+def _check_walk(options: argparse.Namespace) -> int:
+    """Print what the columns of a walk are; return the exit status."""
+    if options.mass is not None:
+        check_mass(options.mass)
+    table = read_any_table(*options.files)
+    if not options.json:
+        print(f"Comparing {len(table)} columns …", file=sys.stderr)
     given = read_column_map(options.columns) if options.columns else None
     check = check_setup(table, options.mass)
     if options.json:
         print(json.dumps(setup_to_json(check, list(table)), allow_nan=False))
     else:
-        print(path, *describe_setup(check), sep="\n")
+        print(*options.files, *describe_setup(check), sep="\n")
     wrong = compare_with_setup(check, given) if given else []
     for text in wrong:
         print(text, file=sys.stderr)
     if options.save and not wrong:
         columns = given or check.columns
-        require_columns(path, table, columns)
+        require_columns(options.files[0], table, columns)
         frame = columns.frame or check.columns.frame
         frames = None if frame is None else table[frame.name]
         save_signals(options.save, *apply_columns(table, columns), frames)

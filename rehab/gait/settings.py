@@ -71,7 +71,7 @@ class DetectorSettings:
 
 
 def check_mass(mass_kg: float | None) -> None:
-    """Raise GaitInputError, with the cure, for a body mass [kg] that is missing or nobody's."""
+    """Raise GaitInputError, with the cure, for a body mass [kg] that is missing or impossible."""
     if mass_kg is None or not MASS_MIN_KG <= mass_kg <= MASS_MAX_KG:
         raise GaitInputError(
             f"A body mass of {mass_kg} kg cannot be used. Weigh the patient and give "

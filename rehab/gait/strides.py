@@ -18,12 +18,12 @@ class RejectionReason(StrEnum):
     LATE = "late"  # samples came late where A2 is made, and moment or angle was made then
     RATE = "rate"  # samples come at another rate than the given one
     FORCE_LOST = "force_lost"  # the vertical force vanished or was not finite
-    FORCE_TOO_LARGE = "force_too_large"  # more than anybody's weight: unit, or mass
+    FORCE_TOO_LARGE = "force_too_large"  # more than any person bears: unit, or mass
     SHORT_STANCE = "short_stance"
     LONG_STANCE = "long_stance"  # standing
     CUT_OFF = "cut_off"  # the record ends before the foot leaves the floor
     IRREGULAR = "irregular"  # far from the usual stance: stumble, stop, both feet on one plate
-    CROSS_STEP = "cross_step"  # the other foot was not where a walker has it
+    CROSS_STEP = "cross_step"  # cross-talk of the plates: the other foot stood on this one too
     WEIGHT = "weight"  # the plates do not carry this person
     MOMENT_LOST = "moment_lost"  # not finite, frozen or jumping
     MOMENT_SIGN = "moment_sign"  # plantarflexion is not positive
@@ -46,7 +46,7 @@ class Flag(StrEnum):
     OFFSET = "offset"  # the plate's zero has moved by more than 15 N; taken out of the contacts
     SUPPORTED = "supported"  # a handrail or harness carries more than 5 % of the weight
     CLONUS = "clonus"  # the ankle beats in stance
-    UNUSUAL_TIMING = "unusual_timing"  # the ankle brakes when nobody's known does; A2 is less sure
+    UNUSUAL_TIMING = "unusual_timing"  # the ankle brakes outside the known range; A2 is less sure
     LATE = "late"  # samples came late and were put back to when they were taken
     LOST = "lost"  # samples are missing where A2 does not notice
 
@@ -63,7 +63,7 @@ class Stride(NamedTuple):
         ``cut_off``, the end of the record.
     a2_w_kg, a2_time_s
         Peak ankle push-off power [W/kg] and when it was reached [s]; None where there is none. Only
-        a valid stride's value may be shown to anybody.
+        a valid stride's value may be shown.
     valid, reasons, flags
         Whether the stride counts, why not, and what the therapist should know of it.
     stance_s

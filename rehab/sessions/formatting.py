@@ -81,7 +81,7 @@ def format_schedule(schedule: Schedule) -> str:
     """Return when feedback comes, in a few words."""
     values = {"steps": schedule.interval, "band": round(100 * schedule.band)}
     match schedule.kind:
-        case ScheduleKind.EVERY if schedule.tells_all:
+        case ScheduleKind.EVERY if schedule.answers_all:
             return gettext("every step")
         case ScheduleKind.EVERY:
             return gettext("every %(steps)d steps") % values

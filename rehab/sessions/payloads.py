@@ -68,13 +68,14 @@ def describe_now(fold: SessionFold) -> Message:
 
 
 def describe_source_phase(fold: SessionFold) -> Message:
-    """Return the phase as a simulated patient needs to know it."""
+    """Return the phase and its feedback type as a simulated patient needs to know them."""
     phase = fold.phase
     return {
         "kind": phase.kind,
         "name": phase.name,
         "feedback": phase.feedback,
         "gain": phase.gain,
+        "valence": fold.valence.slug,
     }
 
 

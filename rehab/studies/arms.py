@@ -34,7 +34,7 @@ class Condition:
     measure, protocol
         Keys of what is trained and of the phases.
     schedule
-        After which steps the patient is told.
+        After which steps the patient gets feedback.
 
     Raises
     ------
@@ -67,7 +67,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class ArmRule:
-    """An arm: its code (which tells nothing of its condition), name, part of the ratio, condition.
+    """An arm: its code (which reveals no condition), name, part of the ratio, condition.
 
     Raises
     ------

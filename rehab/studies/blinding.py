@@ -24,7 +24,7 @@ MARKABLE = {Task.ASSESSOR: Role.PT, Task.INTERIM: Role.RESEARCHER}
 def give_mark(study: Study, user: User, task: Task, by: User | None, now: datetime) -> None:
     """Mark an account as an assessor, or as one that may look before the end.
 
-    Raises InvalidSetting for a role that cannot have the mark, somebody who has set up sessions of
+    Raises InvalidSetting for a role that cannot have the mark, an account that set up sessions of
     the study, and while one is open.
     """
     with transaction.atomic():
@@ -32,8 +32,8 @@ def give_mark(study: Study, user: User, task: Task, by: User | None, now: dateti
         if user.clinic_id != study.clinic_id or user.role != MARKABLE[task]:
             raise InvalidSetting(
                 gettext(
-                    "Assessors are therapists, and who looks early is a researcher. %(name)s has "
-                    "another role."
+                    "Only therapists can be assessors, and only researchers can see interim "
+                    "results. %(name)s has another role."
                 )
                 % {"name": user}
             )
@@ -55,24 +55,18 @@ def give_mark(study: Study, user: User, task: Task, by: User | None, now: dateti
 
 
 def take_mark(mark: StudyMark, by: User | None, now: datetime) -> None:
-    """End a mark. An assessor may see sessions from here on; the study's events tell since when."""
+    """End a mark. An assessor may see sessions from here on; the events record since when."""
     with transaction.atomic():
         lock(mark.study)
         mark.refresh_from_db()
         if mark.ended_at is None:
             mark.ended_at = now
             mark.save(update_fields=["ended_at"])
-            note(
-                mark.study,
-                StudyEvent.Kind.UNMARKED,
-                by,
-                now,
-                about=f"{mark.task}: {mark.user}",
-            )
+            note(mark.study, StudyEvent.Kind.UNMARKED, by, now, about=f"{mark.task}: {mark.user}")
 
 
 class UnblindingRefused(InvalidSetting):
-    """Somebody who must not know an arm asked for it."""
+    """An account that must not know an arm asked for it."""
 
 
 def reveal_arms(
@@ -85,13 +79,16 @@ def reveal_arms(
     """
     study = enrollment.study
     if not reason.strip():
-        raise InvalidSetting(gettext("Say why the arm must be known: the study's report tells it."))
+        raise InvalidSetting(
+            gettext("Say why the arm must be known. The study's report shows the reason.")
+        )
     if study.state == StudyState.RUNNING and has_mark(study, by, Task.ASSESSOR):
         note(study, StudyEvent.Kind.REFUSED, by, now, enrollment=enrollment, reason=reason.strip())
         raise UnblindingRefused(
             gettext(
-                "You assess in this study, and your measurements would lose their worth. Ask a "
-                "lead or a therapist who treats: they can act at once, also in an emergency."
+                "You are an assessor in this study, and knowing the arm would invalidate your "
+                "measurements. Ask a lead or a treating therapist: they can act at once, even in "
+                "an emergency."
             )
         )
     audit_log.record(

@@ -47,7 +47,10 @@ def enroll(
         _check_may_enter(study, patient)
         if by is not None and has_mark(study, by, StudyMark.Task.ASSESSOR):
             raise InvalidSetting(
-                gettext("You assess in this study. A colleague who treats takes patients in.")
+                gettext(
+                    "You are an assessor in this study. Ask a colleague who treats to enroll "
+                    "patients."
+                )
             )
         version = current_version(study)
         before = Allocation.everywhere.filter(enrollment__study=study).order_by("pk")
@@ -76,7 +79,7 @@ def enroll(
 
 def _check_may_enter(study: Study, patient: Patient) -> None:
     if study.state != StudyState.RUNNING:
-        raise InvalidSetting(gettext("Only a running study takes patients in. Start it first."))
+        raise InvalidSetting(gettext("Only a running study can enroll patients. Start it first."))
     if study.enrollments.count() >= study.participants:
         message = gettext(
             "The study has all its %(count)s participants. Close it, or revise the number."
@@ -94,8 +97,8 @@ def _check_may_enter(study: Study, patient: Patient) -> None:
         raise InvalidSetting(message % (names | {"study": found.study.code}))
     if not patient.simulated and Purpose.RESEARCH not in active_consents(patient):
         message = gettext(
-            "%(patient)s has not consented to research. Note the consent on the page “Consent and "
-            "data” first."
+            "%(patient)s has not consented to research. Record the consent on the page “Consent "
+            "and data” first."
         )
         raise InvalidSetting(message % names)
     check_no_open_session(study, patient)

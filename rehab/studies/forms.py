@@ -47,13 +47,16 @@ ALLOCATION_FIELDS = (
 
 
 class StudyForm(ClinicForm):
-    """The plan of a study. A registered one keeps its allocation, and says why it is changed."""
+    """The plan of a study. A registered one retains its allocation and asks why it is changed."""
 
     block_sizes = forms.CharField(
         label=_("sizes of blocks"),
         initial="4, 6",
         required=False,
-        help_text=_("Of permuted blocks, drawn by chance. Sealed: who enrolls does not see them."),
+        help_text=_(
+            "Of permuted blocks, drawn at random. Sealed: those who enroll patients do not see "
+            "them."
+        ),
     )
     factors_text = forms.CharField(
         label=_("factors to balance"),
@@ -196,8 +199,8 @@ def save_arms(arms: Any, study: Study) -> None:
     arms.save(commit=False)
     for row in arms.deleted_objects:
         row.delete()
-    kept = [f for f in arms.forms if f.instance.code and f not in arms.deleted_forms]
-    for position, form in enumerate(kept):
+    filled = [f for f in arms.forms if f.instance.code and f not in arms.deleted_forms]
+    for position, form in enumerate(filled):
         form.instance.study, form.instance.position = study, position
         form.instance.save()
 

@@ -99,9 +99,7 @@ class Study(ClinicModel):
     days_between = models.PositiveSmallIntegerField(_("days between visits"), default=1)
     washout_days = models.PositiveSmallIntegerField(_("days between periods"), default=7)
     goal_percent = models.FloatField(
-        _("goal (% of baseline)"),
-        default=100,
-        validators=between(50, 200, "%"),
+        _("goal (% of baseline)"), default=100, validators=between(50, 200, "%")
     )
     primary_outcome = models.CharField(_("primary outcome"), max_length=32, choices=OUTCOMES)
     secondary_outcomes = models.JSONField(_("secondary outcomes"), default=list, blank=True)
@@ -195,11 +193,7 @@ class Arm(ScopedModel):
     code = models.CharField(_("code"), max_length=4)
     name = models.CharField(_("name"), max_length=64)
     weight = models.PositiveSmallIntegerField(_("part of the ratio"), default=1)
-    valence = models.CharField(
-        _("feedback type"),
-        max_length=16,
-        choices=valence_choices,
-    )
+    valence = models.CharField(_("feedback type"), max_length=16, choices=valence_choices)
     gain = models.FloatField(_("gain"), default=1.0)
     robot_intensity = models.FloatField(
         _("robot"),
@@ -241,7 +235,7 @@ class Arm(ScopedModel):
         return f"{self.code}: {self.name}"
 
     @property
-    def told(self) -> str:
+    def feedback_schedule(self) -> str:
         """When feedback comes, in words."""
         return format_schedule(self.to_rule().condition.schedule)
 
@@ -304,5 +298,5 @@ class StudyMark(AppendOnlyModel):
 
 
 def has_mark(study: Study, user: Any, task: StudyMark.Task) -> bool:
-    """Return whether somebody has a mark of a study now."""
+    """Return whether an account has a mark of a study now."""
     return study.marks.filter(user=user, task=task, ended_at=None).exists()

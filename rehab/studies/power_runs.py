@@ -25,11 +25,11 @@ from rehab.training.valences import find_valence
 
 SIMULATIONS_MAX = 5000
 STORED_EVERY_S = 3.0  # so much work is lost at most
-STALLED_AFTER = timedelta(seconds=60)  # of a run that nobody has written to since
+STALLED_AFTER = timedelta(seconds=60)  # without a write to the run
 
 
 class PowerRun(ScopedModel):
-    """Studies simulated from seeds 0, 1, 2 …, each once: whoever goes on begins where it stopped.
+    """Studies simulated from seeds 0, 1, 2 …, each once: a continued run begins where it stopped.
 
     ``settings``: what `build_trial` reads. ``found``: by seed, what each comparison of arms found.
     """
@@ -61,13 +61,13 @@ class PowerRun(ScopedModel):
     def assumptions(self) -> str:
         """From which seeds it simulates, and what it assumes, in words."""
         names = ("sd_percent", "kept_percent", "dropout_percent")
-        told = {name: f"{self.settings[name]:g}" for name in names}
+        numbers = {name: f"{self.settings[name]:g}" for name in names}
         words = gettext(
             "Seeds 0 to %(last)d; people differ by %(sd_percent)s %%, washout keeps "
             "%(kept_percent)s %%, %(dropout_percent)s %% leave before each visit. Pairs are not "
             "corrected for their number."
         )
-        return words % (told | {"last": self.simulations - 1})
+        return words % (numbers | {"last": self.simulations - 1})
 
     @property
     def is_done(self) -> bool:
@@ -75,7 +75,7 @@ class PowerRun(ScopedModel):
         return self.done >= self.simulations
 
     def is_working(self, now: datetime) -> bool:
-        """Return whether somebody simulates for it now."""
+        """Return whether a process simulates for it now."""
         if self.is_done or self.trouble or self.worked_at is None:
             return False
         return now - self.worked_at < STALLED_AFTER
@@ -86,10 +86,6 @@ class PowerRun(ScopedModel):
         return summarize(
             [SimulatedDifference(*row) for rows in self.found.values() for row in rows]
         )
-
-    def build_trial(self) -> Trial:
-        """Return the study to simulate. Raises InvalidSetting."""
-        return build_trial(self.study, self.settings)
 
 
 def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
@@ -145,7 +141,7 @@ def work(run: PowerRun) -> Iterator[PowerRun]:
     Raises InvalidSetting, and notes it, where the study cannot be simulated any more.
     """
     try:
-        trial = run.build_trial()
+        trial = build_trial(run.study, run.settings)
     except InvalidSetting as problem:
         run.trouble = str(problem)
         run.save(update_fields=["trouble"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import datetime
 
 from django.db import transaction
@@ -23,7 +23,7 @@ from rehab.training.measures import InvalidSetting
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a session's steps come from, and at which station it is walked."""
+    """Where and how a session is walked: parts of a `SessionRequest`."""
 
     station: Station | None = None
     source: str = ""
@@ -53,7 +53,7 @@ def start_session(
 ) -> TrainingSession:
     """Create the session of a participant's next visit, with the arm's condition.
 
-    ``chosen_id``: key of the visit that somebody saw as the next one, where somebody did.
+    ``chosen_id``: key of the visit that the page showed as the next one; None without a page.
 
     Raises InvalidSetting for a participant who has withdrawn, walked all visits or has a session
     that is open, where another visit is next, for a study that is not running or was changed, a
@@ -99,13 +99,9 @@ def start_session(
                 measure=arm.measure,
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
-                station=place.station,
                 created_by=by,
-                source=place.source,
-                simulated=place.simulated,
-                source_args=place.source_args,
-                walking=place.walking,
                 may_change_type=False,  # it is what the arm was allocated for
+                **{part.name: getattr(place, part.name) for part in fields(place)},
             )
         )
         visit.save()

@@ -24,7 +24,7 @@ LEAST_HIT_RATE, MOST_HIT_RATE = 0.3, 0.9
 
 
 class AdaptationMode(StrEnum):
-    """What becomes of the goal while somebody walks."""
+    """What becomes of the goal while the patient walks."""
 
     OFF = gettext_noop("off")
     SUGGEST = gettext_noop("suggest")
@@ -137,8 +137,8 @@ class Staircase:
     the goal becomes ``goal × (1 + step × (h − n × p))``, within ``limit`` of the anchor. Where
     lower is better the goal is divided instead.
 
-    A goal that anybody else has set is the new anchor, and a new block begins with it; another gain
-    begins a new block.
+    A goal that was set in any other way is the new anchor, and a new block begins with it; another
+    gain begins a new block.
 
     Attributes
     ----------

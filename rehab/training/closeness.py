@@ -14,7 +14,7 @@ COVERAGE = 1.96
 
 @dataclass(frozen=True, slots=True)
 class CloseSteps:
-    """Which steps are told as close: they pay and take nothing, whatever the feedback type.
+    """Which steps are shown as close: they pay and take nothing, whatever the feedback type.
 
     A value comes with its standard deviation, and so with an interval that holds the true one 19
     times of 20. Where more than a set part of the interval lies on the other side of the goal, a
@@ -24,7 +24,7 @@ class CloseSteps:
     ----------
     part
         That part of the interval (ratio): at 0 each step whose interval holds the goal is close, at
-        0.5 none. None where no step is told as close.
+        0.5 none. None where no step is shown as close.
     words
         What the patient reads of one.
 

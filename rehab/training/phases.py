@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from rehab.training.measures import InvalidSetting, check_baseline_percent, check_gain
 from robot.marking import gettext_noop
@@ -147,23 +148,25 @@ def make_phase(
     name: str = "",
     *,
     feedback: bool | None = None,
-    gain: float = 1.0,
-    strides: int | None = None,
-    seconds: float | None = None,
-    goal_percent: float | None = None,
-    robot: bool = True,
-    rest_s: float | None = None,
+    **settings: Any,
 ) -> Phase:
-    """Return a phase; name and feedback are its kind's unless given. Raises InvalidSetting."""
+    """Return a phase.
+
+    Parameters
+    ----------
+    kind
+        Slug of its kind.
+    name, feedback
+        Those of its kind unless given.
+    settings
+        The other fields of ``Phase``.
+
+    Raises
+    ------
+    InvalidSetting
+        For a phase that cannot be walked.
+    """
     known = find_phase_kind(kind)
     return Phase(
-        kind=kind,
-        name=name or known.label,
-        feedback=known.feedback if feedback is None else feedback,
-        gain=gain,
-        strides=strides,
-        seconds=seconds,
-        goal_percent=goal_percent,
-        robot=robot,
-        rest_s=rest_s,
+        kind, name or known.label, known.feedback if feedback is None else feedback, **settings
     )

@@ -1,7 +1,7 @@
-"""Feedback schedules: after which steps the patient is told how it went.
+"""Feedback schedules: after which steps the patient gets feedback.
 
-A schedule changes what is told, never what is scored: each valid step is judged, paid and counted.
-Everything is told to the PT, and the robot has rules of its own (``cueing``).
+A schedule changes what is shown, never what is scored: each valid step is judged, paid and counted.
+The PT sees everything, and the robot has rules of its own (``cueing``).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Schedule:
             raise InvalidSetting("Feedback becomes rarer after 1 to 1000 steps each time.")
 
     @property
-    def tells_all(self) -> bool:
+    def answers_all(self) -> bool:
         """Whether each step is answered."""
         return self.kind is ScheduleKind.EVERY and self.interval == 1
 
@@ -81,7 +81,7 @@ class Schedule:
             return Schedule(self.kind, self.interval, stage=self.stage)
         return Schedule(self.kind, self.interval)
 
-    def tells(self, count: int, performance: float) -> bool:
+    def answers(self, count: int, performance: float) -> bool:
         """Return whether the page answers a step.
 
         Parameters
@@ -112,13 +112,13 @@ def check_schedule_kind(kind: object) -> ScheduleKind:
 
 
 @dataclass(slots=True)
-class Untold:
-    """What the patient has not been told yet: judged steps since the last answer.
+class FeedbackSummary:
+    """What one answer sums up: the judged steps since the answer before it.
 
     Attributes
     ----------
     steps, hits, performance_sum, shown_sum, close, points
-        Of them, as a summary tells them; ``hits`` has none that was close, ``points`` are what each
+        Of them; ``hits`` has none that was close, ``points`` are what each
         earned by the feedback type of its time.
     """
 

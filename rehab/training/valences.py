@@ -15,7 +15,7 @@ from rehab.training.bands import BANDS_MAX, TEXT_MAX, Band, Confetti
 from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
 
-# Larger numbers tell a patient nothing more, and overflow where points are stored.
+# Larger numbers say no more to a patient, and overflow where points are stored.
 POINTS_MAX = 1000
 
 

@@ -63,7 +63,15 @@ class DriveTrain:
         return not self._orders and self._target == self._free == STANDING
 
     def order(self, wheels: Wheels, now_s: float) -> None:
-        """Order speeds of the wheels, which the motors hear after the dead time."""
+        """Order speeds of the wheels, which the motors hear after the dead time.
+
+        Parameters
+        ----------
+        wheels
+            Speeds, left and right [m/s].
+        now_s
+            The time [s].
+        """
         self._orders.append((now_s + self.dead_time_s, wheels))
 
     def next_change_s(self) -> float:

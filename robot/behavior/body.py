@@ -71,7 +71,15 @@ class Body:
         return self.state
 
     def refusal_reason(self, gesture: Gesture, state: BaseState) -> str:
-        """Return what keeps it from performing a gesture; empty where it may."""
+        """Return what keeps it from performing a gesture; empty where it may.
+
+        Parameters
+        ----------
+        gesture
+            At the size that it would be played at.
+        state
+            What the base reports.
+        """
         if not self.base.abilities.moves:
             return CANNOT_MOVE
         if reason := self.safety.rejection_reason(gesture):
@@ -87,7 +95,21 @@ class Body:
     def start(
         self, gesture: Gesture, now_s: float, state: BaseState, answer: Answer, pace: float = 1.0
     ) -> None:
-        """Start a gesture that nothing refuses, and answer by it."""
+        """Start a gesture that nothing refuses, and answer by it.
+
+        Parameters
+        ----------
+        gesture
+            At the size that it is played at.
+        now_s
+            The time [s].
+        state
+            What the base reports.
+        answer
+            How to answer beside motion.
+        pace
+            Share of each waypoint's own pace, above 0 and up to 1.
+        """
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
         pose = self.read().pose  # a simulated base may have been put back
         self.player.start(gesture, now_s, pose, after_s, pace)
@@ -100,6 +122,13 @@ class Body:
         """Arm it and start a gesture where it stands, or return why not, as a code.
 
         The caller vouches for a person who watches. No base is carried home first.
+
+        Parameters
+        ----------
+        gesture
+            In full size; an open loop plays half of it.
+        now_s
+            The time [s].
         """
         safety, state = self.safety, self.read()
         safety.is_watched = True

@@ -30,7 +30,15 @@ class Expression:
         self._notes: deque[Note] = deque()
 
     def start(self, score: Score, now_s: float) -> None:
-        """Begin a score, in place of what is played."""
+        """Begin a score, in place of what is played.
+
+        Parameters
+        ----------
+        score
+            Its times count from now on.
+        now_s
+            The time [s].
+        """
         self._began_s = now_s
         self._lights, self._notes = deque(score.lights), deque(score.notes)
 

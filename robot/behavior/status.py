@@ -21,6 +21,9 @@ LIGHTS = {
     Indication.STOPPED: ("red", "off"),
 }
 
+# What a base shows in these states; it is ready where it is idle for no reason, and else waits.
+SHOWN = {"stopped": Indication.STOPPED, "performing": Indication.MOVING}
+
 STATUS_MOVING_S = 0.25
 STATUS_IDLE_S = 1.0
 MAX_REPORTS = 64  # while they cannot be sent, the oldest are dropped
@@ -68,7 +71,17 @@ class StatusReporter:
         self.on_report(report)
 
     def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
-        """Report that a gesture has started or ended."""
+        """Report that a gesture has started or ended.
+
+        Parameters
+        ----------
+        gesture
+            The gesture.
+        phase
+            ``started`` or ``ended``.
+        outcome
+            How it ended, as a code; empty at its start.
+        """
         report = {"kind": "gesture", "name": gesture.name, "phase": phase, "outcome": outcome}
         is_open = not self._base.abilities.closed_loop
         self.report(report | {"open_loop": True} if is_open else report)
@@ -157,18 +170,9 @@ class StatusReporter:
 
     def show(self, state: RobotState, *, is_quiet: bool) -> None:
         """Show a state by the base's lights, and by a sound unless it is quiet."""
-        match state:
-            case "stopped", _:
-                indication = Indication.STOPPED
-            case "performing", _:
-                indication = Indication.MOVING
-            case "idle", "":
-                indication = Indication.READY
-            case _:
-                indication = Indication.WAITING
+        indication = SHOWN.get(state[0], Indication.WAITING)
+        if state == ("idle", ""):
+            indication = Indication.READY
         if indication is not self._indication:
             self._indication = indication
-            self._base.show(
-                indication,
-                aloud=not is_quiet and indication in self._aloud,
-            )
+            self._base.show(indication, aloud=not is_quiet and indication in self._aloud)

@@ -105,7 +105,15 @@ class BlackBox:
         self._waiting.append({"at_s": round(self._monotonic(), 3), **what})
 
     def retain(self, reason: str, session: int | None) -> None:
-        """Retain the recording around now; within that of an earlier reason, only note this one."""
+        """Retain the recording around now; within that of an earlier reason, only note this one.
+
+        Parameters
+        ----------
+        reason
+            What stopped the robot, as a code.
+        session
+            Number of the session that it was in; None for none.
+        """
         is_first = self._retention is None
         self.note(retained=reason, is_first=is_first)
         if is_first:

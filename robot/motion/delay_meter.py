@@ -34,7 +34,17 @@ class DelayMeter:
         self._last: tuple[float, Pose] | None = None
 
     def add(self, ordered: Twist, pose: Pose, now_s: float) -> None:
-        """Add a tick: what was ordered last before it, and where the base is now."""
+        """Add a tick: what was ordered last before it, and where the base is now.
+
+        Parameters
+        ----------
+        ordered
+            The order that held up to now.
+        pose
+            Where the base is by its odometry.
+        now_s
+            The time [s].
+        """
         last, self._last = self._last, (now_s, pose)
         self._orders.appendleft(ordered)
         if last is None or not 0 < now_s - last[0] <= LONGEST_STEP_S:

@@ -193,12 +193,30 @@ def check_gesture(gesture: Gesture) -> None:
 
 
 def needed_time_s(segments: Sequence[Segment], limits: Limits, hold_s: float) -> float:
-    """Return the time that a waypoint needs at least [s]: its segments with slack, and its hold."""
+    """Return the time that a waypoint needs at least [s]: its segments with slack, and its hold.
+
+    Parameters
+    ----------
+    segments
+        Turns and drives that lead to the waypoint.
+    limits
+        Speeds and accelerations at the waypoint's pace.
+    hold_s
+        How long it stays there [s].
+    """
     return SLACK * sum(segment.min_duration_s(limits) for segment in segments) + hold_s
 
 
 def check_waypoint(number: int, waypoint: Waypoint) -> None:
-    """Check a waypoint by itself, whatever comes before it. Raises BadWaypoint."""
+    """Check a waypoint by itself, whatever comes before it. Raises BadWaypoint.
+
+    Parameters
+    ----------
+    number
+        Its place in the gesture, from 1.
+    waypoint
+        The waypoint.
+    """
     if not all(map(math.isfinite, astuple(waypoint))):
         raise BadWaypoint(number, NOT_FINITE)
     away_m = waypoint.pose.distance_m(HOME)

@@ -74,7 +74,15 @@ NUMBERS = [field.name for field in fields(Move)]
 
 
 def to_data(name: str, moves: Sequence[Move]) -> dict[str, Any]:
-    """Return the JSON data of a gesture."""
+    """Return the JSON data of a gesture.
+
+    Parameters
+    ----------
+    name
+        Its name; not checked here.
+    moves
+        Its steps.
+    """
     return {"name": name, "steps": [asdict(move) for move in moves]}
 
 

@@ -49,6 +49,13 @@ def plan_path(start: Pose, waypoint: Pose) -> tuple[Segment, ...]:
     The base turns to face the place, drives there and turns to the waypoint's heading. A place that
     lies behind is driven to backwards, so that a base that went out comes back the way it went.
     A turn by 0 is a segment too: following it corrects the heading.
+
+    Parameters
+    ----------
+    start
+        Where the base is.
+    waypoint
+        Where it is to come to; its heading may be more than a full turn away.
     """
     segments: list[Segment] = []
     heading_rad = start.heading_rad

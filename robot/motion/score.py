@@ -78,7 +78,17 @@ class Score:
 
 
 def notes(*frequencies_hz: float, at_s: float = 0.0, each_s: float = 0.12) -> tuple[Note, ...]:
-    """Return notes that follow each other."""
+    """Return notes that follow each other.
+
+    Parameters
+    ----------
+    frequencies_hz
+        Their pitches [Hz].
+    at_s
+        When the first begins [s].
+    each_s
+        How long each is [s], without a pause between.
+    """
     return tuple(
         Note(round(at_s + number * each_s, 3), frequency_hz, each_s)
         for number, frequency_hz in enumerate(frequencies_hz)

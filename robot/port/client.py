@@ -92,7 +92,15 @@ class PortClient:
         self._thread.start()
 
     def order(self, frame: bytes, once: bytes = b"") -> None:
-        """Order this frame in place of the last one; ``once`` is sent one time before it."""
+        """Order this frame in place of the last one; ``once`` is sent one time before it.
+
+        Parameters
+        ----------
+        frame
+            Commands for the wheels, of up to 64 bytes.
+        once
+            Other commands, of up to 64 bytes.
+        """
         now_s = self._monotonic()
         if now_s - self._ordered_s > ORDER_HOLDS_S:
             self._last_report_s = now_s  # we hung, not the process

@@ -73,7 +73,15 @@ class PortOpener:
 
 
 def send_stops(open_port: Callable[[], SerialPort], stop: bytes) -> bool:
-    """Stop the base at a port that nobody has open, and return whether it could. Never raises."""
+    """Stop the base at a port that nobody has open, and return whether it could. Never raises.
+
+    Parameters
+    ----------
+    open_port
+        Opens the port; may raise anything.
+    stop
+        The frame that stops the base.
+    """
     with contextlib.suppress(Exception):  # whatever a driver may raise: the port is lost
         port = open_port()
         try:

@@ -70,7 +70,15 @@ class Setpoint:
         self._lock = threading.Lock()  # orders come from another thread
 
     def store(self, line: bytes, now_s: float) -> bytes:
-        """Store an order, and return the frame that it wants sent once."""
+        """Store an order, and return the frame that it wants sent once.
+
+        Parameters
+        ----------
+        line
+            One line of the orders; one that is none is counted.
+        now_s
+            The computer's monotonic clock [s].
+        """
         try:
             order = Order.read(line)
         except BadOrder:

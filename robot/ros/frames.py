@@ -69,7 +69,15 @@ def publish(topic: Topic, message: Mapping[str, Any]) -> Frame:
 
 
 def subscribe(topic: Topic, *, newest_every_ms: int = 0) -> Frame:
-    """Return a subscription: to each message, or to the newest at an interval [ms]."""
+    """Return a subscription: to each message, or to the newest at an interval [ms].
+
+    Parameters
+    ----------
+    topic
+        The topic.
+    newest_every_ms
+        Interval [ms] at which the newest message is sent; 0 for each message.
+    """
     return {
         "op": "subscribe",
         "topic": topic.name,

@@ -59,7 +59,15 @@ def write_twist(twist: Twist, kind: str = TWIST) -> dict[str, Any]:
 
 
 def read_twist(message: Message, kind: str = TWIST) -> Twist:
-    """Read a geometry_msgs/Twist, or a TwistStamped. Raises BadRosFrame."""
+    """Read a geometry_msgs/Twist, or a TwistStamped. Raises BadRosFrame.
+
+    Parameters
+    ----------
+    message
+        What came on the topic.
+    kind
+        Its type, as ROS 1 or 2 writes it.
+    """
     path = ("twist",) if without_msg(kind) == TWIST_STAMPED else ()
     return Twist(
         _number(message, FASTEST, *path, "linear", "x"),
@@ -82,7 +90,15 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
 
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
-    """Read an event: which sensor, and whether it detects a hazard. Raises BadRosFrame."""
+    """Read an event: which sensor, and whether it detects a hazard. Raises BadRosFrame.
+
+    Parameters
+    ----------
+    kind
+        Type of the topic: one of ``EVENTS``, or ``BOOL``, as ROS 1 or 2 writes it.
+    message
+        What came on the topic.
+    """
     kind = without_msg(kind)
     if kind == BOOL:
         return 0, read_flag(message, "data")

@@ -72,7 +72,17 @@ def read_name(message: Mapping[str, Any], name: str) -> str:
 
 
 def read_whole(message: Mapping[str, Any], name: str, *, low: int, high: int = 2**31 - 1) -> int:
-    """Return a whole number of a message, from ``low`` to ``high``. Raises BadFrame."""
+    """Return a whole number of a message, from ``low`` to ``high``. Raises BadFrame.
+
+    Parameters
+    ----------
+    message
+        The message.
+    name
+        The field's name.
+    low, high
+        The least and the largest number, included.
+    """
     value = message.get(name)
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
         upto = f"{low} or more" if high == 2**31 - 1 else f"{low} to {high}"

@@ -29,12 +29,7 @@ def many_files():
 
 
 def run_ours(
-    tmp_path: Path,
-    count: int,
-    viewers: int,
-    *,
-    seconds: float = 6.0,
-    slices: int = 1,
+    tmp_path: Path, count: int, viewers: int, *, seconds: float = 6.0, slices: int = 1
 ) -> dict[str, Any]:
     rows, seen = tmp_path / "rows.json", tmp_path / "seen.json"
     program = ("-m", "tests.bench.watched", str(seen))

@@ -38,10 +38,7 @@ def start(*words):
     """Start the program that drives a base."""
     command = [sys.executable, "-m", "robot", "gesture", "original_positive", "--times", "9"]
     return subprocess.Popen(
-        [*command, *words],
-        cwd=ROOT,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        [*command, *words], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
 
 

@@ -47,12 +47,7 @@ def has_more(walk: Walk, mark: int) -> bool:
 class Faults:
     """The set, its load, and what each fault did."""
 
-    def __init__(
-        self,
-        broken: FaultySet,
-        entrance: Entrance,
-        seed: int,
-    ) -> None:
+    def __init__(self, broken: FaultySet, entrance: Entrance, seed: int) -> None:
         self.set, self.pair, self.restarts = broken, broken.pair, broken.restarts
         self.entrance = entrance
         self.began_s = 0.0

@@ -15,6 +15,7 @@ pytest.importorskip("pybullet", reason="pybullet is not installed")
 
 from robot.bases.kobuki_protocol.commands import BaseControl, encode_commands
 from robot.bases.kobuki_protocol.frames import FRAME_S
+from robot.bases.kobuki_protocol.wheels import control_to_twist, slow_to_wheels
 from robot.bases.twin.bullet import STEPS, BulletBody
 from robot.bases.twin.faults import Faults
 from robot.bases.twin.firmware import Firmware
@@ -52,7 +53,7 @@ def run_floor() -> float:
     for number in range(FRAMES):
         if ordered(number) != was:
             was = firmware.control = ordered(number)
-            body.roll(*firmware.wheels_m_s)
+            body.roll(*slow_to_wheels(control_to_twist(firmware.control)).wheels_m_s)
         began_s = time.perf_counter()
         for _ in range(STEPS):
             step()

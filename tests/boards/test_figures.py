@@ -6,15 +6,7 @@ import pytest
 
 from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
-from tests.support.boards import (
-    board_of,
-    figures_of,
-    patient_of,
-    people_of,
-    see,
-    told,
-    walk_down,
-)
+from tests.support.boards import board_of, figures_of, patient_of, people_of, see, told, walk_down
 from tests.support.walks import strides, walk
 
 pytestmark = pytest.mark.django_db

@@ -51,13 +51,6 @@ def world(world: World) -> World:
 
 
 @pytest.fixture
-def patient(world) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
-@pytest.fixture
 def client(world) -> Client:
     return client_of(world)
 
@@ -342,9 +335,7 @@ def crowd(world, patient) -> TrainingSession:
 def test_among_ten_thousand_sessions_only_the_patients_rows_are_read(client, crowd):
     url = url_of(crowd)
     client.get(url)
-    with CaptureQueriesContext(
-        connection,
-    ) as asked:
+    with CaptureQueriesContext(connection) as asked:
         page = client.get(url).content.decode()
     # browser session, account, session, boards of the clinic, figures, facts of what is shown
     assert len(asked) == 6

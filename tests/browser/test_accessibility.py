@@ -17,13 +17,10 @@ pytestmark = pytest.mark.browser
 WALKED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.models import Patient
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
-from tests.support.walks import visit
-rosa = Patient.everywhere.create(
-    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
-)
+from tests.support.walks import make_patient, visit
+rosa = make_patient(first_clinic(), code="R-1")
 for number, valence in enumerate(["positive", "negative", "explicit"], start=1):
     visit(rosa, valence, number, 9 - 3 * number, 360, timezone.now())
 blocks = Protocol.everywhere.create(clinic=first_clinic(), name="Blocks")

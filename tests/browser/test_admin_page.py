@@ -16,12 +16,9 @@ pytestmark = pytest.mark.browser
 SEED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.models import Patient
 from rehab.sessions.setup.protocols import Protocol
-from tests.support.walks import strides, walk
-rosa = Patient.everywhere.create(
-    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
-)
+from tests.support.walks import make_patient, strides, walk
+rosa = make_patient(first_clinic(), code="R-1")
 walk(rosa, "positive", strides(60, 60), now=timezone.now(), wanted=0.6)
 blocks = Protocol.everywhere.create(clinic=first_clinic(), name="Blocks")
 blocks.phases.create(position=1, kind="baseline", name="Look", feedback=False, strides=60)

@@ -17,20 +17,14 @@ PATIENCE_MS = 40_000
 SEED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.models import Patient
-from tests.support.walks import strides, walk
+from tests.support.walks import make_patient, strides, walk
 from tests.support.world import agreeing
 clinic = first_clinic()
 for number, name in enumerate("Rosa Ken Mia Omar Lena Pavel".split()):
-    patient = agreeing(Patient.everywhere.create(
-        clinic=clinic, code=f"R-{number}", nickname=name, paretic_side="left", boards="clinic"
-    ))
+    patient = agreeing(make_patient(clinic, name, code=f"R-{number}", boards="clinic"))
     walk(patient, "positive", strides(20 - number, number), now=timezone.now())
     print(patient.alias)
-Patient.everywhere.create(
-    clinic=clinic, code="demo", nickname="Demo", paretic_side="left", simulated=True,
-    boards="clinic",
-)
+make_patient(clinic, "Demo", code="demo", simulated=True, boards="clinic")
 """
 
 

@@ -42,12 +42,10 @@ EXPECTED = """
 from datetime import time
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.models import Patient
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Station
-amara = Patient.everywhere.create(
-    clinic=first_clinic(), code="A-1", nickname="Amara", paretic_side="left"
-)
+from tests.support.walks import make_patient
+amara = make_patient(first_clinic(), "Amara", code="A-1")
 plan_visit(amara, timezone.now().date(), time(9, 30))
 Station.everywhere.create(clinic=first_clinic(), name="Window")
 """
@@ -315,13 +313,9 @@ def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
 LONG_DAY = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.models import Patient
 from rehab.sessions.log import Remark, SessionEvent
-from tests.support.walks import visit, walk
-long = Patient.everywhere.create(
-    clinic=first_clinic(), code="C" * 32, nickname="Maximiliana-Konstantina-Schmidt.",
-    paretic_side="left",
-)
+from tests.support.walks import make_patient, visit, walk
+long = make_patient(first_clinic(), "Maximiliana-Konstantina-Schmidt.", code="C" * 32)
 session = visit(long, "negative", 1, 0, 1600, timezone.now())
 SessionEvent.everywhere.bulk_create(
     SessionEvent(

@@ -12,12 +12,9 @@ from tests.support.servers import Server
 pytestmark = pytest.mark.browser
 WALKED = """
 from django.utils import timezone
-from rehab.people.models import Patient
 from rehab.people.sign_in.first_start import first_clinic
-from tests.support.walks import walk
-rosa = Patient.everywhere.create(
-    clinic=first_clinic(), code="R1", nickname="Rosa", paretic_side="left"
-)
+from tests.support.walks import make_patient, walk
+rosa = make_patient(first_clinic(), code="R1")
 for day in range(3):
     walk(rosa, "positive", [2.5, 1.5] * 10, days_ago=day, now=timezone.now())
 """

@@ -20,16 +20,14 @@ pytestmark = pytest.mark.browser
 SEED = """
 import json
 from django.utils import timezone
-from rehab.people.models import Patient, User
+from rehab.people.models import User
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.sessions.corrections import CorrectedField, add_note, correct_session
 from rehab.sessions.log import Remark, SessionEvent
-from tests.support.walks import strides, walk
+from tests.support.walks import make_patient, strides, walk
 now, lead = timezone.now(), User.everywhere.get(username="pt")
 def person(name, code):
-    return Patient.everywhere.create(
-        clinic=first_clinic(), code=code, nickname=name, paretic_side="left"
-    )
+    return make_patient(first_clinic(), name, code=code)
 rosa, omar, lena = person("Rosa", "R-1"), person("Omar", "O-2"), person("Lena", "L-3")
 for weeks, hits in ((2, 4), (1, 6)):
     walk(rosa, "positive", strides(hits, 10 - hits), days_ago=7 * weeks, now=now)

@@ -25,18 +25,14 @@ NOTHING_BELOW = "() => document.documentElement.scrollHeight <= innerHeight"
 ENDED = """
 import json
 from django.utils import timezone
-from rehab.people.models import Patient
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.sessions.questionnaires import ask
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Device
 from rehab.stations.tablets import COOKIE
-from tests.support.walks import walk
+from tests.support.walks import make_patient, walk
 clinic = first_clinic()
-rosa = Patient.everywhere.create(
-    clinic=clinic, code="R1", nickname="Rosa", paretic_side="left", language="es",
-    screen_text="largest",
-)
+rosa = make_patient(clinic, code="R1", language="es", screen_text="largest")
 session = walk(rosa, "positive", [2.5, 1.5] * 10, now=timezone.now())
 session.station = first_station(clinic)
 session.save()

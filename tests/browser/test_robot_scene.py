@@ -13,24 +13,13 @@ from websockets.sync.client import ClientConnection
 from robot.wire.incident import pack, read_lines
 from tests.support.browsers import signed_in
 from tests.support.incidents import BUMPED
+from tests.support.robot_reports import STATUS
 from tests.support.servers import Server
 from tests.support.walk_seed import hear, make_walks, robot_of
 
 pytestmark = pytest.mark.browser
 
-STATUS = {
-    "kind": "status",
-    "base": "kobuki",
-    "simulated": False,
-    "open_loop": False,
-    "bumpers": True,
-    "state": "performing",
-    "gesture": "celebrate",
-    "reason": "",
-    "battery_v": 15.5,
-    "battery_share": 0.7,
-    "battery_low": False,
-}
+REAL = STATUS | {"base": "kobuki", "bumpers": True, "battery_v": 15.5, "battery_share": 0.7}
 
 
 SEED = """
@@ -72,7 +61,7 @@ def monitor(browser: Browser, server: Server, size: str) -> Iterator[tuple[Page,
 
 
 def report(robot: ClientConnection, **more: object) -> None:
-    robot.send(json.dumps({"type": "report", "report": STATUS | more}))
+    robot.send(json.dumps({"type": "report", "report": REAL | more}))
 
 
 def middle(page: Page) -> tuple[float, float]:

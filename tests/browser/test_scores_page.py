@@ -16,11 +16,8 @@ pytestmark = pytest.mark.browser
 SEED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.models import Patient
-from tests.support.walks import strides, walk
-rosa = Patient.everywhere.create(
-    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
-)
+from tests.support.walks import make_patient, strides, walk
+rosa = make_patient(first_clinic(), code="R-1")
 for index in range(14):
     walk(rosa, "positive", strides(10 + index, 10), days_ago=20 - index, now=timezone.now())
 walk(rosa, "binary", strides(30, 3), days_ago=2, now=timezone.now())

@@ -99,23 +99,6 @@ def test_an_app_and_its_recovery_codes(page: Page, server: Server) -> None:
     expect(page.locator("h1").first).to_contain_text("Today")
 
 
-def test_a_clinic_that_asks_for_it(page: Page, server: Server) -> None:
-    page.goto("/admin/rehab/clinic/1/change/")
-    sign_in(page, server)
-    page.check("#id_second_factor_required")
-    page.click("[name=_save]")
-    expect(page.locator("#id_username")).to_be_visible()  # the sign-in from before is over
-    page.goto("/start/")
-    sign_in(page, server)
-    expect(page.locator("h1")).to_have_text("Set up a second factor")
-    page.goto("/start/")  # there is no way around
-    expect(page.locator("#id_username")).to_be_visible()
-    sign_in(page, server)
-    page.tap("a:has-text('Authenticator app')")
-    set_up_app(page)
-    expect(page.locator("h1").first).to_contain_text("Today")
-
-
 def test_a_passkey(page: Page, server: Server) -> None:
     devices = page.context.new_cdp_session(page)
     devices.send("WebAuthn.enable")

@@ -95,7 +95,7 @@ def test_a_session_is_told_in_the_languages_of_who_reads_it(
         desk.goto(path)
         pt(desk)
     desk.goto("/start/")
-    desk.click("a.p")
+    desk.click("a.tap")
     patient = int(desk.url.rstrip("/").rpartition("/")[2])
     for path in ("", "details/", "screen/", "new/", "sessions/"):
         desk.goto(f"/patients/{patient}/{path}")

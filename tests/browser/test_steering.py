@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browsers import signed_in
+from tests.support.robot_reports import STATUS
 from tests.support.servers import Server, serve
 from tests.support.walk_seed import Walk, feet_of, hear, make_walks, robot_of
 from tests.support.wire import Wire
@@ -196,14 +197,7 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
 def test_a_robot_that_waits_for_a_person_is_let_go_without_scrolling(server, browser):
     """It stands for a reason of its own, nobody has stopped it."""
     (walk,) = make_walks(server, {"valence": "positive"})
-    status = {
-        "kind": "status",
-        "base": "kinematic",
-        "state": "disarmed",
-        "gesture": None,
-        "pose": {"x_m": 0, "y_m": 0, "heading_rad": 0},
-        "reason": "place_unknown",
-    }
+    status = STATUS | {"state": "disarmed", "gesture": None, "reason": "place_unknown"}
     with (
         pages(browser, server, walk, walk.monitor_path) as opened,
         robot_of(server, walk, "kinematic") as robot,

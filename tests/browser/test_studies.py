@@ -18,26 +18,19 @@ pytestmark = pytest.mark.browser
 
 PEOPLE = """
 import json
-from importlib import import_module
-from django.conf import settings
-from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
 from django.utils import timezone
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
-from rehab.people.models import Patient, User
+from rehab.people.models import User
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.people.sign_in.flow import BACKEND
+from tests.support.walk_seed import browser_session
+from tests.support.walks import make_patient
 clinic = first_clinic()
 found = {}
 for name, role in (("lena", "lead"), ("theo", "pt"), ("asha", "pt")):
     user = User.everywhere.create_user(name, role=role, clinic=clinic)
-    cookies = import_module(settings.SESSION_ENGINE).SessionStore()
-    cookies[SESSION_KEY] = str(user.pk)
-    cookies[BACKEND_SESSION_KEY] = BACKEND
-    cookies[HASH_SESSION_KEY] = user.get_session_auth_hash()
-    cookies.save()
-    found[name] = cookies.session_key
-rosa = Patient.everywhere.create(clinic=clinic, code="R1", nickname="Rosa", paretic_side="left")
+    found[name] = browser_session(user)
+rosa = make_patient(clinic, code="R1")
 record_consent(rosa, Purpose.RESEARCH, None, timezone.now())
 found["patient"] = rosa.pk
 print(json.dumps(found))

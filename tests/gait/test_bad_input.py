@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 from rehab.gait import (
     Flag,
     GaitInputError,
-    LegSamples,
     RejectionReason,
     StrideDetector,
-    TwoLegDetector,
 )
 from tests.gait.walks import ANGLE, FORCE, MOMENT, make_walk, pair_up, read_moore
 
@@ -338,18 +336,10 @@ def test_a_plate_that_chatters_is_the_same_in_any_chunks(plate, gain, seed):
     spoiled = (walk.left if plate == "left" else walk.right)[0]
     spoiled[first : first + 3000] *= gain
 
-    def measure(size):
-        detector, strides = TwoLegDetector(1000, walk.mass_kg, look_ahead_s=0.05), []
-        for begin in range(0, len(walk.t_s), size):
-            part = slice(begin, begin + size)
-            legs = (LegSamples(*walk.left[:, part]), LegSamples(*walk.right[:, part]))
-            strides += detector.feed(walk.t_s[part], *legs)
-        return strides + detector.finish()
-
-    whole = measure(len(walk.t_s))
+    whole = walk.both_legs()
     assert len(whole) > 10
     for size in (20, 333, 1000):
-        assert repr(measure(size)) == repr(whole)
+        assert repr(walk.in_chunks(size, look_ahead_s=0.05)) == repr(whole)
 
 
 ODD = st.sampled_from([0.0, np.nan, np.inf, -np.inf, 1e300, -1e300, 25.0, 700.0, -700.0, 1e-300])
@@ -369,16 +359,9 @@ def test_nothing_stops_it(odd, size):
     for row, first, count, value in odd:
         channels[row, first : min(first + count, 1600)] = value
 
-    def measure(step):
-        detector = TwoLegDetector(250, 75.0)
-        strides = []
-        for begin in range(0, channels.shape[1], step):
-            time, *legs = channels[:, begin : begin + step]
-            strides += detector.feed(time, LegSamples(*legs[:3]), LegSamples(*legs[3:]))
-        return strides
-
+    spoiled = replace(walk, t_s=channels[0], left=channels[1:4], right=channels[4:])
     with np.errstate(all="ignore"):
-        strides, others = measure(10**6), measure(size)
+        strides, others = spoiled.in_chunks(10**6), spoiled.in_chunks(size)
     assert repr(strides) == repr(others)
     assert all(s.a2_w_kg is not None and np.isfinite(s.a2_w_kg) for s in strides if s.valid)
     assert strides[-1].initial_contact_s > 1500 / 250

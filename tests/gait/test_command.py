@@ -60,7 +60,7 @@ def test_a_table_to_read(lab_file, capsys):
     shown = capsys.readouterr().out
 
     assert "12 strides, 0 valid" in shown
-    assert "Turn the sign of the angle" in shown
+    assert "The ankle brakes where most push" in shown
 
 
 @pytest.mark.parametrize(

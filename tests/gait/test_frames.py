@@ -143,16 +143,11 @@ def test_numbers_that_begin_in_the_middle_of_a_walk(name, missing):
     for begins in (half, len(spoiled.t_s)):
         detector = TwoLegDetector(spoiled.rate_hz, spoiled.mass_kg, look_ahead_s=0.05)
         strides = found[begins] = []
-        for first in range(0, len(spoiled.t_s), 20):
-            part = slice(first, first + 20)
-            numbers = spoiled.frames[part].copy()
+        for number, chunk in enumerate(spoiled.chunks(20)):
+            first = 20 * number
+            numbers = spoiled.frames[first : first + 20].copy()
             numbers[: missing * (first == begins)] = np.nan
-            strides += detector.feed(
-                spoiled.t_s[part],
-                LegSamples(*spoiled.left[:, part]),
-                LegSamples(*spoiled.right[:, part]),
-                frame=numbers if first >= begins else None,
-            )
+            strides += detector.feed(*chunk, frame=numbers if first >= begins else None)
         assert detector.frame_problem == ""
     since_s = spoiled.t_s[half] + 1.5
     later = [stride for stride in clean if since_s < stride.initial_contact_s]
@@ -169,14 +164,9 @@ def test_wrong_numbers_that_begin_later_are_told():
     walk, clean = open_walk("100 Hz")
     detector = TwoLegDetector(walk.rate_hz, walk.mass_kg)
     found = []
-    for first in range(0, len(walk.t_s), 20):
-        part = slice(first, first + 20)
-        found += detector.feed(
-            walk.t_s[part],
-            LegSamples(*walk.left[:, part]),
-            LegSamples(*walk.right[:, part]),
-            frame=np.full(len(walk.t_s[part]), 7.0) if first >= 1000 else None,
-        )
+    for number, chunk in enumerate(walk.chunks(20)):
+        frame = np.full(len(chunk[0]), 7.0) if number >= 50 else None
+        found += detector.feed(*chunk, frame=frame)
 
     assert "stay as they are" in detector.frame_problem
     assert count(found, clean).lost <= 1

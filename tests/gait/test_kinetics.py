@@ -1,7 +1,5 @@
 """The parts that A2 is made of, each against something that is known."""
 
-import csv
-
 import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
@@ -13,7 +11,7 @@ from rehab.gait.signals.filters import (
     find_last,
     interpolate_peak,
 )
-from tests.support.data import signals
+from tests.gait.walks import read_moore_columns
 
 
 @pytest.mark.parametrize("rate_hz", [100, 1000])
@@ -70,9 +68,7 @@ def test_a2_from_force_and_center_of_pressure():
 
     The foot's own weight and inertia, left out, make some percent.
     """
-    with (signals("moore2013_s15_pre") / "UnpertPre_data.csv").open() as file:
-        names = next(csv.reader(file))
-        column = dict(zip(names, np.loadtxt(file, delimiter=",", unpack=True), strict=True))
+    column = read_moore_columns()
     moment = compute_ankle_moment(
         column["LeftGRF_x"],
         column["LeftGRF_y"],

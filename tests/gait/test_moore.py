@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rehab.gait import Flag, LegSamples, RejectionReason, StrideDetector, TwoLegDetector
+from rehab.gait import Flag, RejectionReason, StrideDetector
 from tests.gait.walks import pair_up, read_moore
 
 pytestmark = pytest.mark.matrix
@@ -111,15 +111,7 @@ def test_two_legs_know_more(found):
 @pytest.mark.parametrize("size", [1, 3, 7, 50, 1000, 10**6])
 def test_the_same_in_any_chunks(moore, found, size, look_ahead_s):
     walk, _ = moore
-    detector = TwoLegDetector(walk.rate_hz, walk.mass_kg, look_ahead_s=look_ahead_s)
-    strides = []
-    for first in range(0, len(walk.t_s), size):
-        part = slice(first, first + size)
-        strides += detector.feed(
-            walk.t_s[part], LegSamples(*walk.left[:, part]), LegSamples(*walk.right[:, part])
-        )
-
-    assert strides + detector.finish() == found[look_ahead_s]
+    assert walk.in_chunks(size, look_ahead_s=look_ahead_s) == found[look_ahead_s]
 
 
 def test_one_leg_gives_the_same_numbers_as_two(moore, found):

@@ -9,6 +9,7 @@ import pytest
 from rehab.gait import LegSamples, RejectionReason
 from rehab.gait.recordings.csv_files import save_signals
 from rehab.sources.arguments import make_parser
+from rehab.sources.client import Display
 from rehab.sources.recording.source import RecordingSource
 from rehab.training.phases import make_phase
 from rehab.training.steps import Side
@@ -89,6 +90,7 @@ def test_signals_over_plates_are_replayed_as_a_source(treadmill, tmp_path):
     legs = {side: LegSamples(*getattr(passing, side)) for side in ("left", "right")}
     save_signals(path, passing.t_s, legs, None)
     arguments = ["--mass", str(walk.mass_kg), "--rate", str(walk.rate_hz), "--token", "t"]
+    display = Display(make_phase("training"), None, "explicit")
     played = {}
     for mode in ([], ["--overground"]):
         options = make_parser("recording", RecordingSource).parse_args(
@@ -96,9 +98,7 @@ def test_signals_over_plates_are_replayed_as_a_source(treadmill, tmp_path):
         )
         play = RecordingSource(options, lambda _text: None).open_walk(Side.LEFT)
         played[bool(mode)] = [
-            stride.value
-            for stride in iter(partial(play, make_phase("training")), None)
-            if not stride.reasons
+            stride.value for stride in iter(partial(play, display), None) if not stride.reasons
         ]
 
     measured = passing.both_legs(is_overground=True, look_ahead_s=0.05)

@@ -117,16 +117,10 @@ def test_step_length_and_symmetry():
 def test_the_same_in_any_chunks(size, look_ahead_s):
     """At 1 kHz, where a stance is averaged down and the buffer moves at other samples."""
     walk, _ = make_walk(rate_hz=1000, strides=30)
-    detector = TwoLegDetector(walk.rate_hz, walk.mass_kg, look_ahead_s=look_ahead_s)
-    strides = []
-    for first in range(0, len(walk.t_s), size):
-        part = slice(first, first + size)
-        strides += detector.feed(
-            walk.t_s[part], LegSamples(*walk.left[:, part]), LegSamples(*walk.right[:, part])
-        )
+    strides = walk.in_chunks(size, look_ahead_s=look_ahead_s)
 
     assert sum(stride.valid for stride in strides) > 50
-    assert strides + detector.finish() == walk.both_legs(look_ahead_s=look_ahead_s)
+    assert strides == walk.both_legs(look_ahead_s=look_ahead_s)
 
 
 def test_memory_stays_as_it_is():

@@ -89,7 +89,8 @@ def test_units_and_signs_of_angle(walk, factor, unit):
 
     assert guess.unit == unit
     assert guess.factor == pytest.approx(1 / factor)
-    assert guess.is_certain
+    assert not guess.doubt
+    assert not guess.is_certain  # its label says nothing
 
 
 def test_times_in_milliseconds(walk):

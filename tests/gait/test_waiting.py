@@ -9,22 +9,10 @@ from tests.gait.faults.bench import FAULTS, open_walk
 from tests.gait.walks import make_walk
 
 
-def cut(walk, size):
-    """Return the chunks of a walk, as a detector is fed with them."""
-    return [
-        (
-            walk.t_s[first : first + size],
-            LegSamples(*walk.left[:, first : first + size]),
-            LegSamples(*walk.right[:, first : first + size]),
-        )
-        for first in range(0, len(walk.t_s), size)
-    ]
-
-
 def feed(walk, size, look_ahead_s=0.0):
     """Return the strides that each chunk completes, and then those of the end."""
     detector = TwoLegDetector(walk.rate_hz, walk.mass_kg, look_ahead_s=look_ahead_s)
-    told = [detector.feed(*chunk) for chunk in cut(walk, size)]
+    told = [detector.feed(*chunk) for chunk in walk.chunks(size)]
     return [*told, detector.finish()]
 
 
@@ -83,7 +71,7 @@ def test_samples_that_wait_are_their_own():
     walk, _ = make_walk(strides=12)
     detector = TwoLegDetector(walk.rate_hz, walk.mass_kg)
     found = []
-    for t_s, left, right in cut(walk, 5):
+    for t_s, left, right in walk.chunks(5):
         chunk = np.array([t_s, *left[:3], *right[:3]])
         found += detector.feed(chunk[0], LegSamples(*chunk[1:4]), LegSamples(*chunk[4:]))
         chunk[:] = np.nan
@@ -114,7 +102,7 @@ def test_chunks_without_samples():
     none = np.empty(0)
     nothing = (none, LegSamples(none, none, none), LegSamples(none, none, none))
     found = []
-    for chunk in cut(walk, 5):
+    for chunk in walk.chunks(5):
         found += detector.feed(*nothing) + detector.feed(*chunk)
 
     assert found + detector.finish() == walk.both_legs(look_ahead_s=0.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, measure_strides
+from rehab.gait import LegSamples, TwoLegDetector, measure_strides
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.training.steps import Measurement, Side
 from tests.support.data import signals
@@ -37,6 +37,19 @@ class Walk:
         given = {"rate_hz": self.rate_hz, "mass_kg": self.mass_kg} | settings
         return measure_strides(self.t_s, legs, **given)
 
+    def chunks(self, size):
+        """Yield times and both legs in chunks, as ``TwoLegDetector.feed`` takes them."""
+        for first in range(0, len(self.t_s), size):
+            part = slice(first, first + size)
+            legs = (LegSamples(*leg[:, part]) for leg in (self.left, self.right))
+            yield self.t_s[part], *legs
+
+    def in_chunks(self, size, **settings):
+        """Return the strides of both legs, fed chunk by chunk."""
+        detector = TwoLegDetector(self.rate_hz, self.mass_kg, **settings)
+        strides = [stride for chunk in self.chunks(size) for stride in detector.feed(*chunk)]
+        return strides + detector.finish()
+
     def change(self, row, change, *, both=False):
         """Return the walk with one channel changed, on the left or on both legs."""
         legs = [self.left.copy(), self.right.copy()]
@@ -45,13 +58,16 @@ class Walk:
         return replace(self, left=legs[0], right=legs[1])
 
 
+def read_moore_columns() -> dict[str, np.ndarray]:
+    """Return the columns of the recorded walk by name."""
+    with (signals("moore2013_s15_pre") / "UnpertPre_data.csv").open() as file:
+        names = next(csv.reader(file))
+        return dict(zip(names, np.loadtxt(file, delimiter=",", unpack=True), strict=True))
+
+
 def read_moore() -> tuple[Walk, dict[str, list[dict[str, float]]]]:
     """Return the recorded walk and its reference strides by side."""
-    folder = signals("moore2013_s15_pre")
-    with (folder / "UnpertPre_data.csv").open() as file:
-        names = next(csv.reader(file))
-        table = np.loadtxt(file, delimiter=",", unpack=True)
-    column = dict(zip(names, table, strict=True))
+    column = read_moore_columns()
     legs = [
         np.array(
             [
@@ -62,7 +78,8 @@ def read_moore() -> tuple[Walk, dict[str, list[dict[str, float]]]]:
         )
         for side in ("Left", "Right")
     ]
-    reference = json.loads((folder / "reference.json").read_text())["legs"]
+    path = signals("moore2013_s15_pre") / "reference.json"
+    reference = json.loads(path.read_text())["legs"]
     strides = {side.lower(): reference[side]["strides"] for side in reference}
     return Walk(column["time"], legs[0], legs[1], rate_hz=100, mass_kg=79.4), strides
 

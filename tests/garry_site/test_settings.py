@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from django.contrib.auth.hashers import make_password
@@ -13,7 +14,7 @@ from django.core.management import get_commands
 from garry_site import settings as own_settings
 from tests.support.servers import run_python, try_python
 
-HOSTED = {
+HOSTED: dict[str, Any] = {
     "GARRY_HOSTED": "1",
     "GARRY_SECRET_KEY": "k" * 25 + "0123456789" * 5,
     "GARRY_ALLOWED_HOSTS": "garry.example",
@@ -21,7 +22,7 @@ HOSTED = {
 }
 
 
-def check(tmp_path: Path, *arguments: str, **variables: str) -> tuple[int, str]:
+def check(tmp_path: Path, *arguments: str, **variables: Any) -> tuple[int, str]:
     """Run `manage.py check` as an operator would, with nothing but these variables."""
     result = try_python(tmp_path, "manage.py", "check", *arguments, **variables)
     return result.returncode, result.stdout + result.stderr
@@ -64,7 +65,7 @@ SERVERS = {
     "daphne": ("-m", "daphne", "garry_site.asgi:application", "--port", "0"),
     "serve": ("manage.py", "serve"),
 }
-UNSAFE = {
+UNSAFE: dict[str, tuple[dict[str, Any], str]] = {
     "without a key": ({"GARRY_SECRET_KEY": ""}, "needs a secret key of its own"),
     "with a short key": ({"GARRY_SECRET_KEY": "k" * 49}, "50 or more random characters"),
     "with debug pages": ({"GARRY_DEBUG": "1"}, "must not show debug pages"),

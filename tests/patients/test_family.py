@@ -30,7 +30,7 @@ from rehab.sessions.reports.patient_summary import describe_weeks
 from rehab.sessions.reports.results import Result
 from rehab.studies.enrolling import withdraw
 from tests.support.studies import enrolled, running_study
-from tests.support.world import NOW, build_world, client_of
+from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
 
@@ -184,17 +184,6 @@ def test_a_link_ends_in_weeks(agreed, weeks):
     token = give_link(agreed.patient, 2, by, "", NOW, shows_name=True)
     assert find_link(token, NOW + timedelta(days=14) - timedelta(seconds=1)) is not None
     assert find_link(token, NOW + timedelta(days=14)) is None
-
-
-def test_another_clinic_neither_sees_nor_ends_it(agreed):
-    give(agreed)
-    stranger = client_of(build_world("birch"))
-    link = FamilyLink.everywhere.get(patient=agreed.patient)
-    url = reverse("end-family-link", kwargs={"link_id": link.pk})
-    assert stranger.post(url).status_code == 404
-    assert stranger.get(links_page(agreed)).status_code == 404
-    link.refresh_from_db()
-    assert link.ended_at is None
 
 
 def test_who_asks_too_often_waits(agreed, monkeypatch):

@@ -14,7 +14,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day import dashboard
 from tests.support.clock import HERE
 from tests.support.walks import HIT, walk
-from tests.support.world import NOW, World, build_world
+from tests.support.world import NOW, World
 
 pytestmark = pytest.mark.django_db
 
@@ -132,11 +132,3 @@ def test_a_visit_is_removed_from_its_own_patient_alone(world):
     assert Visit.everywhere.filter(pk=other.pk).exists()
     client.post(f"/patients/{rosa.pk}/visits/", {"remove": mine.pk})
     assert not Visit.everywhere.filter(pk=mine.pk).exists()
-
-
-def test_nobody_plans_for_another_clinic(world):
-    birch = build_world("birch")
-    before = Visit.everywhere.count()
-    answer = world.pt.post(f"/patients/{birch.patient.pk}/visits/", {"in": "1"})
-    assert answer.status_code == 404
-    assert Visit.everywhere.count() == before

@@ -200,11 +200,6 @@ def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
     assert "boards" in active_consents(patient)
 
 
-def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
-    pt.post(reverse("leave-boards", kwargs={"session_id": world.session.pk}))
-    assert "boards" not in active_consents(world.patient)
-
-
 # --- care -----------------------------------------------------------------------------------------
 
 

@@ -9,12 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from django.apps import apps
 from django.conf import settings
 from django.core.management import call_command
 from django.db import connection, models
 from django.db.models import QuerySet
 from django.forms import modelform_factory
 
+from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.results import read_results
+from rehab.boards.snapshots import BoardSnapshot
 from rehab.checks import check_personal_fields
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.patients.erasure import erase
@@ -218,3 +222,28 @@ def test_what_is_erased_is_found_in_no_table_file_log_or_archive(tmp_path, caplo
     assert found_in(planted, iter([("log", caplog.text)])) == set()
     call_command("dumpdata", "--all", output=str(tmp_path / "dump.json"))
     assert found_in(planted, iter([("dump", (tmp_path / "dump.json").read_text())])) == set()
+
+
+# --- keys without a relation ----------------------------------------------------------------------
+
+
+def test_no_other_column_holds_a_patients_key_than_the_boards_own():
+    """It is a number of a row that is anonymous once erased, and deleted within days."""
+    plain = {
+        f"{model.__name__}.{field.name}"
+        for model in apps.get_models()
+        for field in model._meta.concrete_fields
+        if "patient" in field.name and not field.is_relation
+    }
+    assert plain == {"BoardChange.patient_key"}
+
+
+def test_an_erased_patient_leaves_frozen_boards(world):
+    fill_board(world)
+    board = world.rows[Leaderboard]
+    rows = list(read_results(board, NOW))
+    BoardSnapshot.everywhere.filter(board=board).update(results=rows)
+    assert world.patient.pk in {row.patient_id for row in rows}
+    erase(world.patient, ErasureReason.ASKED, None, NOW)
+    left = BoardSnapshot.everywhere.get(board=board).to_results()
+    assert {row.patient_id for row in left} == {row.patient_id for row in rows} - {world.patient.pk}

@@ -240,9 +240,7 @@ def has_new_password(user: User) -> bool:
 def test_nobody_sheds_the_own_factor_in_the_admin(lead, pt):
     for user in (lead, pt):
         add_app(user)
-    assert "Change your own on the page Your account" in remove_factors(
-        signed_in(lead), lead, pt
-    )
+    assert "Change your own on the page Your account" in remove_factors(signed_in(lead), lead, pt)
     assert [one.user for one in Authenticator.everywhere.all()] == [lead]
 
 

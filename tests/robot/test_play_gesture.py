@@ -70,15 +70,6 @@ def test_the_twin_comes_home_in_truth():
 
 
 @pytest.mark.realtime
-def test_a_gesture_on_a_twin_with_unequal_wheels():  # the others: tests/bench/test_twin_gestures
-    options = ("--left-scale=1.02", "--right-scale=1.005", "--drift-deg-min=2")
-    with TwinBase(time.monotonic, *options) as twin:
-        played = play_gesture(GESTURES["sway"], twin, time.monotonic, time.sleep)
-    assert played["outcome"] == "done"
-    assert is_home(played["true_pose"])
-
-
-@pytest.mark.realtime
 def test_a_bump_ends_it_and_another_one_is_refused():
     with TwinBase(time.monotonic) as twin:
         bump = {"do": "set", "name": "bumper", "value": 2}

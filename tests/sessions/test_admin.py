@@ -25,7 +25,7 @@ from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
-from tests.support.walks import strides, walk
+from tests.support.walks import make_patient, strides, walk
 from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -34,9 +34,7 @@ SESSIONS = "/admin/rehab/trainingsession/"
 
 
 def patient_of(world: World, name: str) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code=f"K-{name}", nickname=name, paretic_side="left"
-    )
+    return make_patient(world.clinic, name)
 
 
 # --- finding sessions ---------------------------------------------------------------------------

@@ -30,16 +30,14 @@ from rehab.sessions.reports.day.week import week_summary
 from rehab.sessions.reports.patient_summary import describe_take_home
 from rehab.sessions.reports.trend import load_trend
 from tests.support.boards import all_rows, figures_of, rows_computed_anew
-from tests.support.walks import strides, walk
+from tests.support.walks import make_patient, strides, walk
 from tests.support.world import NOW, World, agreeing, build_world, client_of
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 def patient_of(world: World, name: str, **fields) -> Patient:
-    patient = Patient.everywhere.create(
-        clinic=world.clinic, code=f"K-{ord(name[0])}", nickname=name, paretic_side="left", **fields
-    )
+    patient = make_patient(world.clinic, name, code=f"K-{ord(name[0])}", **fields)
     return agreeing(patient)
 
 

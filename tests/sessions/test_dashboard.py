@@ -26,7 +26,7 @@ from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State
 from rehab.training.fold.tallies import Tally
 from tests.support.marks import mark
-from tests.support.walks import RIGHT, strides, walk
+from tests.support.walks import RIGHT, make_patient, strides, walk
 from tests.support.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -51,9 +51,7 @@ def world(world: World) -> World:
 
 @pytest.fixture
 def rosa(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
-    )
+    return make_patient(world.clinic, code="K-1")
 
 
 def ago(patient: Patient, valence: str, walked, moment: datetime, **how) -> TrainingSession:
@@ -140,7 +138,7 @@ def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monke
     assert [line.state for line in told["today"]] == ["Running", *["Finished"] * 3]
     assert told["today"][0].session == left
     assert told["walking"] == 1
-    assert "The session of Rosa is open since Sep 15" in told["alerts"][0].message
+    assert "The session of Rosa has been open since Sep 15" in told["alerts"][0].message
 
 
 def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch):
@@ -199,7 +197,7 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
     told = dashboard_context(pt, NOW)
     words = [alert.message for alert in find_alerts(pt, told["today"], told["stations"], NOW)]
     assert len(words) == 3
-    assert words[0] == "The session of Rosa is open since 06:00. End it."
+    assert words[0] == "The session of Rosa has been open since 06:00. End it."
     assert words[1].startswith("never at ")
     assert "has never dialed in" in words[1]
     assert "revoked and shut out" in words[2]
@@ -286,9 +284,7 @@ def test_the_front_page_costs_the_same_however_much_was_walked(
     with django_assert_max_num_queries(15) as first:
         pt.get("/admin/")
     for number in range(8):
-        patient = Patient.everywhere.create(
-            clinic=world.clinic, code=f"M-{number}", nickname="M", paretic_side="left"
-        )
+        patient = make_patient(world.clinic, "M", code=f"M-{number}")
         ago(patient, "positive", strides(2, 1), now, end=None if number % 2 else ChangeKind.FINISH)
         station = Station.everywhere.create(clinic=world.clinic, name=f"S-{number}")
         Device(

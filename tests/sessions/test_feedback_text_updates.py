@@ -13,9 +13,7 @@ from rehab.people.roles import Role
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
-from rehab.sessions.services import SessionRequest, create_session
-from rehab.training.goals import GoalRule
-from rehab.training.phases import make_phase
+from tests.support.walks import make_session
 from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -29,12 +27,7 @@ def pt(world):
 def begin(world, valence="positive", language="en"):
     world.patient.language = language
     world.patient.save()
-    phases = [make_phase("training")]
-    return create_session(
-        SessionRequest(
-            patient=world.patient, valence=valence, goal=GoalRule(value=4.0), phases=phases
-        )
-    )
+    return make_session(world.patient, valence)
 
 
 def form(slug="positive", **changes):

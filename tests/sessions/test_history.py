@@ -13,7 +13,6 @@ from django.utils import timezone
 
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
-from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import (
     clinic_time,
@@ -33,13 +32,6 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def patient(world) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
-@pytest.fixture
 def client(world) -> Client:
     return client_of(world, Role.PT)
 
@@ -50,17 +42,8 @@ def detail(client: Client, session) -> str:
 
 def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
     phases = (make_phase("baseline", strides=3), make_phase("training", gain=0.85))
-    walked: list[Walked] = [
-        2.1,
-        1.9,
-        None,
-        2.4,
-        (RIGHT, 7.0),
-        2.3,
-        Change(ChangeKind.GOAL, 1.5),
-        2.3,
-        99.0,
-    ]
+    walked: list[Walked] = [2.1, 1.9, None, 2.4, (RIGHT, 7.0), 2.3]
+    walked += [Change(ChangeKind.GOAL, 1.5), 2.3, 99.0]
     session = walk(patient, "positive", walked, phases=phases)
     chart = read_json(detail(client, session), "session")
     stored = list(Step.everywhere.filter(session=session, side="left").order_by("number"))
@@ -118,21 +101,11 @@ def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, pati
 def test_phases_and_events_are_told(client, patient):
     phases = (make_phase("baseline", strides=2), make_phase("training"))
     walked: list[Walked] = [
-        1.0,
-        3.0,
-        HIT,
-        Change(ChangeKind.GOAL, 2.4),
-        HIT,
-        MISS,
-        Change(ChangeKind.PAUSE),
-        HIT,
-        Change(ChangeKind.RESUME),
-        MISS,
+        *(1.0, 3.0, HIT, Change(ChangeKind.GOAL, 2.4), HIT, MISS),
+        *(Change(ChangeKind.PAUSE), HIT, Change(ChangeKind.RESUME), MISS),
         Change(ChangeKind.ACTIVATION_THRESHOLD, 0.8),
         Change(ChangeKind.ROBOT_INTENSITY, 0.5),
-        Change(ChangeKind.GAIN, 0.85),
-        Change(ChangeKind.PHASE, 0),
-        None,
+        *(Change(ChangeKind.GAIN, 0.85), Change(ChangeKind.PHASE, 0), None),
     ]
     session = walk(patient, "positive", walked, phases=phases)
     page = detail(client, session)
@@ -238,20 +211,11 @@ def test_who_may_look(world, patient):
 
 
 def test_figures_are_written_the_same_everywhere():
-    assert [plain(format_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)] == [
-        "71 %",
-        "0 %",
-        "100 %",
-        "−2 %",
-        "–",
-    ]
+    rates = [plain(format_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)]
+    assert rates == ["71 %", "0 %", "100 %", "−2 %", "–"]
     assert [format_number(value, 0) for value in (1234.4, -5, -0.2)] == ["1,234", "−5", "0"]
-    assert [plain(format_duration(s)) for s in (0, 59.4, 59.6, 1234)] == [
-        "0 s",
-        "59 s",
-        "1 min",
-        "21 min",
-    ]
+    durations = [plain(format_duration(s)) for s in (0, 59.4, 59.6, 1234)]
+    assert durations == ["0 s", "59 s", "1 min", "21 min"]
 
 
 def test_days_follow_the_clinics_own_clock(world):
@@ -267,16 +231,10 @@ def test_days_follow_the_clinics_own_clock(world):
 def test_a_change_of_type_and_gain_is_told_wherever_the_session_is(client, patient):
     phases = (make_phase("training", "First"), make_phase("training", "Last"))
     walked: list[Walked] = [
-        HIT,
-        Change(ChangeKind.GAIN, 0.9),
-        HIT,
-        Change(ChangeKind.VALENCE, "negative"),
-        Change(ChangeKind.WORDS_SHOWN, 0.0),
-        Change(ChangeKind.CHART_STYLE, "line"),
-        Change(ChangeKind.PAUSE, "restart"),
-        Change(ChangeKind.RESUME),
-        Change(ChangeKind.PHASE, 1.0),
-        MISS,
+        *(HIT, Change(ChangeKind.GAIN, 0.9), HIT, Change(ChangeKind.VALENCE, "negative")),
+        *(Change(ChangeKind.WORDS_SHOWN, 0.0), Change(ChangeKind.CHART_STYLE, "line")),
+        *(Change(ChangeKind.PAUSE, "restart"), Change(ChangeKind.RESUME)),
+        *(Change(ChangeKind.PHASE, 1.0), MISS),
     ]
     session = walk(patient, "positive", walked, phases=phases)
     page = detail(client, session)
@@ -294,13 +252,7 @@ def test_a_change_of_type_and_gain_is_told_wherever_the_session_is(client, patie
         assert line in told
     chart = json.loads(re.search(r'<script id="session"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
     assert [phase["name"] for phase in chart["phases"]] == ["First", "Last · Negative"]
-    assert {mark["kind"] for mark in chart["marks"]} == {
-        "gain",
-        "valence",
-        "words_shown",
-        "chart_style",
-        "pause",
-        "resume",
-    }
+    kinds = "gain valence words_shown chart_style pause resume"
+    assert {mark["kind"] for mark in chart["marks"]} == set(kinds.split())
     listed = client.get(reverse("history", args=[patient.pk])).content.decode()
     assert "Positive, changed to Negative" in words(listed)

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
+from tests.support.page_text import plain
+from tests.support.page_text import words as page_words
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, client_of
 
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def patient(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
 def words(world: World, patient: Patient, asked: str = "") -> str:
     page = client_of(world, Role.PT).get(f"/patients/{patient.pk}/sessions/{asked}")
-    told = re.search(r"<main.*</main>", page.content.decode(), re.DOTALL)
-    assert told
-    return " ".join(re.sub("<[^>]+>", " ", told[0]).replace("\N{NO-BREAK SPACE}", " ").split())
+    return plain(page_words(page.content.decode().split("<main")[1].split("</main>")[0]))
 
 
 def note(session: TrainingSession, *kinds: tuple[str, float | None]) -> None:

@@ -28,6 +28,7 @@ from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Measurement, Side
 from rehab.training.summary.metrics import compute_metrics
 from tests.support.extent import examples
+from tests.support.walks import make_patient
 from tests.support.world import NOW, store
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
@@ -38,7 +39,7 @@ TRAINING = (make_phase("training"),)
 @pytest.fixture
 def patient() -> Patient:
     clinic = Clinic.everywhere.create(name="Elm")
-    return Patient.everywhere.create(clinic=clinic, code="7", nickname="Rosa", paretic_side="left")
+    return make_patient(clinic, code="7")
 
 
 def begin(patient: Patient, valence: str = "binary", **settings: Any) -> SessionAggregate:

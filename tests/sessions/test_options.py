@@ -19,6 +19,7 @@ from rehab.sessions.setup.option import Group, Option, OptionColumn
 from rehab.sessions.setup.options import OPTIONS, build_parts, exported_options, preset_options
 from rehab.sessions.setup.presets import Preset
 from rehab.training.measures import InvalidSetting
+from tests.support.walks import make_patient
 from tests.support.world import World, client_of
 
 pytestmark = pytest.mark.django_db
@@ -47,9 +48,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Option:
 
 @pytest.fixture
 def rosa(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="K7-204", nickname="Rosa", paretic_side="left"
-    )
+    return make_patient(world.clinic, code="K7-204")
 
 
 def sent(patient: Patient, by: User, **others: Any) -> dict[str, str]:

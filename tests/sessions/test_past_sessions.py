@@ -25,13 +25,6 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def patient(world) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
-@pytest.fixture
 def client(world) -> Client:
     return client_of(world, Role.PT)
 
@@ -109,21 +102,8 @@ def test_the_trend_equals_the_stored_strides(world, client, patient):
         make_phase("catch", strides=2),
         make_phase("training", "Training 85 %", gain=0.85),
     )
-    walked: list[Walked] = [
-        1.0,
-        1.5,
-        None,
-        2.0,
-        3.0,
-        1.0,
-        (RIGHT, 9.0),
-        2.5,
-        2.0,
-        8.0,
-        8.0,
-        4.0,
-        2.2,
-    ]
+    walked: list[Walked] = [1.0, 1.5, None, 2.0, 3.0, 1.0, (RIGHT, 9.0), 2.5, 2.0]
+    walked += [8.0, 8.0, 4.0, 2.2]
     session = walk(patient, "positive", walked, phases=phases, wanted=0.6)
     (point,) = load_trend(world.people[Role.PT], type(session).everywhere.filter(pk=session.pk))
     steps = Step.everywhere.filter(session=session, side="left", valid=True)

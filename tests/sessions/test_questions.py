@@ -18,12 +18,11 @@ from rehab.sessions.questionnaires import (
     ask,
     find_instrument,
 )
-from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Device, Station
 from rehab.stations.tablets import COOKIE
-from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from tests.support.walks import make_session
 from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -35,15 +34,11 @@ def planned(world: World, *slugs: str, language: str = "en") -> TrainingSession:
     protocol.questionnaires = list(slugs)
     protocol.save()
     Patient.everywhere.filter(pk=world.patient.pk).update(language=language, screen_text="largest")
-    session = create_session(
-        SessionRequest(
-            patient=Patient.everywhere.get(pk=world.patient.pk),
-            valence="positive",
-            goal=GoalRule(value=1.0),
-            protocol=protocol,
-            measure=world.session.measure,
-            station=world.rows[Station],
-        )
+    session = make_session(
+        Patient.everywhere.get(pk=world.patient.pk),
+        protocol=protocol,
+        measure=world.session.measure,
+        station=world.rows[Station],
     )
     later = NOW + timedelta(seconds=1)
     session.state, session.started_at, session.ended_at = "finished", NOW, later

@@ -5,10 +5,13 @@ from __future__ import annotations
 import shutil
 import subprocess
 from datetime import UTC, datetime, timedelta
+from urllib.parse import urlencode
 
 import pytest
 from django.db import connection
+from django.urls import reverse
 
+from rehab.people.roles import Role
 from rehab.sessions.setup import recordings
 from rehab.sessions.setup.recordings import (
     UploadRefused,
@@ -19,6 +22,8 @@ from rehab.sessions.setup.recordings import (
     uploaded_file,
     write_columns,
 )
+from tests.support.data import signals
+from tests.support.world import client_of
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +50,45 @@ def test_another_upload_replaces_the_one_before_of_this_person_only():
     add_part(other, b"new", 0)
     assert not mine.exists()
     assert (other.read_bytes(), theirs.read_bytes()) == (b"new", b"theirs")
+
+
+def test_files_of_one_walk_are_stored_side_by_side():
+    forces, moments = uploaded_file(7, ".mot", 0), uploaded_file(7, ".mot", 1)
+    add_part(forces, b"forces", 0)
+    add_part(moments, b"moments", 0)
+    assert forces.read_bytes() == b"forces"
+    add_part(forces, b"another walk", 0)
+    assert not moments.exists()
+    with pytest.raises(UploadRefused):
+        uploaded_file(7, ".mot", recordings.FILES_MAX)
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize(
+    ("names", "mass", "shown"),
+    [
+        (["btk_pig_flatfoot_full.c3d"], "", "LAnkleMoment.X"),
+        (["g23_grf.mot", "g23_id.sto", "g23_ik.mot"], "72.6", "ankle_angle_r_moment"),
+        (["g23_grf.mot"], "", "The body mass is not in this file"),
+    ],
+)
+def test_strange_files_in_the_browser(world, monkeypatch, names, mass, shown):
+    """From a file to columns and valid strides, or to what it lacks."""
+    pytest.importorskip("ezc3d")
+    monkeypatch.setattr(recordings, "close_old_connections", lambda: None)  # it is the test's
+    client = client_of(world, Role.PT)
+    files = [signals("lab_files") / name for name in names]
+    for place, file in enumerate(files):
+        data = file.read_bytes()
+        for at in range(0, len(data), recordings.PART_BYTES):
+            query = urlencode({"at": at, "ending": file.suffix, "file": place})
+            part = data[at : at + recordings.PART_BYTES]
+            address = f"{reverse('add-recording-part')}?{query}"
+            answer = client.post(address, part, content_type="application/octet-stream")
+            assert answer.status_code == 200
+    endings = ",".join(file.suffix for file in files)
+    page = client.post(reverse("check-recording"), {"ending": endings, "mass": mass})
+    assert shown in page.content.decode()
 
 
 def test_an_upload_that_nobody_stores_is_removed_after_a_day():
@@ -100,14 +144,14 @@ def test_one_file_is_checked_at_a_time_and_after_everything_else(monkeypatch):
 
     def run(arguments: list[str], **options: object) -> subprocess.CompletedProcess[str]:
         began.append(arguments)
-        other = check_upload(uploaded_file(8, ".csv"), None)
+        other = check_upload([uploaded_file(8, ".csv")], None)
         assert other.wrong == ["Other files are being checked. Try again in a minute."]
         return subprocess.CompletedProcess(arguments, 0, "{}", "")
 
     monkeypatch.setattr(recordings, "WAIT_S", 0.01)
     monkeypatch.setattr(subprocess, "run", run)
     for _again in range(2):
-        assert check_upload(uploaded_file(7, ".csv"), None).found == {}
+        assert check_upload([uploaded_file(7, ".csv")], None).found == {}
     assert len(began) == 2
     for arguments in began:
         assert "--bounded" in arguments
@@ -125,5 +169,5 @@ def test_who_waits_for_a_check_holds_no_connection(monkeypatch):
 
     connection.ensure_connection()
     monkeypatch.setattr(subprocess, "run", run)
-    check_upload(uploaded_file(7, ".csv"), None)
+    check_upload([uploaded_file(7, ".csv")], None)
     assert held == [None]

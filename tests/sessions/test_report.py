@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 from datetime import UTC, datetime, timedelta
 
@@ -11,7 +10,6 @@ import time_machine
 
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
-from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
@@ -20,26 +18,17 @@ from rehab.sessions.reports.report_chart import draw_chart
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.clock import HERE
+from tests.support.page_text import article_words
 from tests.support.walks import HIT, MISS, RIGHT, Walked, walk
 from tests.support.world import NOW, World, client_of
 
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def patient(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
 def read(world: World, session: TrainingSession, role: Role = Role.PT) -> str:
     """Return the page's words."""
-    client = client_of(world, role)
-    page = client.get(f"/sessions/{session.pk}/report/").content.decode()
-    paper = page.split("<article")[1].split("</article>")[0]
-    text = html.unescape(re.sub(r"<[^>]+>", " ", paper)).replace("\N{NO-BREAK SPACE}", " ")
-    return " ".join(text.split())
+    page = client_of(world, role).get(f"/sessions/{session.pk}/report/").content.decode()
+    return article_words(page)
 
 
 def note(session: TrainingSession, kind: str, value: float | None = None, **data) -> None:
@@ -117,12 +106,9 @@ def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
 
 def test_what_else_was_measured_stands_as_its_mean(world, patient):
     session = walk(patient, "positive", [HIT, MISS, HIT, None, (RIGHT, HIT)])
-    extras = [
-        {"heart_rate": 100, "flag_late": 1, "sent_value": 4},
-        {"heart_rate": 103},
-        {"power": 2},
-    ]
-    extras += [{"heart_rate": 1}, {"heart_rate": 1}]  # an invalid stride, and the other leg
+    extras = [{"heart_rate": 100, "flag_late": 1, "sent_value": 4}, {"heart_rate": 103}]
+    # The last two are of an invalid stride, and of the other leg.
+    extras += [{"power": 2}, {"heart_rate": 1}, {"heart_rate": 1}]
     for number, extra in enumerate(extras, 1):
         Step.everywhere.filter(session=session, number=number).update(extra=extra)
     assert "Also measured, mean heart_rate 102 · power 2.00 Notes" in read(world, session)
@@ -146,18 +132,8 @@ def test_a_session_without_a_stride_has_a_page(world, patient, walked):
 
 def test_the_chart_shows_every_stride_once(world, patient):
     phases = (make_phase("baseline", strides=2), make_phase("training"))
-    strides: list[Walked] = [
-        1.0,
-        1.5,
-        HIT,
-        MISS,
-        None,
-        HIT,
-        Change(ChangeKind.GOAL, 3.0),
-        HIT,
-        MISS,
-        0.0,
-    ]
+    strides: list[Walked] = [1.0, 1.5, HIT, MISS, None, HIT]
+    strides += [Change(ChangeKind.GOAL, 3.0), HIT, MISS, 0.0]
     session = walk(patient, "positive", strides, phases=phases)
     chart = report_context(world.people[Role.PT], session)["chart"]
     assert chart["hit"].count("M") == 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 
 import pytest
@@ -11,26 +10,17 @@ from django.urls import reverse
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.training.phases import make_phase
+from tests.support.page_text import article_words
 from tests.support.walks import HIT, MISS, RIGHT, walk
 from tests.support.world import World, client_of
 
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def patient(world: World) -> Patient:
-    return Patient.everywhere.create(
-        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
-    )
-
-
 def read(world: World, patient: Patient, role: Role = Role.PT) -> str:
     """Return the page's words."""
-    client = client_of(world, role)
-    page = client.get(reverse("take-home", kwargs={"patient_id": patient.pk})).content.decode()
-    paper = page.split("<article")[1].split("</article>")[0]
-    text = html.unescape(re.sub(r"<[^>]+>", " ", paper)).replace("\N{NO-BREAK SPACE}", " ")
-    return " ".join(text.split())
+    url = reverse("take-home", kwargs={"patient_id": patient.pk})
+    return article_words(client_of(world, role).get(url).content.decode())
 
 
 def test_it_counts_what_was_walked(world, patient):

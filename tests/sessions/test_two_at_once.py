@@ -20,6 +20,7 @@ from rehab.sessions.setup.defaults import install_defaults
 from rehab.stations.models import Station
 from tests.support.forms import session_form
 from tests.support.programs import program_of
+from tests.support.walks import make_patient
 from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.postgres
@@ -38,12 +39,7 @@ def station(world: World) -> Station:
 
 @pytest.fixture
 def people(world: World) -> list[Patient]:
-    return [
-        Patient.everywhere.create(
-            clinic=world.clinic, code=f"K-{name}", nickname=name, paretic_side="left"
-        )
-        for name in ("Rosa", "Omar")
-    ]
+    return [make_patient(world.clinic, name) for name in ("Rosa", "Omar")]
 
 
 def at_once(*acts: Callable[[], Any]) -> list[Any]:

@@ -10,24 +10,16 @@ from django.urls import reverse
 from rehab.people.roles import Role
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
-from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.sessions.services import change_session
 from rehab.training.changes import ChangeKind
-from rehab.training.goals import GoalRule
-from rehab.training.phases import make_phase
+from tests.support.walks import make_session
 from tests.support.world import client_of, signed_in
 
 pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection
 
 
 def begin(world):
-    session = create_session(
-        SessionRequest(
-            patient=world.patient,
-            valence="positive",
-            goal=GoalRule(value=2.0),
-            phases=[make_phase("training")],
-        )
-    )
+    session = make_session(world.patient)
     change_session(session, ChangeKind.START)
     session.refresh_from_db()
     return session

@@ -8,6 +8,7 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
+from rehab.people.consent.services import active_consents
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import SCORES_SHOWN_FOR, TrainingSession
@@ -99,6 +100,7 @@ def test_a_patient_at_it_leaves_boards_after_the_own_session(world, screen):
     assert screen.get(reverse("scores", kwargs=session)).status_code == 200
     assert screen.post(reverse("leave-boards", kwargs=session)).status_code == 302
     assert Patient.everywhere.get(pk=world.patient.pk).boards == "own"
+    assert "boards" not in active_consents(world.patient)
 
 
 def test_a_source_is_still_told_that_a_session_has_ended(world):

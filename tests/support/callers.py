@@ -16,7 +16,7 @@ from rehab.people.roles import Role
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.live.protocol.frames import READ_NOW
-from rehab.sessions.log import Step
+from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.protocols import MeasureDefinition
@@ -393,8 +393,24 @@ async def change(session: TrainingSession, kind: str, value: float | None = None
 
 async def numbers(session: TrainingSession) -> list[int]:
     """Return the numbers of a session's stored steps."""
+    return await rows_of(session, "number")
+
+
+async def rows_of(session: TrainingSession, *columns: str) -> list[Any]:
+    """Return columns of a session's stored steps, in their order."""
     steps = Step.everywhere.filter(session=session).order_by("number")
-    return [number async for number in steps.values_list("number", flat=True)]
+    return [row async for row in steps.values_list(*columns, flat=len(columns) == 1)]
+
+
+async def events_of(session: TrainingSession, kind: str) -> list[SessionEvent]:
+    """Return a session's stored events of a kind, in their order."""
+    rows = SessionEvent.everywhere.filter(session=session, kind=kind).order_by("pk")
+    return [row async for row in rows]
+
+
+async def reread(session: TrainingSession) -> TrainingSession:
+    """Return a session as it is stored now."""
+    return await TrainingSession.everywhere.aget(pk=session.pk)
 
 
 async def restart() -> None:

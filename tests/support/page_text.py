@@ -18,6 +18,11 @@ def words(markup: str) -> str:
     return html.unescape(" ".join(re.sub(r"<[^>]+>", " ", markup).split()))
 
 
+def article_words(page: str) -> str:
+    """Return the text of a page's article: what is printed."""
+    return words(plain(html.unescape(page.split("<article")[1].split("</article>", maxsplit=1)[0])))
+
+
 def read_json(page: str, name: str) -> Any:
     """Return the data that a page holds for its scripts by that name."""
     return json.loads(re.search(rf'<script id="{name}"[^>]*>(.*?)</script>', page, re.DOTALL)[1])

@@ -73,7 +73,7 @@ def clean_environment(folder: Path, port: int) -> dict[str, str]:
 
 
 def try_python(
-    folder: Path, *arguments: str, port: int = 8000, umask: int = -1, **variables: str
+    folder: Path, *arguments: str, port: int = 8000, umask: int = -1, **variables: Any
 ) -> subprocess.CompletedProcess[str]:
     """Run Python on a data folder, with our settings and these variables; return what became."""
     return subprocess.run(

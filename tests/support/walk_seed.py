@@ -14,12 +14,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import django
 from websockets.sync.client import ClientConnection, connect
 
 from tests.support.servers import ROOT, Server, clean_environment
+
+if TYPE_CHECKING:
+    from rehab.people.models import User
 
 GOAL = 4.0
 
@@ -118,17 +121,28 @@ def make_walks(server: Server, *wanted: dict[str, Any]) -> list[Walk]:
     return [Walk(**row) for row in json.loads(made.stdout)]
 
 
-def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Make the sessions, and one PT who may see them all."""
+def browser_session(user: User) -> str:
+    """Return the key of a new browser session in which a user is signed in."""
     from importlib import import_module
 
     from django.conf import settings
     from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
 
+    from rehab.people.sign_in.flow import BACKEND
+
+    cookies = import_module(settings.SESSION_ENGINE).SessionStore()
+    cookies[SESSION_KEY] = str(user.pk)
+    cookies[BACKEND_SESSION_KEY] = BACKEND
+    cookies[HASH_SESSION_KEY] = user.get_session_auth_hash()
+    cookies.save()
+    return str(cookies.session_key)
+
+
+def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Make the sessions, and one PT who may see them all."""
     from rehab.people.models import Patient, User
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic
-    from rehab.people.sign_in.flow import BACKEND
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.sessions.setup.protocols import Protocol
     from rehab.stations.models import Device, Station
@@ -139,11 +153,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     clinic = first_clinic()
     count = User.everywhere.count()
     person = User.everywhere.create_user(f"walker{count}", role=Role.PT, clinic=clinic)
-    cookies = import_module(settings.SESSION_ENGINE).SessionStore()
-    cookies[SESSION_KEY] = str(person.pk)
-    cookies[BACKEND_SESSION_KEY] = BACKEND
-    cookies[HASH_SESSION_KEY] = person.get_session_auth_hash()
-    cookies.save()
+    cookie = browser_session(person)
     made = []
     for index, wish in enumerate(wanted):
         name = f"{count}-{index}"
@@ -184,7 +194,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 created_by=person,
             )
         )
-        made.append({"session": session.pk, "cookie": cookies.session_key, **tokens})
+        made.append({"session": session.pk, "cookie": cookie, **tokens})
     return made
 
 

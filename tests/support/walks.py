@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
+from typing import Any
 
-from rehab.people.models import Patient
+from rehab.people.models import Clinic, Patient
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
@@ -24,6 +25,23 @@ LEFT, RIGHT = Side.LEFT, Side.RIGHT
 Walked = float | None | Change | tuple[Side, float]
 
 
+def make_patient(clinic: Clinic, nickname: str = "Rosa", **fields: Any) -> Patient:
+    """Create a patient whose left leg is paretic."""
+    defaults: dict[str, Any] = {"code": f"K-{nickname}", "paretic_side": "left"}
+    return Patient.everywhere.create(clinic=clinic, nickname=nickname, **defaults | fields)
+
+
+def make_session(patient: Patient, valence: str = "positive", **settings: Any) -> TrainingSession:
+    """Create a session that is ready to start; what is not set is usual.
+
+    ``settings``: of its `SessionRequest`.
+    """
+    usual: dict[str, Any] = {"goal": GoalRule(value=GOAL), "trained_side": LEFT}
+    if "protocol" not in settings:
+        usual["phases"] = (make_phase("training"),)
+    return create_session(SessionRequest(patient=patient, valence=valence, **usual | settings))
+
+
 def walk(
     patient: Patient,
     valence: str,
@@ -38,16 +56,12 @@ def walk(
 ) -> TrainingSession:
     """Create a session, walk it and end it. Strides follow each other by a second."""
     began = now - timedelta(days=days_ago)
-    session = create_session(
-        SessionRequest(
-            patient=patient,
-            valence=valence,
-            goal=GoalRule(value=GOAL),
-            phases=phases or (make_phase("training"),),
-            trained_side=LEFT,
-            target=Target(hit_rate=wanted),
-            simulated=simulated,
-        )
+    session = make_session(
+        patient,
+        valence,
+        phases=phases or (make_phase("training"),),
+        target=Target(hit_rate=wanted),
+        simulated=simulated,
     )
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     session.created_at = began
@@ -74,21 +88,18 @@ def visit(
     """Let a simulated patient walk a whole visit, with all phases, two goal changes and a pause."""
     began = now - timedelta(days=days_ago, seconds=1.2 * count)
     half = (count - 54 - 12 - 40) // 2
-    session = create_session(
-        SessionRequest(
-            patient=patient,
-            valence=valence,
-            goal=GoalRule(percent_of_baseline=97),
-            phases=(
-                make_phase("baseline", strides=54),
-                make_phase("training", strides=half),
-                make_phase("catch", strides=12),
-                make_phase("training", "Training 85 %", gain=0.85, strides=half),
-                make_phase("washout"),
-            ),
-            trained_side=LEFT,
-            target=Target(hit_rate=0.6, duration_s=600),
-        )
+    session = make_session(
+        patient,
+        valence,
+        goal=GoalRule(percent_of_baseline=97),
+        phases=(
+            make_phase("baseline", strides=54),
+            make_phase("training", strides=half),
+            make_phase("catch", strides=12),
+            make_phase("training", "Training 85 %", gain=0.85, strides=half),
+            make_phase("washout"),
+        ),
+        target=Target(hit_rate=0.6, duration_s=600),
     )
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     session.created_at = began

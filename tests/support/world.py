@@ -122,10 +122,10 @@ class World:
         device.save()
         return client, device
 
-    def begin_session(self, patient: Patient | None = None, **options: Any) -> TrainingSession:
+    def begin_session(self, patient: Patient | None = None, **chosen: Any) -> TrainingSession:
         """Return a new session, ready to start, with the measure and protocol of the finished."""
         like = self.session
-        options = {"valence": "positive", "goal": GoalRule(value=1.0)} | options
+        options: dict[str, Any] = {"valence": "positive", "goal": GoalRule(value=1.0)} | chosen
         return create_session(
             SessionRequest(
                 patient=patient or self.patient,

@@ -117,7 +117,7 @@ def test_a_summary_tells_close_steps_apart():
     schedule = Schedule(ScheduleKind.SUMMARY, 4)
     fold = start(make_plan(schedule=schedule, close_steps=CLOSE))
     feed(fold, (4.5, 0.01), (4.01, 0.1), (3.0, 0.01), (3.99, 0.1))
-    answer = fold.telling.answer
+    answer = fold.delivery.answer
     assert (answer.steps, answer.hits, answer.close) == (4, 1, 2)
     assert answer.points == fold.feedback.points == 0  # one paid, one taken
 

@@ -169,6 +169,6 @@ def test_plans_from_before_there_was_a_choice_follow_the_old_rules():
             del phase[name]
     plan = SessionPlan.from_json(data)
     assert plan.cue_timing == CueTiming()
-    assert plan.schedule.tells_all
+    assert plan.schedule.answers_all
     assert plan.adaptation.mode == "off"
     assert plan.phases[0].robot

@@ -19,7 +19,7 @@ SCHEDULES = st.builds(
 
 
 def told_of(schedule, performances):
-    return [n for n, one in enumerate(performances, 1) if schedule.tells(n, one)]
+    return [n for n, one in enumerate(performances, 1) if schedule.answers(n, one)]
 
 
 def test_each_schedule_tells_what_its_name_says():
@@ -53,12 +53,12 @@ def test_every_step_is_told_once_or_waits(schedule, values):
     fold, steps, hits = start(make_plan(schedule=schedule)), 0, 0
     for value in values:
         walk(fold, [value])
-        if fold.telling.answer is not None:
-            assert fold.telling.told[-1] == fold.last_number
-            steps += fold.telling.answer.steps
-            hits += fold.telling.answer.hits
-    assert steps + fold.telling.untold.steps == len(values)
-    assert hits + fold.telling.untold.hits == fold.feedback.hits
+        if fold.delivery.answer is not None:
+            assert fold.delivery.reported[-1] == fold.last_number
+            steps += fold.delivery.answer.steps
+            hits += fold.delivery.answer.hits
+    assert steps + fold.delivery.pending.steps == len(values)
+    assert hits + fold.delivery.pending.hits == fold.feedback.hits
 
 
 @pytest.mark.parametrize(

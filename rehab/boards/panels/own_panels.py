@@ -2,7 +2,7 @@
 
 Points rank sessions of one type, hit rates those of all. Sessions that were simulated and those
 that a person walked never share a board. Only finished sessions are on one: with judged steps,
-which have a hit rate, or imported from the original GARRY, which kept their points alone.
+which have a hit rate, or imported from the original GARRY, which stored only their points.
 """
 
 from __future__ import annotations

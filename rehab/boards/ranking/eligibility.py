@@ -14,7 +14,7 @@ from rehab.people.models.running_studies import RUNNING
 def eligible_patients(board: Leaderboard) -> QuerySet[Patient]:
     """Return the patients who have agreed to be on a board and are in no blinded study.
 
-    Who has left one stays away until it is closed: a board of one feedback type tells the arm.
+    Who has left one stays away until it is closed: a board of one feedback type reveals the arm.
     """
     patients = Patient.everywhere.filter(boards__in=board.accepted_levels, blinded=False)
     patients = patients.exclude(enrollments__study__state=RUNNING)

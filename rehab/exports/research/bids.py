@@ -1,7 +1,7 @@
 """Sessions in the layout of BIDS for motion: each stride a sample, with its own latency.
 
 Source: Brain Imaging Data Structure, specification of motion (bids-specification.readthedocs.io).
-Strides do not come at a fixed rate: the channel ``latency`` tells when each did, and the sampling
+Strides do not come at a fixed rate: the channel ``latency`` says when each did, and the sampling
 frequency is the mean cadence of the file.
 """
 

@@ -1,4 +1,4 @@
-"""Dates that are shifted: by the same weeks for all that is told of a patient."""
+"""Dates that are shifted: by the same weeks for all data of a patient."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 from django.utils.crypto import salted_hmac
 
 MAX_WEEKS = 520
-SINCE_1970_S = 1e8  # clocks beyond three years count from 1970, and would tell the date
+SINCE_1970_S = 1e8  # clocks beyond three years count from 1970, and would reveal the date
 
 
 def shift_of(pseudonym: str) -> timedelta:
     """Return by how much a patient's dates are moved: 1 to 520 whole weeks back.
 
     It follows from the pseudonym and the server's own key (HMAC-SHA-256): the same at each export,
-    and unknown to whoever has only the files. Whole weeks keep the day of the week.
+    and unknown to anyone who has only the files. Whole weeks keep the day of the week.
     """
     digest = salted_hmac("garry.exports.dates", pseudonym, algorithm="sha256").digest()
     return -timedelta(weeks=1 + int.from_bytes(digest[:8], "big") % MAX_WEEKS)

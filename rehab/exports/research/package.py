@@ -32,7 +32,7 @@ from rehab.training.changes import ENDED_STATES
 from rehab.training.scoring import RULES_VERSION
 
 ABOUT_EXPORT = "export.json"
-KEPT_FOR = timedelta(hours=24)
+MAX_AGE = timedelta(hours=24)
 CHUNK_BYTES = 256 * 1024
 
 
@@ -49,7 +49,7 @@ class ExportProgress(NamedTuple):
 
 
 def sessions_for(user: User, study: Study | None) -> QuerySet[TrainingSession]:
-    """Return the ended sessions that somebody may export: of a study, or all.
+    """Return the ended sessions that a user may export: of a study, or all.
 
     Those of participants who have left a study, and agreed that its data then go, are not among
     them.
@@ -98,10 +98,10 @@ class Package:
 
     @classmethod
     def find(cls, folder: Path, user: User, now: datetime) -> Package | None:
-        """Return the export that somebody has begun in a folder; None if there is none.
+        """Return the export that a user has begun in a folder; None if there is none.
 
         One that is too old is removed; one of another account, or of a former role, which may have
-        been told more, is left alone.
+        seen more, is left alone.
         """
         try:
             about, made_at = _read_about(folder)
@@ -112,7 +112,7 @@ class Package:
             return None
         if (about["user"], about.get("role")) != (user.pk, user.role):
             return None
-        if not timedelta() <= now - made_at < KEPT_FOR:
+        if not timedelta() <= now - made_at < MAX_AGE:
             package.discard()
             return None
         return package
@@ -159,18 +159,18 @@ class Package:
     def files(self) -> Iterator[tuple[str, Iterable[str | bytes]]]:
         """Yield the files of the archive: name and content in pieces.
 
-        A session that somebody may not see any more, or whose patient was erased, is left out.
+        A session that the user may not see any more, or whose patient was erased, is left out.
         """
         allowed = self._readable()
         people: dict[str, dict[str, Any]] = {}
         parts = []
         for key in self.keys:
             about = self._part(key) / ABOUT
-            told = json.loads(about.read_text("utf-8")) if about.exists() else {}
-            if key in allowed and told.get("pseudonym") == allowed[key]:
+            known = json.loads(about.read_text("utf-8")) if about.exists() else {}
+            if key in allowed and known.get("pseudonym") == allowed[key]:
                 parts.append(self._part(key))
-                if told["participant_id"]:
-                    people.setdefault(told["participant_id"], told)
+                if known["participant_id"]:
+                    people.setdefault(known["participant_id"], known)
         yield "README.txt", [self._readme(len(parts))]
         yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
         for table in TABLES:
@@ -209,9 +209,9 @@ class Package:
 
 
 def discard_old(folder: Path, now: datetime) -> None:
-    """Remove exports that nobody has fetched for a day."""
+    """Remove exports that were not fetched within a day."""
     for one in folder.iterdir() if folder.is_dir() else ():
-        if one.is_dir() and now - _find_beginning(one) >= KEPT_FOR:
+        if one.is_dir() and now - _find_beginning(one) >= MAX_AGE:
             shutil.rmtree(one, ignore_errors=True)
 
 

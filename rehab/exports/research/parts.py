@@ -62,7 +62,7 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
         if shift is not None and table is STEPS:
             rows = _from_first_step(rows)
         if shift is not None and table is INCIDENTS:
-            rows = (row._replace(recording="") for row in rows)  # it may tell the time of day
+            rows = (row._replace(recording="") for row in rows)  # it may show the time of day
         pump(rows, sinks)
     write_bundle(_of(aside / "fhir", session, "json"), user, session, shift)
     about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
@@ -91,7 +91,7 @@ def _has_one_goal(user: User, session: TrainingSession) -> bool:
 
 
 def _from_first_step(rows: Iterable[Any]) -> Iterator[Any]:
-    """Yield steps whose times do not tell the date: a clock since 1970 begins at the first one."""
+    """Yield steps whose times reveal no date: a clock since 1970 begins at the first one."""
     origin = None
     for row in rows:
         if origin is None:

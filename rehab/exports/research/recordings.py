@@ -11,22 +11,13 @@ from rehab.exports.research.sinks import Rows
 from rehab.people.web.csv_tables import CsvWriter
 from rehab.sources.recording.plain import PLAIN
 
+NAMES = (
+    *("number", "time_s", "side", "value", "goal", "shown", "hit", "valid", "reason"),
+    *("phase", "kind", "feedback", "gain"),
+)
 # Column of the recording: column of the table of steps.
-COLUMNS = {
-    "number": "number",
-    "time_s": "time",
-    "side": "side",
-    "value": "value",
-    "goal": "goal",
-    "shown": "shown",
-    "hit": "hit",
-    "valid": "valid",
-    "reason": "reasons",
-    "phase": "phase_name",
-    "kind": "phase_kind",
-    "feedback": "feedback",
-    "gain": "gain",
-}
+RENAMED = {"time_s": "time", "reason": "reasons", "phase": "phase_name", "kind": "phase_kind"}
+COLUMNS = {name: RENAMED.get(name, name) for name in NAMES}
 
 
 class RecordingSink:

@@ -27,17 +27,15 @@ class Sink(Protocol):
         """Finish what was written."""
 
 
-def pump(rows: Iterable[Any], sinks: Sequence[Sink]) -> int:
-    """Write rows to every sink, finish them, and return how many rows there were."""
-    remaining, count = iter(rows), 0
+def pump(rows: Iterable[Any], sinks: Sequence[Sink]) -> None:
+    """Write rows to every sink, and finish them."""
+    remaining = iter(rows)
     with ExitStack() as closing:  # every file, also where a row cannot be written
         for sink in reversed(sinks):
             closing.callback(sink.close)
         while batch := list(islice(remaining, BATCH_ROWS)):
-            count += len(batch)
             for sink in sinks:
                 sink.write(batch)
-    return count
 
 
 class CsvSink:

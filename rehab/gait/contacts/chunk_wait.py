@@ -1,7 +1,7 @@
 """How long samples of a force may wait for others before they are looked at.
 
 To look at a chunk costs as much as hundreds of samples do. While a foot swings, has just landed or
-still stands, no valid stance can have ended, and its newest sample tells which.
+still stands, no valid stance can have ended, and its newest sample shows which.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rehab.gait.signals.filters import Floats, find_minimum
 class ChunkWait:
     """While no valid stance can have ended in samples that wait.
 
-    Only a foot that leaves and lands again within one chunk is told later, by the longest wait.
+    Only a foot that leaves and lands again within one chunk is reported later, by the longest wait.
 
     Attributes
     ----------

@@ -1,4 +1,7 @@
-"""Where a foot leaves and meets the floor that it drags over: by the slope of the force."""
+"""Initial and terminal contact of a foot that drags over the floor, by the slope of the force.
+
+The reference is docs/reference/gait.md#contacts.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Contacts of a foot with the floor, from the vertical force under it."""
+"""Contacts of a foot with the floor, from the vertical force under it.
+
+Initial and terminal contact by two thresholds (hysteresis), with debouncing and baseline (zero)
+tracking; the reference is docs/reference/gait.md#contacts.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ from rehab.gait.signals.samples import FORCE, TIME
 CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
 RELEASE_N = 20.0
 STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
-BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on with the last stance
+BOUNCE_S = 0.15  # debounce: no foot swings faster; a sooner contact continues the last stance
 # A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is
 # certain above that; its ends are timed at the release threshold where the force gets there and no
 # drag is found, else by slope and dip (`drag`).
@@ -38,7 +42,7 @@ class ContactFinder:
 
     A contact is certain at 0.15 of the body weight, ``contact_n`` at least; its beginning and
     end are timed where the force crosses ``release_n``, by linear interpolation between samples.
-    Those of a foot that is dragged are told by ``drag.find_edge``.
+    Those of a foot that is dragged are found by ``drag.find_edge``.
 
     Parameters
     ----------

@@ -159,7 +159,7 @@ def measure_gyroscope(
     Raises
     ------
     GaitInputError
-        With the cure, where nobody walks with either sign.
+        With the cure, where no strides are found with either sign.
     """
     detector = GyroscopeStrideDetector(estimate_rate(t_s), segment=segment)
     strides = detector.feed(t_s, rate_rad_s) + detector.finish()

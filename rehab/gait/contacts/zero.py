@@ -1,4 +1,4 @@
-"""What a plate reads while nobody stands on it."""
+"""The zero of a force plate (tare): its reading without load, with its baseline drift."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
@@ -70,15 +71,17 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
         raise GaitInputError(
             f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(header)}."
         )
-    table = np.genfromtxt(
-        path,
-        delimiter=delimiter,
-        skip_header=1,
-        usecols=[header.index(name) for name in wanted],
-        encoding="utf-8-sig",
-        invalid_raise=False,
-        ndmin=2,
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of rows that are too short, which are left out
+        table = np.genfromtxt(
+            path,
+            delimiter=delimiter,
+            skip_header=1,
+            usecols=[header.index(name) for name in wanted],
+            encoding="utf-8-sig",
+            invalid_raise=False,
+            ndmin=2,
+        )
     if not table.shape[0]:
         raise GaitInputError(f"{path.name} has a header but no samples. Export it again.")
     return dict(zip(wanted, table.T, strict=True))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import gzip
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -10,26 +13,35 @@ import numpy as np
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
 from rehab.gait.recordings.columns import ColumnMap, find_layout, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns
+from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
 
+# What parsers raise for files that are not what they say.
+DAMAGED = (
+    ArithmeticError, AttributeError, EOFError, gzip.BadGzipFile, LookupError, MemoryError,
+    RuntimeError, TypeError, ValueError, csv.Error, zlib.error,
+)  # fmt: skip
+LARGEST = 1e30  # of what a sensor sends; beyond, it is damaged
 BYTES_MAX = 512 * 1024 * 1024
 
-READERS: dict[str, Callable[[Path], dict[str, Floats]]] = {
+READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
     ".csv": csv_files.read_table,
     ".c3d": c3d_files.read_table,
     ".mot": motion_files.read_storage,
     ".sto": motion_files.read_storage,
     ".trc": motion_files.read_markers,
+    ".tsv": motion_files.read_qualisys,
 }
 
 
-def read_any_table(path: Path) -> dict[str, Floats]:
-    """Return the columns of a file by name, shape (n,) each, all at the fastest channel's rate.
+def read_any_table(*paths: Path) -> Table:
+    """Return the columns of a walk's files by name, shape (n,) each, at the fastest one's rate.
 
     Kinds are told by their endings: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
-    OpenSim's .mot, .sto and .trc. Times are in a column that is called time, in seconds.
+    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Times are in a column that is called time, in
+    seconds, by which several files are joined.
 
     Raises
     ------
@@ -38,26 +50,38 @@ def read_any_table(path: Path) -> dict[str, Floats]:
     OSError
         For a file that cannot be read.
     """
+    if len(paths) > 1:
+        return join_tables({path.name: read_any_table(path) for path in paths})
+    (path,) = paths
     if path.stat().st_size > BYTES_MAX:
         raise GaitInputError(
             f"{path.name} has more than {BYTES_MAX // 2**20} MiB. Export a minute of walking."
         )
     endings = [ending.lower() for ending in path.suffixes if ending.lower() != ".gz"]
     reader = READERS.get(endings[-1] if endings else ".csv", csv_files.read_table)
-    if reader is csv_files.read_table and motion_files.is_exported(path):
-        reader = motion_files.read_export
-    return reader(path)
+    try:
+        if reader is csv_files.read_table and motion_files.is_exported(path):
+            reader = motion_files.read_export
+        table = reader(path)
+    except GaitInputError:
+        raise
+    except DAMAGED as problem:
+        raise GaitInputError(f"{path.name} is damaged ({problem}). Export it again.") from None
+    table = table if isinstance(table, Table) else Table(table)
+    for name, values in table.items():
+        table[name] = np.where(np.abs(values) < LARGEST, values, np.nan)
+    return table
 
 
 def read_signals(
-    path: Path, pairs: Sequence[str] | None = None
+    path: Path | Sequence[Path], pairs: Sequence[str] | None = None
 ) -> tuple[Floats, dict[str, LegSamples], Floats | None]:
     """Return times [s], each leg's channels and the frame numbers of a recording.
 
     Parameters
     ----------
     path
-        The file. A cell that is not a number is a missing sample: NaN.
+        The file, or several of one walk. A cell that is not a number is a missing sample: NaN.
     pairs
         Which column is which channel, as for ``read_column_map``; None to decide by the header.
 
@@ -73,7 +97,8 @@ def read_signals(
     OSError
         For a file that cannot be read.
     """
-    table = read_any_table(path)
+    paths = [path] if isinstance(path, Path) else list(path)
+    path, table = paths[0], read_any_table(*paths)
     columns = read_column_map(pairs) if pairs else find_layout(list(table))
     require_columns(path, table, columns)
     names = [column.name for column in columns.columns]

@@ -85,6 +85,7 @@ def check_signals(
     rate_hz: float,
     mass_kg: float,
     own_deceleration_s: dict[str, float] | None = None,
+    strides: list[Stride] | None = None,
 ) -> SignalCheck:
     """Return the check of signs, units, weight and force–kinematics lag of half a minute or more.
 
@@ -96,6 +97,8 @@ def check_signals(
         As for ``TwoLegDetector``.
     own_deceleration_s
         ``deceleration_s`` of an earlier check of this person, by side.
+    strides
+        Those of the signals, where they are measured already.
 
     Raises
     ------
@@ -105,7 +108,8 @@ def check_signals(
     time = np.asarray(t_s, dtype=np.float64)
     legs = {"left": left, "right": right}
     given = {side: LegSamples(*leg) for side, leg in legs.items() if leg is not None}
-    strides = make_detector(given, rate_hz, mass_kg).feed_legs(time, given) if given else []
+    if strides is None:
+        strides = make_detector(given, rate_hz, mass_kg).feed_legs(time, given) if given else []
     findings = _check_rate(time, rate_hz)
     decelerations: dict[str, float | None] = {}
     for side, leg in given.items():
@@ -164,13 +168,18 @@ def _check_force(force: Floats, strides: list[Stride], weight_n: float) -> list[
         return [("force_lost", "No vertical force arrives. Look at the plate and its channel.")]
     low, high = np.percentile(finite, [1, 99]).tolist()
     if -low > high and -low > 0.3 * weight_n:
-        return [("force_sign", "The vertical force has the wrong sign. Turn it: up is positive.")]
+        return [
+            (
+                "force_sign",
+                "The vertical force is negative; here up is positive. Give it a factor of -1.",
+            )
+        ]
     if high < 0.01 * weight_n and high - low > 0.0002 * weight_n:
-        return [("force_unit", f"The vertical force reaches only {high:.2g} N. Send newtons, not "
-                 "kilonewtons, and check that the plate is on.")]  # fmt: skip
+        return [("force_unit", f"The vertical force reaches only {high:.2g} N. Look up its "
+                 "unit, and check that the plate is on.")]  # fmt: skip
     if high > 5 * weight_n:
-        return [("force_unit", f"The vertical force reaches {high:.2g} N. Send newtons, not "
-                 "millinewtons, and check the body mass.")]  # fmt: skip
+        return [("force_unit", f"The vertical force reaches {high:.2g} N. Look up its unit, "
+                 "and check the body mass.")]  # fmt: skip
     if not strides:
         return [("no_strides", "No stride was seen. Walk for half a minute, and check that the "
                  "plate is on and zeroed.")]  # fmt: skip

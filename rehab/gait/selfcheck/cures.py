@@ -1,4 +1,7 @@
-"""What to put right where strides are rejected for a reason too often."""
+"""What to look at where strides are rejected for a reason too often.
+
+A sign, a unit or a delay is named as a question, never as the cure: another person may look so.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,8 @@ CURES = {
         "The vertical force breaks off while the foot stands. Look at the plate."
     ),
     RejectionReason.FORCE_TOO_LARGE: (
-        "The vertical force is more than twice the body weight. Send it in newtons and check "
-        "the body mass."
+        "The vertical force is more than twice the body weight, unusual for walking. Check the "
+        "body mass and the unit of force by a known weight on the plate."
     ),
     RejectionReason.LONG_STANCE: (
         "The foot does not leave its plate. Zero the plate, or start the belt."
@@ -37,46 +40,48 @@ CURES = {
         "The ankle moment is missing, frozen or jumps. Look at its channel."
     ),
     RejectionReason.MOMENT_SIGN: (
-        "The ankle moment has the wrong sign. Turn it: plantarflexion is positive."
+        "The ankle moment is negative through most of stance; here plantarflexion is positive. "
+        "Look up which sign the lab's system gives it."
     ),
     RejectionReason.MOMENT_TOO_SMALL: (
-        "The ankle moment is next to nothing. Send newton meters, not kilonewton meters or "
-        "newton meters per kilogram."
+        "The ankle moment is next to nothing. Look up its unit and whether it is by body mass; it "
+        "is right for a foot that is hardly loaded in front."
     ),
     RejectionReason.MOMENT_TOO_LARGE: (
-        "The ankle moment is larger than anybody's. Send newton meters, not newton millimeters, "
-        "and check the body mass."
+        "The ankle moment is larger than any known of walking. Look up its unit and check the body "
+        "mass."
     ),
     RejectionReason.MOMENT_IN_SWING: (
         "The ankle moment does not vanish while the foot swings. Check that force and moment "
-        "are of the same leg and in time, and zero the plate."
+        "are of the same leg, and that the plate is zeroed before inverse dynamics."
     ),
     RejectionReason.MOMENT_OUT_OF_STEP: (
-        "The ankle moment is too large for the force under the foot. Check that both are of the "
-        "same leg and in time, and the units."
+        "The ankle moment does not fit to the force under the foot: both feet on one plate, or "
+        "another leg's, time or unit. Compare the two curves (--plot)."
     ),
     RejectionReason.ANGLE_LOST: (
         "The ankle angle is missing, frozen or jumps. Look at markers or sensor."
     ),
     RejectionReason.ANGLE_FLAT: (
-        "The ankle angle hardly moves. Send radians, and check the channel."
+        "The ankle angle hardly moves. Check the channel and its unit; it is right for a rigid "
+        "orthosis, which has no A2."
     ),
     RejectionReason.ANGLE_TOO_LARGE: (
-        "The ankle angle moves more than any ankle. Send radians, not degrees."
+        "The ankle angle moves more than any ankle can. Look up its unit."
     ),
     RejectionReason.ANGLE_OUT_OF_STEP: (
-        "The ankle angle does not fit to the force. Check that both are of the same leg and in "
-        "time."
+        "The ankle turns back before the foot leaves, which is unusual. Compare angle and force "
+        "(--plot): another leg's, another time, or how this person walks."
     ),
     RejectionReason.POWER_REVERSED: (
-        "The ankle seems to brake where it should push. Turn the sign of the angle: "
-        "plantarflexion is positive."
+        "The ankle brakes where most push; here plantarflexion is positive. Look up which sign the "
+        "lab's system gives the angle."
     ),
     RejectionReason.NO_PUSH_OFF: (
-        "No push-off is found. Check the signs of moment and angle, and that they are of the "
-        "same leg as the force."
+        "No push-off is found. Check that moment and angle are of the same leg as the force, and "
+        "their signs; it is right for a foot that is lifted without pushing."
     ),
     RejectionReason.OUT_OF_BOUNDS: (
-        "Push-off power is larger than anybody's. Check the units of moment and angle."
+        "Push-off power is larger than any known of walking. Look up the units of moment and angle."
     ),
 }

@@ -14,6 +14,7 @@ from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import find_deceleration_peak
+from rehab.gait.setup.names import read_label
 from rehab.gait.setup.proposal import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
@@ -44,8 +45,8 @@ class SetupCheck:
         differ in the latter by more than any delay that matters.
     late, lost
         Samples that came late, and times without samples.
-    strides, valid
-        Of the recording, measured with this.
+    strides, valid, a2_w_kg
+        Of the recording, measured with this; the median A2 of valid strides by side.
     findings
         What a person should look at, with the cure.
     """
@@ -57,16 +58,17 @@ class SetupCheck:
     lost: int
     strides: int
     valid: int
+    a2_w_kg: dict[str, float]
     findings: tuple[str, ...]
 
     @property
     def is_certain(self) -> bool:
         """Whether nothing is left to look at."""
-        return not self.findings
+        return not self.findings and all(one.is_certain for one in self.proposal.guesses.values())
 
 
 def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> SetupCheck:
-    """Return what the columns of half a minute of walking are, and whether they are in time.
+    """Return what the columns of a walk are, and whether they are in time.
 
     Parameters
     ----------
@@ -89,6 +91,11 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
         for side, leg in legs.items()
         for channel in ("moment", "angle")
     }
+    a2_w_kg = {
+        side: median(values)
+        for side in legs
+        if (values := [s.a2_w_kg for s in strides if s.side == side and s.valid and s.a2_w_kg])
+    }
     (times,), late_s = SampleClock().add(np.array([time_s]))
     late = 0 if late_s is None else int((late_s > LATE_S).sum())
     lost = int((np.diff(times) > 2.5 / proposal.rate_hz).sum())
@@ -98,8 +105,9 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
         legs.get("right"),
         rate_hz=proposal.rate_hz,
         mass_kg=proposal.mass_kg,
+        strides=strides,
     )
-    findings = [
+    findings = list(proposal.notes) + [
         f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt
     ]
     findings += _describe_missing(proposal) + _describe_timing(timing)
@@ -112,6 +120,7 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
         lost=lost,
         strides=len(strides),
         valid=sum(stride.valid for stride in strides),
+        a2_w_kg=a2_w_kg,
         findings=tuple(dict.fromkeys(findings)),
     )
 
@@ -130,12 +139,15 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
             if guess is None:
                 continue
             what = f"{side}.{channel}={column.name}"
+            is_clear = guess.likeness > CERTAIN_LIKE and not guess.doubt
             if guess.column != column.name:
-                if guess.is_certain:
+                label = read_label(column.name)
+                is_named = label and label.channel == channel and label.side in {"", side}
+                if guess.is_certain or (is_clear and not is_named):
                     wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
             elif guess.factor * column.factor < 0 and guess.likeness > CERTAIN_LIKE:
                 wrong.append(f"{what}: its sign is turned. Give a factor of {guess.factor:.6g}.")
-            elif abs(column.factor / guess.factor - 1) > SAME_FACTOR and guess.is_certain:
+            elif abs(column.factor / guess.factor - 1) > SAME_FACTOR and is_clear:
                 wrong.append(
                     f"{what}: it is in {guess.unit}. Give a factor of {guess.factor:.6g}, "
                     f"not {column.factor:.6g}."
@@ -150,16 +162,25 @@ def _make_map(proposal: Proposal) -> ColumnMap:
     whole = {side: leg for side, leg in legs.items() if leg.keys() >= set(REQUIRED)}
     if not whole:
         seen = ", ".join(f"{s} {c} {g.column}" for (s, c), g in proposal.guesses.items())
+        missing = [one for one in REQUIRED if one not in {c for _, c in proposal.guesses}]
+        lacking = f" It has no ankle {' and no ankle '.join(missing)}." if missing else ""
         raise GaitInputError(
             f"No leg is whole: a vertical force, an ankle moment and an ankle angle are needed, "
-            f"seen was {seen}. Let the lab send what is missing."
+            f"seen was {seen}.{lacking} Let the lab send what is missing, or give the file that "
+            "has it in the same command."
         )
     frame = None if proposal.frame is None else SignalColumn(proposal.frame)
     return ColumnMap(SignalColumn(proposal.time, proposal.time_factor), whole, frame)
 
 
 def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:
-    return measure_strides(time_s, legs, rate_hz=proposal.rate_hz, mass_kg=proposal.mass_kg)
+    return measure_strides(
+        time_s,
+        legs,
+        rate_hz=proposal.rate_hz,
+        mass_kg=proposal.mass_kg,
+        is_overground=proposal.is_overground,
+    )
 
 
 def _find_timing(
@@ -195,13 +216,10 @@ def _describe_missing(proposal: Proposal) -> list[str]:
 
 def _describe_timing(timing: dict[tuple[str, str], float | None]) -> list[str]:
     """Return what is unusual about the moments' times; of the angles the self-check tells it."""
-    found = []
+    unknown = [f"{side} {channel}" for (side, channel), at_s in timing.items() if at_s is None]
+    found = [f"Too few strides to tell whether in time: {', '.join(unknown)}."] if unknown else []
     for (side, channel), at_s in timing.items():
-        if at_s is None:
-            found.append(
-                f"Whether the {side} {channel} is in time cannot be told: too few strides."
-            )
-        elif channel == "moment" and abs(at_s) > MOMENT_TOLERANCE_S:
+        if channel == "moment" and at_s is not None and abs(at_s) > MOMENT_TOLERANCE_S:
             order = "later" if at_s > 0 else "earlier"
             found.append(
                 f"The {side} moment falls {abs(at_s) * 1000:.0f} ms {order} than its force; up to "

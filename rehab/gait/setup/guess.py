@@ -17,8 +17,8 @@ class Guess:
         What its numbers are multiplied with to SI units and our signs, and their unit.
     likeness
         Correlation with the channel's shape.
-    is_certain
-        Whether nothing else is nearly as likely.
+    is_named
+        Whether its label says so, too.
     doubt
         What speaks against it, else empty.
     """
@@ -29,5 +29,10 @@ class Guess:
     factor: float
     unit: str
     likeness: float
-    is_certain: bool
+    is_named: bool
     doubt: str = ""
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether its label, its unit and its curve agree."""
+        return self.is_named and not self.doubt

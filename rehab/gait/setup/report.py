@@ -12,15 +12,16 @@ from rehab.gait.setup.guess import Guess
 def describe_setup(check: SetupCheck) -> list[str]:
     """Return a set-up check as lines to read."""
     proposal = check.proposal
-    measured = "measured with the plates" if proposal.is_mass_measured else "as given"
+    sources = {"plates": "measured with the plates", "file": "by the file", "given": "as given"}
     lines = [
         f"time   {proposal.time} × {proposal.time_factor:g}, {proposal.rate_hz:.1f} Hz; "
         f"{check.late} samples late, {check.lost} times lost",
-        f"mass   {proposal.mass_kg:.1f} kg, {measured}",
+        f"mass   {proposal.mass_kg:.1f} kg, {sources[proposal.mass_source]}",
     ]
     for (side, channel), guess in sorted(proposal.guesses.items()):
         lines.append(f"{side:5}  {_describe_guess(guess, check.timing_s.get((side, channel)))}")
-    lines.append(f"{check.strides} strides, {check.valid} valid")
+    a2 = "".join(f", A2 {side} {value:.2f} W/kg" for side, value in check.a2_w_kg.items())
+    lines.append(f"{check.strides} strides, {check.valid} valid{a2}")
     lines += [f"! {text}" for text in check.findings]
     return [*lines, "", "If that is right, measure with:", "  " + format_arguments(check)]
 
@@ -42,8 +43,9 @@ def format_arguments(check: SetupCheck) -> str:
         for side, leg in check.columns.legs.items()
         for channel, column in leg.items()
     ]
-    quoted = " ".join(f"'{pair}'" if " " in pair or "*" in pair else pair for pair in pairs)
-    return f"--mass {check.proposal.mass_kg:.1f} --columns {quoted}"
+    quoted = " ".join(f"'{pair}'" if set(pair) & set(" *()'$&;|") else pair for pair in pairs)
+    over = "--overground " if check.proposal.is_overground else ""
+    return f"--mass {check.proposal.mass_kg:.1f} {over}--columns {quoted}"
 
 
 def _format_column(column: SignalColumn) -> str:
@@ -67,7 +69,9 @@ def setup_to_json(check: SetupCheck, columns: list[str]) -> dict[str, Any]:
         "time": {"column": proposal.time, "factor": proposal.time_factor},
         "rate_hz": proposal.rate_hz,
         "mass_kg": round(proposal.mass_kg, 1),
-        "is_mass_measured": proposal.is_mass_measured,
+        "is_mass_measured": proposal.mass_source == "plates",
+        "is_overground": proposal.is_overground,
+        "a2_w_kg": check.a2_w_kg,
         "late": check.late,
         "lost": check.lost,
         "strides": check.strides,

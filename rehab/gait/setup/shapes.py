@@ -6,12 +6,20 @@ labs take for an ankle's by a column too far.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from rehab.gait.signals.filters import Floats
 
 POINTS = 100  # of a stride
+STANCE = 0.62  # of a stride, in the shapes
+LOADED = 0.15  # of the largest force
+STANCE_S = (0.2, 4.0)
+STRIDES_MOST = 30  # half a minute is enough
+SEEN = 0.8  # of a stride
+SHIFT = 4  # hundredths of a stride
 
 _TIMES = np.arange(POINTS) / POINTS
 
@@ -44,42 +52,86 @@ SHAPES: dict[str, Floats] = {
 }
 
 
-def make_profile(time_s: Floats, values: Floats, contacts_s: Floats) -> Floats | None:
+@dataclass(frozen=True, slots=True)
+class Stances:
+    """A leg's stances: when each begins and ends, and when the next one begins [s], shape (n,)."""
+
+    begin_s: Floats
+    end_s: Floats
+    next_s: Floats
+
+    def __len__(self) -> int:
+        return len(self.begin_s)
+
+
+def find_stances(time_s: Floats, force: Floats) -> Stances:
+    """Return when a force bears somebody, of stances that are seen whole.
+
+    Parameters
+    ----------
+    time_s, force
+        Shape (n,), upward positive, of any unit.
+    """
+    known = np.nan_to_num(force)
+    high = float(known.max(initial=0.0))
+    high = float(np.percentile(known[known > 0.2 * high], 98)) if high > 0 else 0.0
+    loaded = np.concatenate(([False], known > LOADED * high, [False])) if high > 0 else np.zeros(2)
+    edges = np.flatnonzero(loaded[1:] != loaded[:-1]).reshape(-1, 2)
+    whole = edges[(edges[:, 0] > 0) & (edges[:, 1] < len(time_s))]
+    begin_s, end_s = time_s[whole[:, 0]], time_s[whole[:, 1] - 1]
+    usual = (end_s - begin_s > STANCE_S[0]) & (end_s - begin_s < STANCE_S[1])
+    begin_s, end_s = begin_s[usual], end_s[usual]
+    after_s = end_s + (end_s - begin_s) * (1 - STANCE) / STANCE
+    next_s = np.append(begin_s[1:], np.inf)
+    is_next = (next_s - end_s > 0.1) & (next_s - begin_s < 3 * (end_s - begin_s))
+    return Stances(begin_s, end_s, np.where(is_next, next_s, after_s))
+
+
+def make_profile(time_s: Floats, values: Floats, stances: Stances) -> Floats | None:
     """Return the median of a channel over strides, shape (POINTS,), None without usable ones.
+
+    Stances are stretched to one length, and swings to another, as people differ in their shares.
 
     Parameters
     ----------
     time_s, values
         Shape (n,).
-    contacts_s
-        Initial contacts of one leg [s], increasing.
+    stances
+        Of one leg.
     """
-    lengths = np.diff(contacts_s)
-    usual = lengths[(lengths > 0.5) & (lengths < 6)]
-    if not len(usual):
-        return None
-    middle = float(np.median(usual))
-    begins = contacts_s[:-1][np.abs(lengths / middle - 1) < 0.2]
     known = np.isfinite(values)
-    if len(begins) < 3 or known.sum() < POINTS:
+    if not len(stances) or known.sum() < POINTS / 2:
         return None
-    at_s = begins[:, np.newaxis] + _TIMES * middle
-    profile: Floats = np.median(np.interp(at_s, time_s[known], values[known]), axis=0)
-    return profile
+    most = slice(0, STRIDES_MOST)
+    ends = (stances.begin_s[most], stances.end_s[most], stances.next_s[most])
+    begin_s, end_s, next_s = (times[:, np.newaxis] for times in ends)
+    in_stance = begin_s + _TIMES / STANCE * (end_s - begin_s)
+    in_swing = end_s + (_TIMES - STANCE) / (1 - STANCE) * (next_s - end_s)
+    at_s = np.where(_TIMES < STANCE, in_stance, in_swing)
+    if not known.all():
+        time_s, values = time_s[known], values[known]
+    seen = np.interp(at_s, time_s, values, left=np.nan, right=np.nan)
+    seen = seen[np.isfinite(seen).mean(axis=1) > SEEN]
+    if not len(seen):
+        return None
+    profile: Floats = np.nanmedian(seen, axis=0) if len(seen) > 1 else seen[0]
+    return np.where(np.isfinite(profile), profile, np.nanmedian(profile))
 
 
-def find_likeness(profile: Floats, shape: str, most_shift: int = 4) -> float:
-    """Return how alike a profile is to a shape: their correlation, below 0 with the sign turned.
+def find_likeness(profile: Floats) -> dict[str, float]:
+    """Return how alike a profile is to each shape: their correlation, below 0 with the sign turned.
 
     Both may be shifted by a few hundredths of a stride against each other, as stances differ.
     """
-    curve = SHAPES[shape] - SHAPES[shape].mean()
     centered = profile - profile.mean()
-    size = float(np.linalg.norm(curve) * np.linalg.norm(centered))
-    if not size > 0:
-        return 0.0
-    found = [
-        float(np.roll(centered, shift) @ curve) / size
-        for shift in range(-most_shift, most_shift + 1)
-    ]
-    return max(found, key=abs)
+    size = float(np.linalg.norm(centered))
+    if not 0 < size < np.inf:
+        return dict.fromkeys(SHAPES, 0.0)
+    found = (_SHIFTED @ centered) / size
+    best = found[np.arange(len(SHAPES)), np.abs(found).argmax(axis=1)]
+    return dict(zip(SHAPES, best.tolist(), strict=True))
+
+
+_CURVES = np.array([curve - curve.mean() for curve in SHAPES.values()])
+_SHIFTED = np.array([np.roll(_CURVES, shift, axis=1) for shift in range(-SHIFT, SHIFT + 1)])
+_SHIFTED = np.swapaxes(_SHIFTED, 0, 1) / np.linalg.norm(_CURVES, axis=1)[:, np.newaxis, np.newaxis]

@@ -204,7 +204,7 @@ def estimate_rate(t_s: Floats) -> float:
     Raises
     ------
     GaitInputError
-        With the cure, where the times tell no rate.
+        With the cure, where the times have no usual rate.
     """
     if not (np.diff(t_s) > 0).any():
         raise GaitInputError("The times of the samples do not go on. Map another time column.")

@@ -2,7 +2,7 @@
 
 What is missing from the count is lost, and what comes late is late by what its number says: nothing
 is guessed, as it has to be from stamps alone (``signals.clock``). Numbers that cannot be a count of
-the samples are ignored, and it is told why.
+the samples are ignored, and the reason is reported.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the clock of a stance was like: late and lost samples, and whose clock channels keep."""
+"""Gaps in the time base of a stance: late and lost samples, and the clock of each channel."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class ClockJudge:
         return StanceClock(kinetics_s, taken_s, bridged_s, latest_s, lost_s, reasons, flags)
 
     def _weigh(self, window: Floats, late_s: Floats) -> None:
-        """Add what this stance's late samples tell of how its moment and angle are made."""
+        """Add the evidence of this stance's late samples on how its moment and angle are made."""
         is_late = np.concatenate(([False], late_s > LATE_S / 2, [False]))
         edges = np.flatnonzero(is_late[1:] != is_late[:-1]).reshape(-1, 2)
         for first, last in edges:

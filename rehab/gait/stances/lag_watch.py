@@ -1,6 +1,6 @@
 """Whether angle or moment comes out of time with the force, by the strides before.
 
-What one stride cannot tell several can. A moment is its force times a lever, so both fall together,
+Several strides show what one cannot. A moment is its force times a lever, so both fall together,
 whoever walks. An ankle brakes soon after its foot has left, but people differ in that by more than
 any lag that matters: it is refused only where it changes from this person's own first strides.
 """
@@ -26,7 +26,7 @@ from rehab.gait.signals.filters import (
 # after terminal contact. Of seven or eight people and five systems [ms]: moore2013 49 to 61;
 # gaitalytics -2 to 13 (treadmill), 4 to 10 (overground); BTK's two -2 to 22; OpenSim's two 27 to
 # 35; an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside,
-# a stride is marked as unusual and stays valid: nothing proves that nobody walks so.
+# a stride is marked as unusual and stays valid: nothing proves that no person walks so.
 BRAKING_S = (-0.02, 0.075)
 BRAKING_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.1, 0.2)
@@ -86,7 +86,7 @@ class LagWatch:
 
     @property
     def beyond_s(self) -> float:
-        """By how much the lag is less or more than anybody's [s], 0 where it is not."""
+        """By how much the lag is outside of what is known of people [s], 0 where it is not."""
         if not self._newest:
             return 0.0
         return min(0.0, self._lag_s - self._least_s) + max(0.0, self._lag_s - self._most_s)

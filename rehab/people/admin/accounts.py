@@ -24,6 +24,7 @@ from rehab.people.roles import Role
 from rehab.people.sign_in import attempts, resets
 from rehab.people.sign_in.factors import factors
 from rehab.people.web.admin_base import ScopedOptions, TrackedAdmin, asks_who_it_is, rights_for
+from rehab.people.web.row_forms import with_values
 
 
 class NewAccountForm(AdminUserCreationForm):
@@ -160,15 +161,7 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         """Return the form; a lead's new account belongs to the lead's own clinic."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
         clinic_id = user_of(request).clinic_id
-        if clinic_id is None:
-            return form
-
-        class OwnClinicForm(form):  # type: ignore[misc]
-            def __init__(self, *args: Any, **kwargs: Any) -> None:
-                super().__init__(*args, **kwargs)
-                self.instance.clinic_id = clinic_id
-
-        return OwnClinicForm
+        return form if clinic_id is None else with_values(form, clinic_id=clinic_id)
 
     def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
         """Offer the roles that this person may assign: only a host creates hosts."""

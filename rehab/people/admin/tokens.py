@@ -9,6 +9,7 @@ from django.http import HttpRequest
 
 from rehab.people.access import user_of
 from rehab.people.sign_in.tokens import ApiToken
+from rehab.people.web.row_forms import with_values
 from rehab.people.web.token_admin import TokenAdmin
 
 
@@ -36,15 +37,7 @@ class ApiTokenAdmin(TokenAdmin):
     ) -> Any:
         """Return the form; a new token speaks for whoever makes it."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
-        maker = user_of(request)
-
-        class OwnTokenForm(form):  # type: ignore[misc]
-            def __init__(self, *args: Any, **kwargs: Any) -> None:
-                super().__init__(*args, **kwargs)
-                if self.instance.pk is None:
-                    self.instance.user = maker
-
-        return OwnTokenForm
+        return with_values(form, user_id=user_of(request).pk)
 
     def may_issue(self, request: HttpRequest, holder: Any) -> bool:
         """Return whether this person may have the token: it is the own one."""

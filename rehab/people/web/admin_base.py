@@ -24,7 +24,7 @@ from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
 from rehab.people.row_values import read_key, read_values, save_changes
 from rehab.people.scope import ScopedModel, visible_rows
 from rehab.people.sign_in import step_up
-from rehab.people.web.row_forms import ClinicForm
+from rehab.people.web.row_forms import ClinicForm, with_values
 
 AS_READ = "values of a row as they were read"
 asks_who_it_is = method_decorator(step_up.required)  # of a page or action
@@ -209,7 +209,8 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
     ) -> Any:
         """Return the form; a new row's clinic is the person's own, or none for a host."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
-        return type(form)(form.__name__, (form,), {"new_clinic_id": user_of(request).clinic_id})
+        own = {"clinic_id": user_of(request).clinic_id} if hasattr(self.model, "clinic") else {}
+        return with_values(form, **own)
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return URLs and labels of further pages about a row."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from django import forms
 
@@ -19,15 +19,24 @@ class LabeledFormSet(forms.BaseInlineFormSet):
             field.widget.attrs["aria-label"] = field.label
 
 
+def with_values(form: Any, **values: Any) -> Any:
+    """Return a class of forms like this one, whose new row has these values from the beginning."""
+
+    class FormOfNewRow(form):  # type: ignore[misc]
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            super().__init__(*args, **kwargs)
+            if self.instance.pk is None:
+                for name, value in values.items():
+                    setattr(self.instance, name, value)
+
+    return FormOfNewRow
+
+
 class ClinicForm(forms.ModelForm):
     """A form of a row whose clinic is set by the server."""
 
-    new_clinic_id: ClassVar[int | None] = None
-
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        if self.instance.pk is None and getattr(self.instance, "clinic_id", 0) is None:
-            self.instance.clinic_id = self.new_clinic_id
         say_ranges(self)
 
     def _get_validation_exclusions(self) -> set[str]:

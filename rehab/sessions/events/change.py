@@ -25,7 +25,7 @@ def change_event(fold: SessionFold, kind: str, value: ChangeValue = None) -> Liv
     control = CONTROLS[kind]
     messages = {
         audience.value: PAYLOADS[audience, payload](fold, control, value)
-        for audience, payload in control.tells.items()
+        for audience, payload in control.payloads.items()
         if audience is not Audience.SOURCE  # which gets `source_message` before the acknowledgment
     }
     return event_for(fold, **messages)
@@ -43,7 +43,7 @@ def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
 def source_message(fold: SessionFold, kind: str) -> Message | None:
     """Return the message to a source about a change, as of now; None for none."""
     control = CONTROLS[kind]
-    payload = control.tells.get(Audience.SOURCE)
+    payload = control.payloads.get(Audience.SOURCE)
     return None if payload is None else PAYLOADS[Audience.SOURCE, payload](fold, control, None)
 
 
@@ -85,7 +85,7 @@ def _value(fold: SessionFold, control: Control) -> Message:
     return {control.event_field: control.value_in_force(fold)}
 
 
-# The message of a change for each audience (`Control.tells`).
+# The message of a change for each audience (`Control.payloads`).
 PAYLOADS: dict[tuple[Audience, Payload], Callable[[SessionFold, Control, ChangeValue], Message]] = {
     (Audience.PATIENT, Payload.STATE): lambda fold, _control, _value: _state(fold),
     (Audience.PATIENT, Payload.PHASE): lambda fold, _control, _value: _phase_for_patient(fold),

@@ -18,7 +18,7 @@ from rehab.sessions.payloads import (
 from rehab.training.controls import CONTROLS, Audience
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
-from rehab.training.schedules import ScheduleKind, Untold
+from rehab.training.schedules import FeedbackSummary, ScheduleKind
 from rehab.training.steps import InvalidReason
 
 # What a chart needs of a past step.
@@ -35,7 +35,7 @@ def history_entry(
     if audience is Audience.PATIENT:
         if not plan.phases[step.phase].feedback:
             return None
-        if not (plan.schedule.tells_all or step.number in told):
+        if not (plan.schedule.answers_all or step.number in told):
             return None
     if step.side != plan.trained_side:
         return None
@@ -60,7 +60,7 @@ def snapshot(
     the robot's latest status and decision; ``marks`` are changes and remarks.
     """
     plan, recent = fold.plan, list(recent)
-    entries = (history_entry(audience, plan, step, fold.telling.told) for step in recent)
+    entries = (history_entry(audience, plan, step, fold.delivery.reported) for step in recent)
     message: Message = {
         "type": "snapshot",
         "number": fold.last_number,
@@ -107,19 +107,19 @@ def _controls_for(audience: Audience, fold: SessionFold) -> Message:
 def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:
     """Return what the patient was last shown of a step; None before the first."""
     plan, context = fold.plan, StepContext.of(fold)
-    told = fold.telling.told
+    told = fold.delivery.reported
     if plan.schedule.kind is ScheduleKind.SUMMARY:
         return None  # of a summary only its last step is stored
     switched_after = fold.valences.switches[-1][0] if fold.valences.switches else 0
     for step in reversed(recent):
         if step.number <= switched_after:
             return None  # it meant something else
-        if not (plan.schedule.tells_all or step.number in told):
+        if not (plan.schedule.answers_all or step.number in told):
             continue
         if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
             context = context._replace(phase=plan.phases[step.phase])
             return patient_step(
-                plan, context, step, score, streak, live=False, answer=Untold(steps=1)
+                plan, context, step, score, streak, live=False, answer=FeedbackSummary(steps=1)
             )
     return None

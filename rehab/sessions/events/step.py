@@ -20,7 +20,7 @@ from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
-from rehab.training.schedules import ScheduleKind, Untold
+from rehab.training.schedules import FeedbackSummary, ScheduleKind
 from rehab.training.steps import ScoredStep
 from rehab.training.valences import Emblem, Valence
 
@@ -67,7 +67,7 @@ def step_event(
 def _for_patient(
     fold: SessionFold, context: StepContext, step: ScoredStep, live: bool
 ) -> Message | None:
-    score, streak, answer = fold.score, fold.feedback.streak, fold.telling.answer
+    score, streak, answer = fold.score, fold.feedback.streak, fold.delivery.answer
     shown = patient_step(fold.plan, context, step, score, streak, live=live, answer=answer)
     return None if shown is None else shown | describe_walked(fold)
 
@@ -107,7 +107,7 @@ def patient_step(
     streak: int,
     *,
     live: bool,
-    answer: Untold | None,
+    answer: FeedbackSummary | None,
 ) -> Message | None:
     """Return the patient's message about a step; ``answer`` is None where no feedback is due."""
     if step.side != plan.trained_side:
@@ -115,7 +115,7 @@ def patient_step(
     if not context.phase.feedback:
         return {"kind": "calm", "number": step.number}
     if step.performance is None or step.hit is None:
-        kind = "missing" if plan.schedule.tells_all else "calm"
+        kind = "missing" if plan.schedule.answers_all else "calm"
         return {"kind": kind, "number": step.number, "live": live}
     if answer is None:
         return {"kind": "calm", "number": step.number}
@@ -146,7 +146,7 @@ def patient_step(
 def _summary(
     context: StepContext,
     step: StoredStep,
-    answer: Untold,
+    answer: FeedbackSummary,
     score: int | None,
     streak: int,
     *,

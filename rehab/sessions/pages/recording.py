@@ -39,7 +39,10 @@ def add_recording_part(request: HttpRequest) -> HttpResponse:
     """Take a part of a file; ``at`` is where it belongs, ``ending`` what kind of file it is."""
     at = request.GET.get("at", "")
     try:
-        file = uploaded_file(user_of(request).pk, request.GET.get("ending", "").lower())
+        place = request.GET.get("file", "0")
+        if not place.isdecimal() or len(place) > 1:
+            raise UploadRefused
+        file = uploaded_file(user_of(request).pk, request.GET.get("ending", "").lower(), int(place))
         if not at.isdecimal() or len(at) > len(str(BYTES_MAX)):
             raise UploadRefused
         add_part(file, request.body, int(at))
@@ -63,9 +66,9 @@ def check_recording(request: HttpRequest) -> HttpResponse:
         "is_hosted": settings.HOSTED,
     }
     if request.method == "POST":
-        file = _find_upload(request)
+        files = _find_upload(request)
         mass_kg = _read_mass(context["mass"])
-        if file is None:
+        if not files:
             context["problems"] = [_refusal()]
         elif context["mass"].strip() and mass_kg is None:
             context["problems"] = [
@@ -73,15 +76,16 @@ def check_recording(request: HttpRequest) -> HttpResponse:
                 % {"least": MASS_MIN_KG, "most": MASS_MAX_KG}
             ]
         else:
-            context |= {"ending": file.suffix} | _answer(request, file, mass_kg)
+            context |= {"ending": ",".join(file.suffix for file in files)}
+            context |= _answer(request, files, mass_kg)
     return render(request, "sessions/recording.html", context)
 
 
-def _answer(request: HttpRequest, file: Path, mass_kg: float | None) -> dict[str, Any]:
+def _answer(request: HttpRequest, files: list[Path], mass_kg: float | None) -> dict[str, Any]:
     """Return what the page shows of a check, or of a recording that was confirmed."""
     asked = request.POST
     if "confirm" not in asked:
-        checked = check_upload(file, mass_kg)
+        checked = check_upload(files, mass_kg)
         return _describe(checked, _proposed(checked))
     chosen = {
         f"{side}.{channel}": {
@@ -96,16 +100,17 @@ def _answer(request: HttpRequest, file: Path, mass_kg: float | None) -> dict[str
         columns = write_columns(chosen, time)
     except ValueError as problem:
         problems = [_("%(text)s is no number.") % {"text": problem}]
-        return _describe(check_upload(file, mass_kg), chosen) | {"problems": problems}
+        return _describe(check_upload(files, mass_kg), chosen) | {"problems": problems}
     name = name_recording(asked.get("name", ""))
     if not settings.HOSTED and not name:
         problems = [_("Give the recording a name.")]
-        return _describe(check_upload(file, mass_kg), chosen) | {"problems": problems}
+        return _describe(check_upload(files, mass_kg), chosen) | {"problems": problems}
     save = None if settings.HOSTED else recordings_folder() / name
-    checked = check_upload(file, mass_kg, columns, save)
+    checked = check_upload(files, mass_kg, columns, save)
     shown = _describe(checked, chosen)
     if not shown["problems"]:
-        file.unlink(missing_ok=True)
+        for file in files:
+            file.unlink(missing_ok=True)
         shown |= {"stored": name, "found": None, "command": " ".join(map(_quote, columns))}
     return shown
 
@@ -152,12 +157,14 @@ def _proposed(checked: Checked) -> dict[str, dict[str, str]]:
     }
 
 
-def _find_upload(request: HttpRequest) -> Path | None:
+def _find_upload(request: HttpRequest) -> list[Path]:
+    """Return the files of an upload, by their endings; none where one did not arrive."""
+    endings = request.POST.get("ending", "").split(",")
     try:
-        file = uploaded_file(user_of(request).pk, request.POST.get("ending", ""))
+        files = [uploaded_file(user_of(request).pk, one, n) for n, one in enumerate(endings)]
     except UploadRefused:
-        return None
-    return file if file.exists() else None
+        return []
+    return files if all(file.exists() for file in files) else []
 
 
 def _read_mass(text: str) -> float | None:

@@ -19,8 +19,8 @@ TOLD_BEFORE_S = 12.0  # of the course in words; the replay has all of it
 REPLAY_EVERY_S = 0.1
 MAX_ENTRIES = 80
 ORDERED = slice(0, 2)  # of a tick: what was ordered
-# What comes too often to be told; the downloaded file has it.
-UNTOLD = {"heartbeat", "step", "status"}
+# What comes too often to be listed; the downloaded file has it.
+TOO_FREQUENT = {"heartbeat", "step", "status"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +108,11 @@ def _entries(records: Sequence[Record], stopped_s: float) -> Iterator[Entry]:
             felt = hazards
         elif isinstance(received := record.get("received"), dict):
             what = str(received.get("type", ""))[:32]
-            if what not in UNTOLD:
+            if what not in TOO_FREQUENT:
                 yield Entry(at_s, gettext("the server said: %(what)s") % {"what": what})
         elif isinstance(sent := record.get("sent"), dict):
-            if str(sent.get("kind")) not in UNTOLD:
-                yield _told(at_s, sent)
+            if str(sent.get("kind")) not in TOO_FREQUENT:
+                yield _describe_report(at_s, sent)
         elif "retained" in record:
             yield Entry(at_s, gettext("stopped"), str(record["retained"])[:64])
         elif "lost" in record:
@@ -120,7 +120,7 @@ def _entries(records: Sequence[Record], stopped_s: float) -> Iterator[Entry]:
             yield Entry(at_s, words % {"count": record["lost"]})
 
 
-def _told(at_s: float, said: Record) -> Entry:
+def _describe_report(at_s: float, said: Record) -> Entry:
     """Return the entry of a report to the server."""
     name = str(said.get("name") or said.get("gesture") or "")[:64]
     reason: Any = said.get("reason")

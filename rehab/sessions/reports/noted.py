@@ -30,7 +30,7 @@ class Noted:
 
     @property
     def words(self) -> str:
-        """What it was, and how badly somebody was hurt."""
+        """What it was, and how badly the patient was hurt."""
         label = str(EVENTS[self.kind])
         return label if self.severity is None else f"{label}, {self.severity.label}"
 

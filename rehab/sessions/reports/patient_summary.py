@@ -90,7 +90,7 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
 
 
 def describe_today(today: Result, last: Result | None) -> str:
-    """Return one sentence that is true of today and last time, and blames nobody."""
+    """Return one sentence that is true of today and last time, and puts no blame."""
     if last is None:
         return _("Next time you can compare with today.")
     match today.compare_goal(last), today.compare_hits(last):

@@ -1,6 +1,6 @@
-"""A session played back: what its pages were told, when, and what its robot did meanwhile.
+"""A session played back: what its pages were sent, when, and what its robot did meanwhile.
 
-The log is folded again by the rules by which the session ran, and each step and event is told by
+The log is folded again by the rules by which the session ran, and each step and event is sent by
 the same functions, so that a page that plays it shows what it showed then. What no log has is not
 made up: who was connected.
 """
@@ -43,19 +43,19 @@ log = logging.getLogger(__name__)
 AUDIENCES = (Audience.PATIENT, Audience.MONITOR)
 # Folding finds again what these record.
 KINDS = [kind for kind in map(str, EVENTS) if kind not in list(RuleEntry)]
-# The source is there from the first step on: what a log cannot tell is not shown as a fault.
+# The source is there from the first step on: what a log does not hold is not shown as a fault.
 PRESENCE: Message = {"source": True, "robot": False, "tablets": 0, "storage": ""}
 
 
 def play_back(user: User, session: TrainingSession) -> Message:
-    """Return a session as its pages were told of it.
+    """Return a session as it was sent to its pages.
 
     Returns
     -------
     dict
         ``snapshots``: of each audience, before the session began. ``moments``: lists of the time
         from the start on [s], the last step's number, and what patient's and therapist's page
-        were told (null for nothing), oldest first. ``robot``: where it went, as previews
+        were sent (null for nothing), oldest first. ``robot``: where it went, as previews
         (robot/motion/preview.py) with ``at_s`` and ``recorded``: measured, by its black box, or
         as it was ordered. ``took_s``: the time of the last moment.
     """
@@ -84,8 +84,8 @@ def play_back(user: User, session: TrainingSession) -> Message:
         for event in _events(fold, row, late):
             texts = [event.text(audience) for audience in AUDIENCES]
             if any(texts):
-                told = [text and json.loads(text) for text in texts]
-                moments.append([at_s, event.number, *told])
+                messages = [text and json.loads(text) for text in texts]
+                moments.append([at_s, event.number, *messages])
     return {
         "snapshots": snapshots,
         "moments": moments,
@@ -120,7 +120,7 @@ def _events(fold: SessionFold, row: Row, late: Collection[int]) -> list[LiveEven
     ``late``: numbers of the steps that were not shown as live.
     """
     if isinstance(row, SessionEvent) and row.kind not in CONTROLS:
-        return [_told(fold, row)]
+        return [_event_of(fold, row)]
     before = Before.of(fold)
     try:
         if isinstance(row, Measurement):
@@ -133,7 +133,7 @@ def _events(fold: SessionFold, row: Row, late: Collection[int]) -> list[LiveEven
         return []  # as in `fold_log`, which says so
 
 
-def _told(fold: SessionFold, row: SessionEvent) -> LiveEvent:
+def _event_of(fold: SessionFold, row: SessionEvent) -> LiveEvent:
     match row.kind:
         case RobotEntry.STOP | RobotEntry.ARM:
             return robot_stopped_event(fold, row.kind == RobotEntry.STOP)

@@ -73,7 +73,7 @@ def find_comparable(
 def load_results(*sessions: TrainingSession) -> list[Result]:
     """Return the results of a patient's sessions, oldest first; none of one without figures.
 
-    A paired tablet sees no earlier session, and yet tells the patient of them: the caller has
+    A paired tablet sees no earlier session, and yet shows them to the patient: the caller has
     checked that these may be seen.
     """
     rows = TrainingSession.everywhere.filter(pk__in=[session.pk for session in sessions])

@@ -13,10 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.sessions.control_text import describe_change
-from rehab.sessions.formatting import (
-    clinic_time,
-    format_number,
-)
+from rehab.sessions.formatting import clinic_time, format_number
 from rehab.sessions.log import FallSeverity, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
@@ -184,5 +181,5 @@ def _valences_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:
 
 
 def _round(value: float | None) -> float | None:
-    """Return a value rounded to four places, which keeps the page short."""
+    """Return a value rounded to four places, so that the page stays small."""
     return None if value is None else round(value, 4)

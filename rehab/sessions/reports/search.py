@@ -110,11 +110,7 @@ class SessionSearchFilter(ListFilter):
     template = "admin/search_filter.html"
 
     def __init__(
-        self,
-        request: HttpRequest,
-        params: dict[str, list[str]],
-        model: type[Any],
-        model_admin: Any,
+        self, request: HttpRequest, params: dict[str, list[str]], model: type[Any], model_admin: Any
     ) -> None:
         super().__init__(request, params, model, model_admin)
         user = user_of(request)

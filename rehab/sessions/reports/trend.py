@@ -110,7 +110,7 @@ def load_trend(
 
 
 def load_own_trend(sessions: QuerySet[TrainingSession]) -> list[TrendPoint]:
-    """Return the trend of one patient's sessions, for a page that tells this patient of them.
+    """Return the trend of one patient's sessions, for a page that shows them to this patient.
 
     A tablet sees no earlier session, and shows its figures all the same. The caller has checked
     that the session at hand may be seen, and that no other patient's is among them.
@@ -181,18 +181,15 @@ def summarize_trend(
     """Return the figures above the charts."""
     last = next((point for point in reversed(trend) if point.hit_rate is not None), None)
     counted = [group for group in groups if group["simulated"] == simulated]
-    change = last.change if last else None
-    means = ""
+    wanted, means = last and last.target_hit_rate, ""
     if last and last.with_feedback and last.baseline:
         unit = last.session.measure.unit
         after = format_quantity(last.with_feedback.mean, unit)
         means = f"{format_number(last.baseline.mean)} → {after}"
     return {
         "hit_rate": format_rate(last.hit_rate if last else None),
-        "target_hit_rate": format_rate(last.target_hit_rate)
-        if last and last.target_hit_rate
-        else "",
-        "change": format_change(change),
+        "target_hit_rate": format_rate(wanted) if wanted else "",
+        "change": format_change(last.change if last else None),
         "means": means,
         "measure": gettext(last.session.measure.name) if last else "",
         "duration": format_duration(sum(group["active_s"] for group in counted)),
@@ -221,28 +218,24 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
         return f"{label} · {gettext('imported')}" if is_imported else label
 
     comparable = [point for point in trend if point.session.measure == measure]
+    trained = [point.with_feedback for point in comparable]
     return {
         "hits": {
             "days": [day(point) for point in trend],
-            "hit": [
-                None if point.hit_rate is None else round(100 * point.hit_rate, 1)
-                for point in trend
-            ],
-            "wanted": [
-                point.target_hit_rate and round(100 * point.target_hit_rate, 1) for point in trend
-            ],
+            "hit": [to_percent(point.hit_rate) for point in trend],
+            "wanted": [to_percent(point.target_hit_rate) for point in trend],
         },
         "values": {
             "days": [day(point) for point in comparable],
-            "mean": [
-                point.with_feedback and round(point.with_feedback.mean, 3) for point in comparable
-            ],
-            "deviation": [
-                point.with_feedback and round(point.with_feedback.deviation, 3)
-                for point in comparable
-            ],
+            "mean": [spread and round(spread.mean, 3) for spread in trained],
+            "deviation": [spread and round(spread.deviation, 3) for spread in trained],
             "baseline": [point.baseline and round(point.baseline.mean, 3) for point in comparable],
             "goal": [point.session.goal and round(point.session.goal, 3) for point in comparable],
             "unit": measure.unit if measure else "",
         },
     }
+
+
+def to_percent(rate: float | None) -> float | None:
+    """Return a rate in percent, as charts draw it."""
+    return None if rate is None else round(100 * rate, 1)

@@ -30,7 +30,8 @@ WAIT_S = 90.0
 RETAINED_S = 86_400.0  # an upload that was not stored as a recording
 _one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
 # What `rehab.gait.recordings.tables` reads; it is not imported, as servers do without numpy.
-ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".txt")
+ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".trc", ".tsv", ".txt")
+FILES_MAX = 4  # of one walk: forces, moments, angles, markers
 SIDES, CHANNELS = ("left", "right"), ("force", "moment", "angle")
 MASS_MIN_KG, MASS_MAX_KG = 10, 300
 
@@ -61,16 +62,17 @@ def recordings_folder() -> Path:
     return folder
 
 
-def uploaded_file(person: int, ending: str) -> Path:
-    """Return where a person's upload is stored; the next one replaces it.
+def uploaded_file(person: int, ending: str, place: int = 0) -> Path:
+    """Return where a file of a person's upload is stored; another upload replaces them all.
 
-    Raises UploadRefused for a kind of file that cannot be read.
+    ``place`` counts the files of one walk. Raises UploadRefused for a kind of file that cannot be
+    read.
     """
-    if ending not in ENDINGS:
+    if ending not in ENDINGS or not 0 <= place < FILES_MAX:
         raise UploadRefused
     folder: Path = settings.DATA_DIR / "uploads"
     folder.mkdir(mode=0o700, exist_ok=True)
-    return folder / f"{person}{ending}"
+    return folder / f"{person}-{place}{ending}"
 
 
 def discard_old_uploads(now: datetime) -> None:
@@ -92,35 +94,41 @@ def add_part(file: Path, part: bytes, at: int) -> None:
         raise UploadRefused
     if at and file.stat().st_size != at:
         raise UploadRefused
+    person, _, place = file.stem.partition("-")
     if not at:
-        for ending in ENDINGS:
-            file.with_suffix(ending).unlink(missing_ok=True)
+        for other in file.parent.glob(f"{person}-*"):
+            if int(other.stem.partition("-")[2]) >= int(place):
+                other.unlink(missing_ok=True)
     with file.open("ab") as opened:
         opened.write(part)
 
 
 def check_upload(
-    file: Path, mass_kg: float | None, columns: list[str] | None = None, save: Path | None = None
+    files: list[Path],
+    mass_kg: float | None,
+    columns: list[str] | None = None,
+    save: Path | None = None,
 ) -> Checked:
-    """Return what the columns of an upload are, compared with those given; store it if asked.
+    """Return what the columns of an upload's files are, compared with those given.
 
-    It is stored in SI units, and only where nothing is wrong. A server checks one file at a time;
-    who waits for that takes no connection to the database from other pages.
+    If asked for, it is stored in SI units, and only where nothing is wrong. A server checks one
+    upload at a time; who waits for that takes no connection to the database from other pages.
     """
     close_old_connections()
     if not _one_at_a_time.acquire(timeout=WAIT_S):
         return Checked(None, [gettext("Other files are being checked. Try again in a minute.")])
     try:
-        return _check(file, mass_kg, columns, save)
+        return _check(files, mass_kg, columns, save)
     finally:
         _one_at_a_time.release()
 
 
 def _check(
-    file: Path, mass_kg: float | None, columns: list[str] | None, save: Path | None
+    files: list[Path], mass_kg: float | None, columns: list[str] | None, save: Path | None
 ) -> Checked:
     arguments = ["nice"] if shutil.which("nice") else []  # a training goes first
-    arguments += [sys.executable, "-m", "rehab.gait", "check", str(file), "--json", "--bounded"]
+    arguments += [sys.executable, "-m", "rehab.gait", "check", *map(str, files)]
+    arguments += ["--json", "--bounded"]
     arguments += ["--mass", f"{mass_kg:g}"] if mass_kg else []
     arguments += ["--save", str(save)] if save else []
     arguments += ["--columns", *columns] if columns else []

@@ -97,7 +97,7 @@ class SessionFollower:
             case "stop":
                 self.leave()
             case "goal":
-                self.goal = _read_goal(message)
+                self.goal = self._feed.goal = _read_goal(message)
             case "phase":
                 self._feed.phase = self._read_phase(message)
             case "error":
@@ -120,7 +120,7 @@ class SessionFollower:
         is_new = session != self._queue.session
         side, next_number = _read_side(message), _read(message, "next", int)
         self.lost += self._queue.join(_read(message, "session", int), next_number, side)
-        self.goal = _read_goal(message)
+        self.goal = self._feed.goal = _read_goal(message)
         self.unit = str(message.get("unit", ""))
         self._feed.phase = self._read_phase(message)
         if is_new:
@@ -163,6 +163,7 @@ class SessionFollower:
         phase = message.get("phase")
         if not isinstance(phase, dict):
             return make_phase("training")
+        self._feed.valence = str(phase.get("valence", self._feed.valence))
         try:
             return make_phase(
                 phase["kind"],
@@ -171,7 +172,7 @@ class SessionFollower:
                 gain=float(phase.get("gain", 1.0)),
             )
         except (InvalidSetting, KeyError, TypeError, ValueError) as problem:
-            self._notify(f"The server phase a phase that is not known here ({problem}).")
+            self._notify(f"The server announced a phase that is not known here ({problem}).")
             return self._feed.phase
 
 

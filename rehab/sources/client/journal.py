@@ -1,7 +1,8 @@
 """A file with what the server has not stored yet, over ends of this program and power cuts.
 
 A line is the CRC-32 of a JSON object and the object: what a power cut tore or left blank at the
-end is told from what was written. The file is written anew, beside itself, when it has grown.
+end is distinguished from what was written. When the file has grown it is written anew, beside
+itself.
 """
 
 from __future__ import annotations
@@ -13,7 +14,13 @@ from importlib import import_module
 from pathlib import Path
 from threading import Lock
 
-from rehab.sources.client.kept import Kept, Message, fitting, read_line, write_line
+from rehab.sources.client.journal_state import (
+    JournalState,
+    Message,
+    read_line,
+    select_fitting,
+    write_line,
+)
 from rehab.sources.reporting import Notify, SourceError
 
 REWRITE_BYTES = 1024 * 1024  # of lines that are not needed any more
@@ -66,8 +73,8 @@ class Journal:
         self._guard = -1
         try:
             self._guard = _take(path)
-            self.kept = self._read()
-            self._replace(self.kept)
+            self.saved = self._read()
+            self._replace(self.saved)
         except (OSError, SourceError) as problem:
             if self._guard >= 0:
                 os.close(self._guard)
@@ -77,24 +84,24 @@ class Journal:
                 f"The journal {path} cannot be used: {problem.strerror}. Name a file that this "
                 "account may write."
             ) from None
-        if self.kept.steps:
+        if self.saved.steps:
             notify(
-                f"{len(self.kept.steps)} strides of session {self.kept.session} are in {path} and "
-                "not stored yet: they are sent as late ones."
+                f"{len(self.saved.steps)} strides of session {self.saved.session} are in {path} "
+                "and not stored yet: they are sent as late ones."
             )
 
-    def _read(self) -> Kept:
+    def _read(self) -> JournalState:
         """Return what the file says, up to where it is damaged. Raises SourceError."""
-        kept = Kept()
+        state = JournalState()
         try:
             data = self.path.read_bytes()
         except FileNotFoundError:
-            return kept
+            return state
         lines = data.splitlines(keepends=True)
         first = read_line(lines[0]) if lines else None
         if first is None or "journal" not in first:
             if not data.strip(b"\0"):
-                return kept  # made just before the power went
+                return state  # made just before the power went
             raise SourceError(
                 f"{self.path} is no journal of a source. Name another file, which may be a new one."
             )
@@ -109,7 +116,7 @@ class Journal:
             if entry is None:
                 break
             try:
-                kept = kept.after(entry)
+                state = state.after(entry)
             except (KeyError, TypeError, ValueError):
                 break
             read += len(line)
@@ -119,9 +126,9 @@ class Journal:
                 f"{self.path} is damaged from byte {read} on: what stood there is not sent. The "
                 f"whole file is kept as {aside}; the disk may be failing."
             )
-        if kept.session is not None and kept.unsent_from is None:
-            kept.unsent_from = kept.last + 1
-        return kept
+        if state.session is not None and state.unsent_from is None:
+            state.unsent_from = state.last + 1
+        return state
 
     def put_aside(self) -> None:
         """Keep a copy of what is there, for a person: it is not sent."""
@@ -142,30 +149,30 @@ class Journal:
 
     # --- Noting ---
 
-    def note(self, entry: Message, keep: Callable[[], Kept]) -> None:
+    def note(self, entry: Message, read_state: Callable[[], JournalState]) -> None:
         """Add a line: a step, an acknowledgment, a new state.
 
-        ``keep`` returns all that is to be kept after it, for a file that is written anew.
+        ``read_state`` returns all that is to be saved after it, for a file that is written anew.
         """
         line = write_line(entry)
         if self.trouble:
             if self._monotonic() >= self._retry_s:
-                self.renew(keep())
+                self.renew(read_state())
             return
         if self._size + len(line) > self._max_bytes or (
             "ack" in entry and self._size > REWRITE_BYTES + 2 * self._needed
         ):
-            self.renew(keep())
+            self.renew(read_state())
             return
         try:
             self._write(line)
         except OSError as problem:
             self._suffer(f"cannot be written ({problem.strerror})")
 
-    def renew(self, kept: Kept) -> None:
-        """Write the file anew with what is to be kept, as far as there is room."""
+    def renew(self, state: JournalState) -> None:
+        """Write the file anew with what is to be saved, as far as there is room."""
         try:
-            whole = self._replace(kept)
+            whole = self._replace(state)
         except OSError as problem:
             self._suffer(f"cannot be written ({problem.strerror})")
             return
@@ -216,10 +223,10 @@ class Journal:
             self._size += written
         self._is_dirty = True
 
-    def _replace(self, kept: Kept) -> bool:
+    def _replace(self, state: JournalState) -> bool:
         """Write the file anew, at once and to the disk; return whether all had room."""
-        head = (write_line({"journal": self._server}), write_line(kept.header()))
-        lines, whole = fitting(head, kept.steps, self._max_bytes)
+        head = (write_line({"journal": self._server}), write_line(state.header()))
+        lines, whole = select_fitting(head, state.steps, self._max_bytes)
         new = self.path.with_name(f"{self.path.name}.new")
         flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)
         file = os.open(new, flags, 0o600)

@@ -24,8 +24,8 @@ class LiveFeed:
 
     Attributes
     ----------
-    phase
-        The session's phase, as far as is known.
+    phase, goal, valence
+        The session's phase, goal and feedback type, as far as they are known.
     trained_side
         The leg that the session trains, None before there was a session.
     excluded
@@ -41,6 +41,8 @@ class LiveFeed:
 
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.phase = make_phase("training")
+        self.goal: float | None = None
+        self.valence = "positive"
         self.trained_side: Side | None = None
         self.excluded = self.refused = 0
         self.on_change: Callable[[], None] = lambda: None

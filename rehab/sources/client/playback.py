@@ -5,20 +5,74 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
-from rehab.sources.client.clock import PlaybackClock
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_STEPS
 
-# Returns the next stride, walked in that phase; None at the end.
-NextStride = Callable[[Phase], Measurement | None]
+
+class Display(NamedTuple):
+    """What a stride is walked with: phase, goal (None until it is known) and feedback type."""
+
+    phase: Phase
+    goal: float | None
+    valence: str
+
+
+# Returns the next stride, walked with that; None at the end.
+NextStride = Callable[[Display], Measurement | None]
 
 # No stride is shorter (docs/reference/gait.md#plausible-strides): there is time for the server to
 # announce a new phase.
 STRIDE_MIN_S = 0.5
-# Without a connection somebody may walk for hours (a whole day takes 80,000 strides).
+# Without a connection a person may walk for hours (a whole day takes 80,000 strides).
 KEPT_MAX = 80_000
+
+
+class PlaybackClock:
+    """Source time [s] that runs ``speed`` times as fast as ours and can be paused.
+
+    With ``speed`` None strides come as fast as they are sent: nothing is waited for, and the clock
+    shows what it was last set to.
+    """
+
+    def __init__(self, speed: float | None, monotonic: Callable[[], float]) -> None:
+        self.speed = speed
+        self._monotonic = monotonic
+        self._time_s = 0.0  # what it showed when it was last set, started or stopped
+        self._since_s: float | None = None  # our clock then; None while it is paused
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it runs."""
+        return self._since_s is not None
+
+    @property
+    def now_s(self) -> float:
+        """What it shows [s]."""
+        if self._since_s is None or self.speed is None:
+            return self._time_s
+        return self._time_s + (self._monotonic() - self._since_s) * self.speed
+
+    def set(self, time_s: float) -> None:
+        """Set the time it shows, whether it runs or not."""
+        self._time_s = time_s
+        if self._since_s is not None:
+            self._since_s = self._monotonic()
+
+    def start(self) -> None:
+        """Start it, or go on."""
+        if self._since_s is None:
+            self._since_s = self._monotonic()
+
+    def pause(self) -> None:
+        """Pause it at what it shows."""
+        self._time_s, self._since_s = self.now_s, None
+
+    def wait_s(self, time_s: float) -> float:
+        """Return how long a running clock takes to show that time, in our seconds."""
+        return 0.0 if self.speed is None else max(0.0, (time_s - self.now_s) / self.speed)
 
 
 class StridePlayback:
@@ -39,8 +93,8 @@ class StridePlayback:
 
     Attributes
     ----------
-    phase
-        The phase in which the next stride is walked.
+    phase, goal, valence
+        What the next stride is walked with: ``Display``.
     """
 
     clock_pauses = True  # with the session
@@ -56,6 +110,8 @@ class StridePlayback:
     ) -> None:
         self._resumes = resumes
         self.phase = make_phase("training")
+        self.goal: float | None = None
+        self.valence = "positive"
         self._open_walk = open_walk
         self._clock = PlaybackClock(speed, monotonic)
         self._max_unacknowledged = max_unacknowledged
@@ -63,6 +119,10 @@ class StridePlayback:
         self._stride: Measurement | None = None  # begun, not yet due
         self._last_s: float | None = None  # when the last one was, on the source's clock
         self._may_walk = False
+
+    @property
+    def _display(self) -> Display:
+        return Display(self.phase, self.goal, self.valence)
 
     @property
     def speed(self) -> float | None:
@@ -84,7 +144,7 @@ class StridePlayback:
         self.pause()
         self._walk = self._open_walk(trained_side)
         for _ in range(walked if self._resumes else 0):
-            self._walk(self.phase)
+            self._walk(self._display)
         self._stride = self._last_s = None
 
     def end_session(self) -> None:
@@ -129,7 +189,7 @@ class StridePlayback:
         return stride
 
     def _begin_stride(self, walk: NextStride) -> None:
-        self._stride = walk(self.phase)
+        self._stride = walk(self._display)
         if self._stride is None:
             self._walk = None
         elif self._last_s is None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from rehab.sources.client.journal import Journal
-from rehab.sources.client.kept import Kept
+from rehab.sources.client.journal_state import JournalState
 from rehab.training.steps import InvalidReason, Measurement
 from robot.wire.clocks import LATE_S
 from robot.wire.frames import NAME
@@ -95,8 +95,8 @@ class StepQueue:
     journal
         Where steps are kept over the end of this program; only in memory by default.
     marks_late
-        Whether to tell the server which steps come long after they were measured, as one knows here
-        whatever the server has learned of the source's clock.
+        Whether to mark for the server which steps come long after they were measured, as is known
+        here whatever the server has learned of the source's clock.
     monotonic
         Our clock [s].
 
@@ -121,12 +121,12 @@ class StepQueue:
         self._kept: deque[_QueuedStep] = deque()
         self._sent = 0  # how many of the kept, from the oldest on, are in flight
         self._unsent_from: int | None = None
-        if journal is not None and journal.kept.session is not None:
-            kept = journal.kept
-            self.session, self.side, self.state = kept.session, kept.side, kept.state
-            self.last, self._next = kept.last, kept.last + 1
-            self._unsent_from = kept.unsent_from
-            self._keep(kept.steps, -math.inf)
+        if journal is not None and journal.saved.session is not None:
+            saved = journal.saved
+            self.session, self.side, self.state = saved.session, saved.side, saved.state
+            self.last, self._next = saved.last, saved.last + 1
+            self._unsent_from = saved.unsent_from
+            self._keep(saved.steps, -math.inf)
 
     @property
     def unacknowledged(self) -> int:
@@ -160,7 +160,7 @@ class StepQueue:
         numbers anew where the server has more than is known here: it had stored what the journal
         lost with the power. Where after a restart it has less than it had acknowledged, all that is
         kept is put aside: a server that was set back may have given the session's number again, to
-        somebody else's. Raises StepsLost where steps are wanted that were acknowledged since.
+        another one's. Raises StepsLost where steps are wanted that were acknowledged since.
         """
         if session != self.session:
             self.leave()
@@ -208,9 +208,11 @@ class StepQueue:
         if self._journal is not None:
             self._journal.note(entry, self._all)
 
-    def _all(self) -> Kept:
+    def _all(self) -> JournalState:
         steps = [kept.step for kept in self._kept]
-        return Kept(self.session, self.side, self.state, self.last, self._unsent_from, steps)
+        return JournalState(
+            self.session, self.side, self.state, self.last, self._unsent_from, steps
+        )
 
     def _keep(self, steps: list[Message], since_s: float) -> None:
         for step in steps:

@@ -69,7 +69,7 @@ class GyroscopePipeline:
         ]
 
     def _begin(self, name: str, t_s: Floats, rate_rad_s: Floats) -> list[Sided]:
-        """Hold the first samples until they tell their rate."""
+        """Hold the first samples until their rate is known."""
         held = self._held.setdefault(name, [])
         held.append((t_s, rate_rad_s))
         times, rates = (np.concatenate(parts) for parts in zip(*held, strict=True))
@@ -87,7 +87,7 @@ class GyroscopePipeline:
         return self._name(name, detector.feed(times, rates))
 
     def _name(self, name: str, strides: list[GyroscopeStride]) -> list[Sided]:
-        """Return strides with their leg; tell once how the rate is read."""
+        """Return strides with their leg; report once how the rate is read."""
         side, sign = self._gyroscopes[name].side, self._detectors[name].sign
         if sign is not None and self._signs.get(name) != sign:
             self._signs[name] = sign

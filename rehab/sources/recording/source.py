@@ -11,12 +11,11 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from rehab.sources.client import NextStride, write_step
+from rehab.sources.client import Display, NextStride, write_step
 from rehab.sources.recording.layouts import LAYOUTS
 from rehab.sources.recording.reading import read_recording
 from rehab.sources.reporting import Notify, SourceError
 from rehab.sources.source import PlayedSource
-from rehab.training.phases import Phase
 from rehab.training.steps import Measurement, Side
 
 
@@ -66,7 +65,7 @@ class RecordingSource(PlayedSource):
             )
         strides = iter(self._strides[: self._limit])
 
-        def walk(_phase: Phase) -> Measurement | None:
+        def walk(_display: Display) -> Measurement | None:
             return next(strides, None)
 
         return walk

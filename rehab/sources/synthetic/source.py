@@ -8,12 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rehab.sources.client import NextStride
+from rehab.sources.client import Display, NextStride
 from rehab.sources.reporting import Notify
 from rehab.sources.source import PlayedSource
 from rehab.sources.synthetic.profiles import PROFILES
 from rehab.sources.synthetic.walker import SyntheticWalker
-from rehab.training.phases import Phase
 from rehab.training.steps import Measurement, Side
 
 if TYPE_CHECKING:
@@ -52,15 +51,16 @@ class SyntheticSource(PlayedSource):
     def open_walk(self, trained_side: Side) -> NextStride:
         """Return the strides of a walk, one a call."""
         strider: SyntheticWalker | SignalWalker
-        strider = SyntheticWalker(self._profile, self._seed, self._side or trained_side)
+        strider = walker = SyntheticWalker(self._profile, self._seed, self._side or trained_side)
         if self._open_signals is not None:
-            strider = self._open_signals(strider)
+            strider = self._open_signals(walker)
         left = self._limit
 
-        def walk(phase: Phase) -> Measurement | None:
+        def walk(display: Display) -> Measurement | None:
             nonlocal left
             left -= 1
-            return strider.next_stride(phase) if left >= 0 else None
+            walker.goal_w_kg, walker.valence = display.goal, display.valence
+            return strider.next_stride(display.phase) if left >= 0 else None
 
         return walk
 

@@ -38,6 +38,8 @@ class SyntheticWalker:
     ----------
     goal_w_kg
         The goal that is shown [W/kg]; None for the walker's own baseline.
+    valence
+        The feedback type.
     """
 
     def __init__(
@@ -50,7 +52,7 @@ class SyntheticWalker:
         self.profile = profile
         self.side = side
         self.goal_w_kg: float | None = None
-        self._answer = ANSWERS.get(valence, FeedbackResponse())
+        self.valence = valence
         self._random = random.Random(seed).random  # noqa: S311 (chance for walking, not for secrets)
         self._number = 0
         self._time_s = 0.0
@@ -105,6 +107,10 @@ class SyntheticWalker:
             value=None if is_missing else round(value, 4),
             reasons=(InvalidReason.FLAGGED,) if self._is_bad else (),
         )
+
+    @property
+    def _answer(self) -> FeedbackResponse:
+        return ANSWERS.get(self.valence, FeedbackResponse())
 
     def _begin_trial(self, phase: Phase, rest: float) -> None:
         self._phase = phase

@@ -50,5 +50,15 @@ def sequence_of(
 def group_at(
     groups: Sequence[Group], sizes: Sequence[int], seed: str, levels: Sequence[str], index: int
 ) -> str:
-    """Return the group of a stratum's participant, counted from 0."""
+    """Return the group of a stratum's participant.
+
+    Parameters
+    ----------
+    groups, sizes
+        What is allocated, and the sizes of blocks, each drawn equally often.
+    seed, levels
+        The study's secret, and the stratum's level of each factor.
+    index
+        Of the participant within the stratum, from 0.
+    """
     return next(islice(sequence_of(groups, sizes, seed, levels), index, None))

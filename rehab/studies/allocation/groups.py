@@ -61,7 +61,7 @@ def check_groups(groups: Sequence[Group]) -> None:
 
 
 def check_factors(factors: Sequence[Factor]) -> None:
-    """Raise InvalidSetting for factors that do not tell participants apart."""
+    """Raise InvalidSetting for factors that do not distinguish participants."""
     if len({factor.name for factor in factors}) != len(factors):
         raise InvalidSetting("Two factors have the same name. Give each its own.")
     strata = 1

@@ -1,4 +1,4 @@
-"""Lists of allocations that somebody else has drawn, such as a trial office."""
+"""Lists of allocations that others have drawn, such as a trial office."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _read_entry(row: dict[str, str], line: int, factors: Sequence[Factor]) -> Li
 
 
 def _check_complete(listed: Sequence[ListEntry], groups: Sequence[Group]) -> None:
-    """Raise InvalidSetting for gaps in the numbers and for a group that nobody would join."""
+    """Raise InvalidSetting for gaps in the numbers and for a group that stays empty."""
     expected: dict[tuple[str, ...], int] = {}
     for entry in listed:
         number = expected[entry.levels] = expected.get(entry.levels, 0) + 1
@@ -91,7 +91,10 @@ def _check_complete(listed: Sequence[ListEntry], groups: Sequence[Group]) -> Non
 
 
 def group_at(listed: Sequence[ListEntry], levels: Sequence[str], index: int) -> str:
-    """Return the group of a stratum's participant, counted from 0. Raises InvalidSetting."""
+    """Return the group of a stratum's participant; ``index`` counts them from 0.
+
+    Raises InvalidSetting where the list has no further line for these ``levels``.
+    """
     here = [entry.group for entry in listed if entry.levels == tuple(levels)]
     if index >= len(here):
         raise InvalidSetting(

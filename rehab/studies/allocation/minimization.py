@@ -31,7 +31,10 @@ def check_probability(groups: Sequence[Group], probability: float) -> None:
 def imbalance_after(
     groups: Sequence[Group], earlier: Sequence[Allocated], levels: Sequence[str], joined: Group
 ) -> Fraction:
-    """Return the sum over factors of the range of counts, were a participant to join a group."""
+    """Return the sum over factors of the range of counts, were a participant to join a group.
+
+    Counts are divided by the groups' weights; ``levels`` are the participant's.
+    """
     total = Fraction(0)
     for position, level in enumerate(levels):
         alike = [past.group for past in earlier if past.levels[position] == level]
@@ -54,6 +57,17 @@ def choose_group(
 
     Of equally good groups one is drawn; it is taken with ``probability``, else one of the others,
     each equally likely.
+
+    Parameters
+    ----------
+    groups, earlier
+        What is allocated, and all allocations so far, in their order.
+    levels
+        The participant's level of each factor.
+    probability
+        With which the best group is taken, above 1 / number of groups and below 1.
+    seed
+        The study's secret.
     """
     draws = Draws(seed, "minimization", str(len(earlier)))
     order = draws.shuffle(groups)

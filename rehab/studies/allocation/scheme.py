@@ -34,7 +34,7 @@ class Method(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Secret:
-    """What would tell the next allocation: sealed until the study ends.
+    """What would reveal the next allocation: sealed until the study ends.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Secret:
     def commitment(self) -> str:
         """The SHA-256 of the secret, which can be published: it shows later that nothing changed.
 
-        Seeds are drawn with 128 bits or more, so that nobody can try them all.
+        Seeds are drawn with 128 bits or more, too many to try them all.
         """
         return sha256(self.to_text().encode()).hexdigest()
 

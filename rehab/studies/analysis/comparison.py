@@ -21,7 +21,7 @@ from rehab.studies.analysis.walks import Floats
 CONFIDENCE = 0.95
 RESAMPLES = 1000
 SEED = 1908  # of the bootstrap: the same data give the same interval
-MIN_PARTICIPANTS = 3  # of an arm that an interval is told of
+MIN_PARTICIPANTS = 3  # of an arm for which an interval is given
 # Of an arm that is resampled: of fewer, resamples are too few different ones, and some have hardly
 # any spread to divide by.
 MIN_RESAMPLED = 6
@@ -62,7 +62,7 @@ class Difference:
     effect: Interval | None
 
 
-def mean_of(values: Sequence[float]) -> Interval:
+def mean_of(values: Sequence[float] | Floats) -> Interval:
     """Return the mean of some participants' figures with Student's interval."""
     figures = np.asarray(values, dtype=float)
     mean = float(figures.mean())
@@ -91,11 +91,9 @@ def compare(groups: Mapping[str, Mapping[str, float]], *, paired: bool) -> list[
         if here and there:
             of_group, of_reference = (np.array(list(of.values())) for of in (here, there))
             sizes = len(of_group), len(of_reference)
-            told = (group, reference, sizes, paired)
-            interval = _paired(of_group - of_reference) if paired else welch(of_group, of_reference)
-            found.append(
-                Difference(*told, interval, _effect(of_group, of_reference, paired=paired))
-            )
+            effect = _effect(of_group, of_reference, paired=paired)
+            interval = mean_of(of_group - of_reference) if paired else welch(of_group, of_reference)
+            found.append(Difference(group, reference, sizes, paired, interval, effect))
     return found
 
 
@@ -104,7 +102,13 @@ def _t(freedom: float) -> float:
 
 
 def welch(a: Floats, b: Floats) -> Interval:
-    """Return the difference of two means, whatever their variances (Welch 1947)."""
+    """Return the difference of two means, whatever their variances (Welch 1947).
+
+    Parameters
+    ----------
+    a, b
+        The figures of each group's participants, shapes (n,) and (m,), in the outcome's unit.
+    """
     difference = float(a.mean() - b.mean())
     if min(len(a), len(b)) < MIN_PARTICIPANTS:
         return Interval(difference)
@@ -117,12 +121,11 @@ def welch(a: Floats, b: Floats) -> Interval:
     return Interval(difference, difference - half, difference + half)
 
 
-def _paired(differences: Floats) -> Interval:
-    return mean_of(list(differences))
-
-
 def _effect(a: Floats, b: Floats, *, paired: bool) -> Interval | None:
-    """Return Hedges' g with the interval of a bootstrap over participants (BCa: Efron 1987)."""
+    """Return Hedges' g with the interval of a bootstrap over participants (BCa: Efron 1987).
+
+    None where no spread can be estimated; ``a`` and ``b`` as in `welch`.
+    """
     if min(len(a), len(b)) < MIN_PARTICIPANTS or not a.var() + b.var() > 0:
         return None
     from scipy import stats  # takes half a second, which each start of a server would

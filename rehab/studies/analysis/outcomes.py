@@ -1,7 +1,7 @@
 """Outcomes of one session, of two that follow each other, and of each phase.
 
 The list is that of the literature on feedback of push-off (docs/reference/gait.md#outcomes), as far
-as strides tell it; what further channels are sent (forces, moments, step lengths) is compared with
+as strides show it; what further channels are sent (forces, moments, step lengths) is compared with
 the baseline under the channel's name.
 """
 
@@ -20,7 +20,7 @@ from robot.marking import gettext_noop
 # A mean of so many strides has a standard error of 1-2 % (docs/reference/gait.md#phases).
 ENDS = 50
 FIRST_AFTER = 20  # strides in which an after-effect is at its largest
-# Somebody succeeds from where so many strides in a row have this share of hits.
+# A participant succeeds from where so many strides in a row have this share of hits.
 WINDOW, SUCCESS = 20, 0.8
 
 
@@ -44,7 +44,15 @@ class Outcome:
 
 
 def change(walk: Walk, values: Floats) -> float | None:
-    """Return how much better a mean is than the baseline, in percent of the latter."""
+    """Return how much better a mean is than the baseline, in percent of the latter.
+
+    Parameters
+    ----------
+    walk
+        Whose baseline and direction count.
+    values
+        Shape (n,), in the measure's unit. None is returned without values or without a baseline.
+    """
     if walk.baseline is None or not len(values):
         return None
     percent = 100 * (float(values.mean()) / walk.baseline - 1)
@@ -133,7 +141,7 @@ def _invalid(walk: Walk, _before: Walk | None) -> float | None:
     return float(100 * (~walk.valid).mean()) if len(walk.valid) else None
 
 
-def _kept(walk: Walk, before: Walk | None) -> float | None:
+def _retained(walk: Walk, before: Walk | None) -> float | None:
     """Return how much of what the last session ended with this one begins with, in percent."""
     last = None if before is None else _late(before)
     first = _early(walk)
@@ -148,7 +156,7 @@ def _savings(walk: Walk, before: Walk | None) -> float | None:
     return None if last is None or now is None else last - now
 
 
-# What the strides themselves tell; with what every session stores of itself, all of `OUTCOMES`.
+# What the strides themselves show; with what every session stores of itself, all of `OUTCOMES`.
 OF_STRIDES: dict[str, Outcome] = {
     outcome.slug: outcome
     for outcome in (
@@ -167,7 +175,7 @@ OF_STRIDES: dict[str, Outcome] = {
         Outcome("variation", gettext_noop("Variation (CV)"), "%", _cv),
         Outcome("steadiness", gettext_noop("Variation about the trend"), "%", _steadiness),
         Outcome("lag_1", gettext_noop("Memory from stride to stride (lag 1)"), "", _lag_1),
-        Outcome("kept_between_visits", gettext_noop("Kept since the last visit"), "%", _kept),
+        Outcome("kept_between_visits", gettext_noop("Kept since the last visit"), "%", _retained),
         Outcome("savings", gettext_noop("Strides saved since the last visit"), "steps", _savings),
         Outcome("invalid_strides", gettext_noop("Invalid strides"), "%", _invalid),
     )
@@ -187,7 +195,15 @@ OUTCOMES: dict[str, tuple[str, str]] = {
 def compute_outcomes(
     walk: Walk, before: Walk | None, metrics: dict[str, float]
 ) -> dict[str, float]:
-    """Return every outcome that a session has, by slug. ``metrics``: what it stores of itself."""
+    """Return every outcome that a session has, by slug.
+
+    Parameters
+    ----------
+    walk, before
+        The session, and the participant's session before it.
+    metrics
+        The figures that the session stores, by slug, in the units of `METRICS`.
+    """
     figures = {slug: value for slug, value in metrics.items() if slug in OUTCOMES}
     for slug, outcome in OF_STRIDES.items():
         value = outcome.compute(walk, before)

@@ -82,7 +82,17 @@ def make_participant(
     has_left: bool = False,
     is_analyzed: bool = True,
 ) -> Participant:
-    """Return a participant from the planned visits and what was walked of them."""
+    """Return a participant from the planned visits and what was walked of them.
+
+    Parameters
+    ----------
+    code
+        By which results name the participant.
+    planned
+        The visits in their order, each with its session; None where none counts.
+    has_left, is_analyzed
+        Whether the participant withdrew; whether the sessions count in the results.
+    """
     visits: list[ParticipantVisit] = []
     walks: dict[str, list[Walk | None]] = {}
     before: Walk | None = None
@@ -135,7 +145,17 @@ class OutcomeResult:
 def find(
     participants: Sequence[Participant], arms: Sequence[str], slug: str, *, crossover: bool
 ) -> OutcomeResult:
-    """Return what was found of an outcome."""
+    """Return what was found of an outcome.
+
+    Parameters
+    ----------
+    participants, arms
+        Everybody who was allocated; the codes of the arms, in the order of the differences.
+    slug
+        Of the outcome, or `CHANNEL` and a channel's name.
+    crossover
+        Whether everybody walks every arm, so that differences are paired.
+    """
     groups = by_arm(participants, arms, slug)
     figures = []
     for arm in arms:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,6 @@ from rehab.training.phases import Phase
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-# What is read of each stride of the trained leg, in this order.
-COLUMNS = ("phase", "time_s", "value", "gain", "goal", "performance", "hit", "valid", "extra")
 
 
 @dataclass(frozen=True)
@@ -38,6 +36,8 @@ class Walk:
     extra
         Further measured channels by name, shape (n,), NaN where there is none.
     """
+
+    OF_SESSION: ClassVar = ("phases", "higher_is_better")  # the other fields are columns
 
     phases: tuple[Phase, ...]
     higher_is_better: bool
@@ -76,27 +76,38 @@ class Walk:
         return self.value[where & self.valid]
 
 
+# What is read of each stride of the trained leg, in this order.
+COLUMNS = tuple(column.name for column in fields(Walk) if column.name not in Walk.OF_SESSION)
+
+
 def read_walk(
     phases: Sequence[Phase], rows: Iterable[Sequence[Any]], *, higher_is_better: bool
 ) -> Walk:
-    """Return the walk of rows that have ``COLUMNS``, all of the trained leg."""
-    columns = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
-    phase, time_s, value, gain, goal, performance, hit, valid, extra = columns
+    """Return the walk of rows that have ``COLUMNS``, all of the trained leg.
+
+    Parameters
+    ----------
+    phases
+        The plan's.
+    rows
+        One for each stride, in their order; None where there is no value, goal or performance.
+    higher_is_better
+        Of what is measured.
+    """
+    found = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
+    columns: dict[str, Any] = dict(zip(COLUMNS, found, strict=True))
+    extra = columns.pop("extra")
     names = sorted({name for channels in extra for name in channels})
+    columns["hit"] = [one is True for one in columns["hit"]]
+    types = {"phase": np.int64, "hit": bool, "valid": bool}
     return Walk(
         phases=tuple(phases),
         higher_is_better=higher_is_better,
-        phase=np.array(phase, dtype=np.int64),
-        time_s=_floats(time_s),
-        value=_floats(value),
-        gain=_floats(gain),
-        goal=_floats(goal),
-        performance=_floats(performance),
-        hit=np.array([one is True for one in hit], dtype=bool),
-        valid=np.array(valid, dtype=bool),
         extra={name: _floats([channels.get(name) for channels in extra]) for name in names},
+        # None becomes NaN
+        **{name: np.array(one, types.get(name, np.float64)) for name, one in columns.items()},
     )
 
 
 def _floats(column: Sequence[float | None]) -> Floats:
-    return np.array(column, dtype=np.float64)  # None becomes NaN
+    return np.array(column, dtype=np.float64)

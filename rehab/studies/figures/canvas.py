@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 FONT = "'Atkinson Hyperlegible Next', 'Atkinson Hyperlegible', Roboto, Arial, sans-serif"
@@ -11,6 +11,7 @@ INK, MUTED, GRID, QUIET = "#1c1c1a", "#595955", "#dededa", "#f1f1ed"
 # and a dash of its own.
 COLORS = ("#0068a3", "#b84c00", "#00705a", "#98437e", "#4d4d4d", "#7a6000", "#16324f", "#8c1d1d")
 DASHES = ("", "9 4", "2.5 3.5", "12 4 2.5 4", "5 2.5", "1.5 2.5", "16 5", "7 3 2 3 2 3")
+LEFT, RIGHT = 62.0, 16.0  # margins beside a chart
 LETTER = 0.5  # mean width of a letter by the type's size
 
 
@@ -40,6 +41,20 @@ class Canvas:
         self.add(
             "path", d=f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}", stroke=color, stroke_width=width
         )
+
+    def rect(
+        self, x: float, y: float, width: float, height: float, **attributes: float | str
+    ) -> None:
+        """Draw a rectangle from its upper left corner."""
+        place = {"x": x, "y": y, "width": width, "height": height}
+        self.add("rect", **{name: round(value, 1) for name, value in place.items()}, **attributes)
+
+    def grid(self, levels: Sequence[float], y: Callable[[float], float], strong: float) -> None:
+        """Draw a line at each level from the left margin on, one of them strong, with numbers."""
+        for level in levels:
+            color, width = (MUTED, 1.5) if level == strong else (GRID, 1.0)
+            self.line(LEFT, y(level), self.width - RIGHT, y(level), color, width)
+            self.words(LEFT - 8, y(level) + 5, number(level), size=14, anchor="end", color=MUTED)
 
     def words(
         self,

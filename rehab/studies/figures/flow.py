@@ -57,17 +57,8 @@ def draw_flow(first: Box, columns: Sequence[Sequence[Box]], title: str) -> str:
 def _draw(
     canvas: Canvas, box: Box, center: float, top: float, width: float, color: str, height: float
 ) -> None:
-    canvas.add(
-        "rect",
-        x=round(center - width / 2, 1),
-        y=round(top, 1),
-        width=round(width, 1),
-        height=round(height, 1),
-        rx=8,
-        fill="#fff",
-        stroke=color,
-        stroke_width=1.8,
-    )
+    paint = {"fill": "#fff", "stroke": color}
+    canvas.rect(center - width / 2, top, width, height, rx=8, **paint, stroke_width=1.8)
     foot = top + PAD + 14
     room = width - 16
     canvas.words(center, foot, shorten(box.heading, room), size=15, anchor="middle", weight="700")

@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.comparison import Difference
-from rehab.studies.figures.canvas import (
-    GRID,
-    INK,
-    MUTED,
-    QUIET,
-    Canvas,
-    number,
-    shorten,
-)
+from rehab.studies.figures.canvas import GRID, INK, MUTED, QUIET, Canvas, number, shorten
 
 WIDTH, ROW, TOP, FOOT = 1000.0, 30.0, 44.0, 46.0
 LEFT, RIGHT = 420.0, 190.0
@@ -65,7 +57,7 @@ def draw_forest(rows: Sequence[ForestRow], title: str, x_axis: str) -> str:
 def _draw_row(canvas: Canvas, row: ForestRow, top: float, x: Callable[[float], float]) -> None:
     middle = top + ROW / 2
     if row.difference is None:
-        canvas.add("rect", x=8, y=round(top + 2, 1), width=WIDTH - 16, height=ROW - 4, fill=QUIET)
+        canvas.rect(8, top + 2, WIDTH - 16, ROW - 4, fill=QUIET)
         canvas.words(14, middle + 5, row.words, weight="700")
         return
     canvas.words(32, middle + 5, shorten(row.words, LEFT - 48))
@@ -74,17 +66,10 @@ def _draw_row(canvas: Canvas, row: ForestRow, top: float, x: Callable[[float], f
         canvas.words(WIDTH - RIGHT + 14, middle + 5, "–", size=14, color=MUTED)
         return
     color = INK if row.strong else MUTED
-    told = number(round(effect.estimate, 2))
+    label = number(round(effect.estimate, 2))
     if effect.low is not None and effect.high is not None:
         canvas.line(x(effect.low), middle, x(effect.high), middle, color, 2.6)
-        told += f"  [{number(round(effect.low, 2))}, {number(round(effect.high, 2))}]"
+        label += f"  [{number(round(effect.low, 2))}, {number(round(effect.high, 2))}]"
     at, size = x(effect.estimate), 7.0 if row.strong else 5.5
-    canvas.add(
-        "rect",
-        x=round(at - size, 1),
-        y=round(middle - size, 1),
-        width=2 * size,
-        height=2 * size,
-        fill=color,
-    )
-    canvas.words(WIDTH - RIGHT + 14, middle + 5, told, size=14, color=INK)
+    canvas.rect(at - size, middle - size, 2 * size, 2 * size, fill=color)
+    canvas.words(WIDTH - RIGHT + 14, middle + 5, label, size=14, color=INK)

@@ -8,10 +8,10 @@ from itertools import groupby
 
 from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.curves import Point
-from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, QUIET, Canvas, number
+from rehab.studies.figures.canvas import COLORS, INK, LEFT, MUTED, QUIET, RIGHT, Canvas
 
 WIDTH, HEIGHT = 1000.0, 450.0
-LEFT, RIGHT, BOTTOM, BETWEEN = 62.0, 16.0, 54.0, 18.0
+BOTTOM, BETWEEN = 54.0, 18.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +53,7 @@ def draw_curves(
         return bottom - (bottom - top) * (value - levels[0]) / (levels[-1] - levels[0])
 
     _draw_ground(canvas, places, phases, top, bottom)
-    for level in levels:
-        strong = level == 100
-        canvas.line(
-            LEFT, y(level), WIDTH - RIGHT, y(level), MUTED if strong else GRID, 1 + strong / 2
-        )
-        canvas.words(LEFT - 8, y(level) + 5, number(level), size=14, anchor="end", color=MUTED)
+    canvas.grid(levels, y, strong=100)
     canvas.words(LEFT - 8, top - 12, words.y_axis, size=14, color=MUTED, anchor="start")
     canvas.words(WIDTH - RIGHT, HEIGHT - 10, words.x_axis, size=14, anchor="end", color=MUTED)
     for arm, points in enumerate(curves.values()):
@@ -109,19 +104,12 @@ def _draw_ground(
 ) -> None:
     """Shade what was walked without feedback, and name visits and phases that are wide enough."""
     for (visit, phase), (x, bins) in places.starts.items():
-        told, wide = phases[phase], bins * places.step
-        if not told.feedback:
-            canvas.add(
-                "rect",
-                x=round(x, 1),
-                y=round(top, 1),
-                width=round(wide, 1),
-                height=round(bottom - top, 1),
-                fill=QUIET,
-            )
-        if wide > 7.6 * len(told.name):
+        label, wide = phases[phase], bins * places.step
+        if not label.feedback:
+            canvas.rect(x, top, wide, bottom - top, fill=QUIET)
+        if wide > 7.6 * len(label.name):
             middle = x + wide / 2
-            canvas.words(middle, bottom + 18, told.name, size=13, anchor="middle", color=MUTED)
+            canvas.words(middle, bottom + 18, label.name, size=13, anchor="middle", color=MUTED)
         if phase == 0 and len(places.visits) > 1:
             canvas.words(x, top - 32, places.visits[visit], size=15, color=INK, weight="700")
 
@@ -145,10 +133,10 @@ def _runs(points: Sequence[Point]) -> list[list[Point]]:
 def _draw_band(
     canvas: Canvas, arm: int, run: list[tuple[float, Point]], y: Callable[[float], float]
 ) -> None:
-    told = [(x, p.low, p.high) for x, p in run if p.low is not None and p.high is not None]
-    if len(told) < 2:
+    known = [(x, p.low, p.high) for x, p in run if p.low is not None and p.high is not None]
+    if len(known) < 2:
         return
-    upper = [f"{x:.1f} {y(high):.1f}" for x, _low, high in told]
-    lower = [f"{x:.1f} {y(low):.1f}" for x, low, _high in reversed(told)]
+    upper = [f"{x:.1f} {y(high):.1f}" for x, _low, high in known]
+    lower = [f"{x:.1f} {y(low):.1f}" for x, low, _high in reversed(known)]
     path = "M" + "L".join([*upper, *lower]) + "Z"
     canvas.add("path", d=path, fill=COLORS[arm % len(COLORS)], opacity=0.15)

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 
 from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.participants import OutcomeResult
-from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, Canvas, number, shorten
+from rehab.studies.figures.canvas import COLORS, INK, LEFT, MUTED, RIGHT, Canvas, number, shorten
 
 WIDTH, HEIGHT = 1000.0, 400.0
-LEFT, RIGHT, TOP, BOTTOM = 62.0, 16.0, 44.0, 62.0
+TOP, BOTTOM = 44.0, 62.0
 DOT = 4.6
 
 
@@ -36,12 +36,7 @@ def draw_people(
     def y(value: float) -> float:
         return bottom - (bottom - TOP) * (value - levels[0]) / (levels[-1] - levels[0])
 
-    for level in levels:
-        strong = level == 0
-        canvas.line(
-            LEFT, y(level), WIDTH - RIGHT, y(level), MUTED if strong else GRID, 1 + strong / 2
-        )
-        canvas.words(LEFT - 8, y(level) + 5, number(level), size=14, anchor="end", color=MUTED)
+    canvas.grid(levels, y, strong=0)
     wide = (WIDTH - LEFT - RIGHT) / len(labels)
     centers = {arm: LEFT + wide * (index + 0.5) for index, arm in enumerate(labels)}
     if joined:
@@ -62,9 +57,9 @@ def draw_people(
             if figure.mean.low is not None and figure.mean.high is not None:
                 canvas.line(aside, y(figure.mean.low), aside, y(figure.mean.high), color, 3)
             canvas.mark(aside, y(figure.mean.estimate), index, 8)
-            told = number(round(figure.mean.estimate, 1))
+            label = number(round(figure.mean.estimate, 1))
             place = y(figure.mean.estimate) + 5
-            canvas.words(aside + 14, place, told, color=INK, weight="700", halo=True)
+            canvas.words(aside + 14, place, label, color=INK, weight="700", halo=True)
     return canvas.to_text()
 
 

@@ -54,7 +54,7 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_participant(request: HttpRequest, enrollment_id: int) -> HttpResponse:
-    """Show a participant's visits, and what can be done. The arm is told by revealing it alone."""
+    """Show a participant's visits, and what can be done. Only revealing it shows the arm."""
     enrollment = get_enrollment(user_of(request), enrollment_id)
     return render_participant(request, enrollment)
 

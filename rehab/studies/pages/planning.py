@@ -11,7 +11,7 @@ from typing import Any
 from django.contrib import messages
 from django.core.exceptions import PermissionDenied
 from django.db import transaction
-from django.db.models import Count, QuerySet
+from django.db.models import Count
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
@@ -50,7 +50,7 @@ def get_study(user: User, study_id: int) -> Study:
 
 
 def is_assessor(study: Study, user: User) -> bool:
-    """Return whether the arms are hidden from somebody now."""
+    """Return whether the arms are hidden from a user now."""
     return study.state != StudyState.CLOSED and has_mark(study, user, Task.ASSESSOR)
 
 
@@ -110,9 +110,9 @@ def show_study(request: HttpRequest, study_id: int) -> HttpResponse:
 
 
 def study_context(study: Study, user: User) -> dict[str, Any]:
-    """Return what somebody sees of a study."""
+    """Return what a user sees of a study."""
     blind, is_lead = is_assessor(study, user), user.role == Role.LEAD
-    by_name = may_see_names(user.role)
+    by_name, events = may_see_names(user.role), StudyEvent.objects.visible_to(user)
     return {
         "study": study,
         "blind": blind,
@@ -124,14 +124,14 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),
         "versions": study.versions.all(),
-        "events": () if blind else _events(study, user),
+        "events": () if blind else events.filter(study=study).select_related("by"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
         "tasks": _markable(study) if is_lead else (),
     }
 
 
 def _participants(study: Study, user: User) -> list[dict[str, Any]]:
-    """Return the participants that somebody may see; groups only once the study is closed."""
+    """Return the participants that a user may see; groups only once the study is closed."""
     rows = Enrollment.objects.visible_to(user).filter(study=study).select_related("patient")
     groups: dict[int, str] = {}
     if study.state == StudyState.CLOSED:
@@ -141,10 +141,6 @@ def _participants(study: Study, user: User) -> list[dict[str, Any]]:
         {"enrollment": row, "next": next_visit(row), "group": groups.get(row.pk, "")}
         for row in rows.order_by("pk")
     ]
-
-
-def _events(study: Study, user: User) -> QuerySet[StudyEvent]:
-    return StudyEvent.objects.visible_to(user).filter(study=study).select_related("by")
 
 
 def _markable(study: Study) -> list[tuple[str, Any, list[User]]]:
@@ -205,7 +201,7 @@ def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpRes
 
 def write_json(study: Study) -> str:
     """Return a registered study with all its versions; of a closed one also the seed."""
-    told: dict[str, Any] = {
+    protocol: dict[str, Any] = {
         "registered_at": study.registered_at,
         "closed_at": study.closed_at,
         "versions": [
@@ -220,16 +216,12 @@ def write_json(study: Study) -> str:
         ],
     }
     if study.state == StudyState.CLOSED and study.sealed:
-        told["allocation_secret"] = asdict(unseal(study.sealed))
-    return json.dumps(told, indent=2, ensure_ascii=False, default=_plain) + "\n"
-
-
-def _plain(value: datetime) -> str:
-    return value.isoformat()
+        protocol["allocation_secret"] = asdict(unseal(study.sealed))
+    return json.dumps(protocol, indent=2, ensure_ascii=False, default=datetime.isoformat) + "\n"
 
 
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:
-    """Do something, or tell why it cannot be done."""
+    """Do something, or say why it cannot be done."""
     try:
         act()
     except InvalidSetting as problem:

@@ -71,7 +71,7 @@ class PowerForm(forms.Form):
 
 
 def _get(user: User, study_id: int) -> Study:
-    """Return a study that somebody may plan. Raises Http404, PermissionDenied for a draft."""
+    """Return a study that a user may plan. Raises Http404, PermissionDenied for a draft."""
     study = get_study(user, study_id)
     if study.is_draft and user.role != Role.LEAD:
         raise PermissionDenied

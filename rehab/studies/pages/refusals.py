@@ -1,4 +1,4 @@
-"""What a study's pages refuse: told with the cure, and logged without a name."""
+"""Refusals of a study's pages: shown with what to do, and logged without a name."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ def _describe(results: Results, slug: str) -> dict[str, Any]:
                 "label": results.arms[one.arm],
                 "count": one.participants,
                 "missing": one.missing,
-                "mean": _told(one.mean, unit),
+                "mean": _format_interval(one.mean, unit),
             }
             for one in found.arms
         ],
@@ -83,22 +83,22 @@ def _describe(results: Results, slug: str) -> dict[str, Any]:
             {
                 "label": name_pair(results, one.group, one.reference),
                 "paired": one.paired,
-                "difference": _told(one.difference, unit),
-                "effect": _told(one.effect, ""),
+                "difference": _format_interval(one.difference, unit),
+                "effect": _format_interval(one.effect, ""),
             }
             for one in found.differences
         ],
     }
 
 
-def _told(interval: Interval | None, unit: str) -> dict[str, str] | None:
+def _format_interval(interval: Interval | None, unit: str) -> dict[str, str] | None:
     if interval is None:
         return None
     places = 1 if unit else 2
     low, high = (format_number(end, places) for end in (interval.low, interval.high))
-    told = format_number(interval.estimate, places)
+    estimate = format_number(interval.estimate, places)
     within = "" if interval.low is None else f"{low} … {high}"
-    return {"estimate": f"{told} {unit}".strip(), "within": within}
+    return {"estimate": f"{estimate} {unit}".strip(), "within": within}
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)  # audited here, as an export

@@ -72,7 +72,7 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
         goal=GoalRule(percent_of_baseline=study.goal_percent),
         schedule=schedule,
     )
-    told: dict[str, Any] = {
+    described: dict[str, Any] = {
         "code": arm.code,
         "name": arm.name,
         "weight": arm.weight,
@@ -84,23 +84,25 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
         "phases": [_describe_phase(phase) for phase in phases],
     }
     if measure != A2:
-        told["measure_rule"] = asdict(measure)
-    if not schedule.tells_all:
-        told["schedule"] = asdict(schedule)
+        described["measure_rule"] = asdict(measure)
+    if not schedule.answers_all:
+        described["schedule"] = asdict(schedule)
     if protocol.close_percent is not None:
-        told["close_percent"] = protocol.close_percent
+        described["close_percent"] = protocol.close_percent
     asked = [find_instrument(slug, study.clinic_id, "en") for slug in protocol.questionnaires]
     if asked:
-        told["questionnaires"] = [_describe_questionnaire(one) for one in asked]
+        described["questionnaires"] = [_describe_questionnaire(one) for one in asked]
     edited = FeedbackType.everywhere.filter(clinic=study.clinic_id, slug=arm.valence).first()
     if edited is not None:
-        told["feedback"] = _describe_feedback(edited)
-    return told
+        described["feedback"] = _describe_feedback(edited)
+    return described
 
 
 def _describe_phase(phase: Phase) -> dict[str, Any]:
-    told = asdict(phase)
-    return {name: told[name] for name in told if told[name] != USUAL_PHASE.get(name, ...)}
+    described = asdict(phase)
+    return {
+        name: described[name] for name in described if described[name] != USUAL_PHASE.get(name, ...)
+    }
 
 
 def _describe_questionnaire(instrument: Instrument) -> dict[str, Any]:

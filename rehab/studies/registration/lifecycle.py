@@ -119,7 +119,9 @@ def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVe
         last = stored.versions.latest("number")
         document = describe(study)
         if not reason.strip():
-            raise InvalidSetting(gettext("Say why the study is changed: it is registered as well."))
+            raise InvalidSetting(
+                gettext("Say why the study is changed. The reason is registered as well.")
+            )
         if digest_of(document) == last.digest:
             raise InvalidSetting(gettext("Nothing is different from the last version."))
         if document["allocation"] != last.document["allocation"]:
@@ -136,7 +138,7 @@ def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVe
 
 
 def close(study: Study, by: User | None, now: datetime) -> None:
-    """Close a study: nobody enters or walks any more, and nothing is hidden from here on.
+    """Close a study: no one enrolls or walks any more, and nothing is hidden from here on.
 
     Raises InvalidSetting while a session of a participant is open.
     """

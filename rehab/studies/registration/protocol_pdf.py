@@ -55,18 +55,18 @@ def _text(words: object, style: str = "BodyText") -> Paragraph:
 
 def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
     """Yield what stands on paper of one version."""
-    told = version.document
-    yield _text(f"{told['code']}: {told['title']}", "Title")
+    document = version.document
+    yield _text(f"{document['code']}: {document['title']}", "Title")
     made = gettext("Version %(number)d of %(moment)s UTC, %(clinic)s")
     moment = f"{version.at:%Y-%m-%d %H:%M}"
-    yield _text(made % {"number": version.number, "moment": moment, "clinic": told["clinic"]})
+    yield _text(made % {"number": version.number, "moment": moment, "clinic": document["clinic"]})
     if version.reason:
         yield _text(gettext("Changed because: %(reason)s") % {"reason": version.reason})
     yield _text(gettext("Question and hypothesis"), "Heading2")
-    yield _text(told["question"])
+    yield _text(document["question"])
     yield _text(gettext("Arms"), "Heading2")
-    yield _table(_arm_rows(told))
-    for arm in told["arms"]:
+    yield _table(_arm_rows(document))
+    for arm in document["arms"]:
         yield _text(
             gettext("Phases of %(arm)s (%(protocol)s): %(phases)s")
             % {
@@ -81,15 +81,15 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
                 gettext("Feedback of %(arm)s, as the clinic edited it: %(feedback)s") % edited
             )
         for asked in arm.get("questionnaires", ()):
-            told_of = {"arm": arm["code"], "questionnaire": asked["title"]}
-            yield _text(gettext("Asked after sessions of %(arm)s: %(questionnaire)s") % told_of)
+            asked_of = {"arm": arm["code"], "questionnaire": asked["title"]}
+            yield _text(gettext("Asked after sessions of %(arm)s: %(questionnaire)s") % asked_of)
     yield _text(gettext("Plan"), "Heading2")
-    yield _table(_plan_rows(told))
+    yield _table(_plan_rows(document))
     yield _text(gettext("Seals (SHA-256)"), "Heading2")
     yield _text(gettext("Of this version, as JSON with sorted keys and without blanks:"))
     yield _text(version.digest, "Code")
     yield _text(gettext("Of the seed, block sizes or list that participants are allocated by:"))
-    yield _text(told["allocation"]["commitment_sha256"], "Code")
+    yield _text(document["allocation"]["commitment_sha256"], "Code")
     yield Spacer(1, 10 * mm)
 
 
@@ -98,22 +98,24 @@ def _table(rows: list[tuple[object, ...]]) -> Table:
     return Table(cells, style=LINES, hAlign="LEFT", repeatRows=1)
 
 
-def _arm_rows(told: dict[str, Any]) -> list[tuple[object, ...]]:
+def _arm_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
     heads = ("Code", "Name", "Ratio", "Feedback type", "Feedback comes", "Gain", "Robot", "Measure")
     keys = ("code", "name", "weight", "feedback_type", "comes", "gain", "robot_intensity")
     return [
         tuple(gettext(head) for head in heads),
         *(
             tuple((arm | {"comes": _comes(arm)})[key] for key in (*keys, "measure"))
-            for arm in told["arms"]
+            for arm in document["arms"]
         ),
     ]
 
 
 def _comes(arm: dict[str, Any]) -> str:
     """Return when an arm's feedback comes; arms of before there was a choice answer every step."""
-    told = arm.get("schedule", {})
-    return format_schedule(Schedule(**told | {"kind": ScheduleKind(told.get("kind", "every"))}))
+    schedule = arm.get("schedule", {})
+    return format_schedule(
+        Schedule(**schedule | {"kind": ScheduleKind(schedule.get("kind", "every"))})
+    )
 
 
 def _phase_text(phase: dict[str, Any]) -> str:
@@ -146,25 +148,25 @@ def _feedback_text(feedback: dict[str, Any]) -> str:
     return "; ".join((points.replace("None", "–"), *bands))
 
 
-def _plan_rows(told: dict[str, Any]) -> list[tuple[object, ...]]:
+def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
     """Return everything else as rows of name and value."""
-    outcomes, visits, allocation = dict(OUTCOMES), told["visits"], told["allocation"]
+    outcomes, visits, allocation = dict(OUTCOMES), document["visits"], document["allocation"]
     factors = (f"{row['name']}: {', '.join(row['levels'])}" for row in allocation["factors"])
-    months = told["months_since_stroke_at_least"]
-    secondary = ", ".join(str(outcomes[slug]) for slug in told["secondary_outcomes"])
+    months = document["months_since_stroke_at_least"]
+    secondary = ", ".join(str(outcomes[slug]) for slug in document["secondary_outcomes"])
     return [
         (gettext("What"), gettext("Planned")),
-        (gettext("Participants"), told["participants"]),
+        (gettext("Participants"), document["participants"]),
         (gettext("Months since the stroke, at least"), months),
-        (gettext("Design"), told["design"]),
+        (gettext("Design"), document["design"]),
         (gettext("Allocation"), METHODS[Method(allocation["method"])]),
         (gettext("Groups"), ", ".join("-".join(row["arms"]) for row in allocation["groups"])),
         (gettext("Factors"), "; ".join(factors)),
         (gettext("Visits in each period"), visits["in_each_period"]),
         (gettext("Days between visits"), visits["days_between"]),
         (gettext("Days between periods"), visits["days_between_periods"]),
-        (gettext("Goal (% of baseline)"), f"{told['goal_percent_of_baseline']:g}"),
-        (gettext("Primary outcome"), outcomes[told["primary_outcome"]]),
+        (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
+        (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
         (gettext("Secondary outcomes (others are exploratory)"), secondary),
-        (gettext("Version of the scoring rules"), told["scoring_rules_version"]),
+        (gettext("Version of the scoring rules"), document["scoring_rules_version"]),
     ]

@@ -1,4 +1,4 @@
-"""Sealing of a study's secret: the database alone does not tell the next allocation."""
+"""Sealing of a study's secret: the database alone does not reveal the next allocation."""
 
 from __future__ import annotations
 

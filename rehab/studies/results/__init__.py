@@ -1,1 +1,1 @@
-"""A study's results: read from the logs, told to who may look, and drawn."""
+"""A study's results: read from the logs, shown to those who may look, and drawn."""

@@ -111,14 +111,14 @@ def draw_consort(results: Results) -> str:
         left = [gettext("%(count)d left the study") % {"count": one.left}] if one.left else []
         if one.removed:
             left.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
-        told = {"walked": one.visits_walked, "planned": one.visits_planned}
+        visits = {"walked": one.visits_walked, "planned": one.visits_planned}
         columns.append(
             [
                 Box(results.arms[one.arm], (_n(gettext("allocated"), one.allocated),)),
                 Box(
                     _n(gettext("began"), one.began),
                     (
-                        gettext("%(walked)d of %(planned)d visits walked") % told,
+                        gettext("%(walked)d of %(planned)d visits walked") % visits,
                         _n(gettext("all visits"), one.completed),
                         *left,
                     ),

@@ -1,7 +1,7 @@
 """A study's participants, read from the logs of their sessions: once, until something changes.
 
 The log of a session that has ended stays as it is. So a participant is read again only where a row
-differs that decides which sessions count; the process keeps what it read for its latest studies.
+differs that decides which sessions count; the process caches what it read of its latest studies.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from rehab.studies.participants import Enrollment, StudyVisit
 from rehab.training.changes import State
 from rehab.training.plans import SessionPlan
 
-KEPT_STUDIES = 8
+CACHED_STUDIES = 8
 UNREAD = ("session__plan", "session__checkpoint", "session__legacy_row")  # large, and seldom needed
 
 
@@ -64,29 +64,29 @@ class Analysis:
 
 
 @dataclass(frozen=True, slots=True)
-class _Kept:
+class _CachedStudy:
     people: Mapping[int, tuple[Any, Participant]]  # by enrollment: what it was read from
     analysis: Analysis
 
 
 # By the study's key and its seal, which no other one has, also after a restore.
-_kept: OrderedDict[tuple[int, str], _Kept] = OrderedDict()
+_cache: OrderedDict[tuple[int, str], _CachedStudy] = OrderedDict()
 _lock = Lock()  # requests have threads
 
 
 def analyze(study: Study, arms: tuple[str, ...], until: date) -> Analysis:
     """Return what a study's participants gave. ``until``: visits up to this day are due."""
     place = study.pk, study.sealed
-    known = _kept.get(place)
+    known = _cache.get(place)
     people = _read_people(study, until, {} if known is None else known.people)
     analysis = Analysis(tuple(one for _key, one in people.values()), arms, study.crossover)
     if known is not None and _is_same(known.analysis, analysis):
         analysis = known.analysis
     with _lock:
-        _kept[place] = _Kept(people, analysis)
-        _kept.move_to_end(place)
-        while len(_kept) > KEPT_STUDIES:
-            _kept.popitem(last=False)
+        _cache[place] = _CachedStudy(people, analysis)
+        _cache.move_to_end(place)
+        while len(_cache) > CACHED_STUDIES:
+            _cache.popitem(last=False)
     return analysis
 
 
@@ -127,11 +127,14 @@ def _key(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> tuple
     return (
         *(enrollment.code, enrollment.patient_id, enrollment.allocation.group),
         *(enrollment.withdrawn_at, enrollment.is_analyzed),
-        *((visit.number, visit.period, _is_due(visit, until), _told(visit)) for visit in visits),
+        *(
+            (visit.number, visit.period, _is_due(visit, until), _session_key(visit))
+            for visit in visits
+        ),
     )
 
 
-def _told(visit: StudyVisit) -> tuple[Any, ...] | None:
+def _session_key(visit: StudyVisit) -> tuple[Any, ...] | None:
     session = visit.session
     if session is None:
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import date, datetime
 from functools import cached_property
 from hashlib import sha256
@@ -21,6 +21,7 @@ from rehab.studies.analysis.participants import (
     ArmFlow,
     OutcomeResult,
     Participant,
+    ParticipantVisit,
     flow,
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
@@ -31,7 +32,7 @@ from rehab.studies.results.reading import Analysis, analyze
 
 
 def may_look(study: Study, user: User) -> bool:
-    """Return whether somebody may see a study's results now.
+    """Return whether an account may see a study's results now.
 
     Of a closed study all who see studies may; before that only who has the mark for interim looks.
     """
@@ -41,7 +42,7 @@ def may_look(study: Study, user: User) -> bool:
 
 
 def note_look(study: Study, user: User, now: datetime) -> None:
-    """Record an interim look, once a day and person; the study's events tell it."""
+    """Record an interim look, once a day and person, among the study's events."""
     if study.state == StudyState.CLOSED:
         return
     today = clinic_time(now, study.clinic).date()
@@ -60,7 +61,7 @@ class Results:
     study, analysis
         The study, and what was computed of everybody who was ever taken in.
     arms
-        The arms' codes with the labels by which they are told, in the order in which they are told.
+        The arms' codes with the labels that are shown, in the order in which they are shown.
     """
 
     study: Study
@@ -125,22 +126,20 @@ def read_results(study: Study, now: datetime) -> Results:
     return Results(study, analyze(study, tuple(arms), until), arms)
 
 
+def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
+    """Yield the visits of those who are analyzed, each with the columns that say whose it is."""
+    for one in results.participants:
+        for visit in one.visits if one.is_analyzed else ():
+            group = results.arms[visit.arm]
+            yield visit, {"participant": one.code, "group": group, "visit": visit.number}
+
+
 def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
     """Yield one row for each participant, visit and outcome: missing ones are empty."""
-    slugs = (*results.registered, *results.exploratory)
-    for one in results.participants:
-        if not one.is_analyzed:
-            continue
-        for visit in one.visits:
-            for slug in slugs:
-                yield {
-                    "participant": one.code,
-                    "group": results.arms[visit.arm],
-                    "visit": visit.number,
-                    "outcome": slug,
-                    "status": _status(results, slug),
-                    "value": visit.outcomes.get(slug),
-                }
+    for visit, whose in _visits(results):
+        for slug in (*results.registered, *results.exploratory):
+            status, value = _status(results, slug), visit.outcomes.get(slug)
+            yield whose | {"outcome": slug, "status": status, "value": value}
 
 
 def _status(results: Results, slug: str) -> str:
@@ -151,17 +150,8 @@ def _status(results: Results, slug: str) -> str:
 
 def phase_rows(results: Results) -> Iterator[dict[str, Any]]:
     """Yield one row for each participant, visit and phase."""
-    for one in results.participants:
-        if not one.is_analyzed:
-            continue
-        for visit in one.visits:
-            head = {
-                "participant": one.code,
-                "group": results.arms[visit.arm],
-                "visit": visit.number,
-            }
-            for phase in visit.phases:
-                yield head | phase
+    for visit, whose in _visits(results):
+        yield from (whose | phase for phase in visit.phases)
 
 
 def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
@@ -203,8 +193,5 @@ def curve_rows(results: Results) -> Iterator[dict[str, Any]]:
 
 def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
     """Return one row for each group of the flow of participants."""
-    names = [name for name in ArmFlow.__slots__ if name != "arm"]
-    return [
-        {"group": results.arms[one.arm]} | {name: getattr(one, name) for name in names}
-        for one in results.flow
-    ]
+    rows = [asdict(one) for one in results.flow]
+    return [{"group": results.arms[row.pop("arm")]} | row for row in rows]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
-from rehab.studies.analysis.comparison import CONFIDENCE, Interval
+from rehab.studies.analysis.comparison import CONFIDENCE
 from rehab.studies.simulation.trial import Trial, differences, simulate
 
 
@@ -49,12 +49,20 @@ class PairPower:
 def simulate_from(
     trial: Trial, seeds: Iterable[int], every_s: float
 ) -> Iterator[dict[int, list[SimulatedDifference]]]:
-    """Yield what the studies of some seeds found, by seed, about every so many seconds."""
+    """Yield what the studies of some seeds found, by seed.
+
+    Parameters
+    ----------
+    trial, seeds
+        The study, and the seed of each time that it is simulated.
+    every_s
+        After about how much work found differences are yielded [s]; the rest come at the end.
+    """
     batch: dict[int, list[SimulatedDifference]] = {}
     began = time.monotonic()
     for seed in seeds:
         batch[seed] = [
-            _found(one.group, one.reference, one.difference)
+            SimulatedDifference(one.group, one.reference, *astuple(one.difference))
             for one in differences(trial, simulate(trial, seed))
         ]
         if time.monotonic() - began >= every_s:
@@ -62,10 +70,6 @@ def simulate_from(
             batch, began = {}, time.monotonic()
     if batch:
         yield batch
-
-
-def _found(group: str, reference: str, of: Interval) -> SimulatedDifference:
-    return SimulatedDifference(group, reference, of.estimate, of.low, of.high)
 
 
 def summarize(found: Sequence[SimulatedDifference]) -> list[PairPower]:

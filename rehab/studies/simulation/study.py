@@ -100,7 +100,7 @@ def _find_protocol(clinic: Clinic) -> Protocol:
 
 
 def walk_study(study: Study, trial: Trial, seed: int, now: datetime) -> Iterator[int]:
-    """Enroll and walk whoever is missing, and yield how many have walked all that they will.
+    """Enroll and walk the participants who are missing, and yield how many are done.
 
     What was walked before stays: a study that was broken off goes on.
     """

@@ -107,7 +107,7 @@ class Trial:
 
 
 def walkable(plan: SessionPlan) -> SessionPlan:
-    """Return a plan without rests: nobody waits for simulated people."""
+    """Return a plan without rests, which simulated people do not need."""
     return replace(plan, phases=tuple(replace(phase, rest_s=None) for phase in plan.phases))
 
 
@@ -149,6 +149,9 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
 def differences(
     trial: Trial, participants: Sequence[Participant], slug: str = ""
 ) -> list[Difference]:
-    """Return the differences between all pairs of arms in an outcome (the primary one)."""
+    """Return the differences between all pairs of arms in an outcome.
+
+    ``slug``: the outcome's; of the primary one where it is empty.
+    """
     groups = by_arm(participants, list(trial.plans), slug or trial.outcome)
     return compare(groups, paired=trial.is_crossover)

@@ -22,7 +22,7 @@ ENDLESS = gettext_noop(
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """How simulated participants differ, and what is kept of an effect.
+    """How simulated participants differ, and how much of an effect they retain.
 
     Attributes
     ----------

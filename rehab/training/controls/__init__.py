@@ -1,7 +1,7 @@
 """The registry of controls: everything that other code knows of a control of the PT's page.
 
 From an entry follow the states that allow the change, what it does to the fold, who may ask for it
-(pages and the API), what each audience is told, its row in the log, its line in a review and its
+(pages and the API), what each audience is sent, its row in the log, its line in a review and its
 mark on charts. A control that no other code names needs no member of ``ChangeKind``.
 """
 

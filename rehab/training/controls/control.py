@@ -1,4 +1,4 @@
-"""What is known of a control: who may use it and when, what it does, who is told and how."""
+"""What is known of a control: who may use it and when, what it does, who is notified and how."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from robot.marking import AnyOf, Marked
 
 
 class Audience(StrEnum):
-    """Who is told of a session's events."""
+    """Who is notified of a session's events."""
 
     PATIENT = "patient"
     MONITOR = "monitor"
@@ -33,7 +33,7 @@ class Audience(StrEnum):
 
 
 class Payload(StrEnum):
-    """What an audience is told of a change; ``rehab.sessions.events`` builds each."""
+    """What an audience is sent of a change; ``rehab.sessions.events`` builds each."""
 
     KIND = "kind"  # that it happened
     VALUE = "value"  # the value that is now in force
@@ -49,7 +49,7 @@ class Requester(StrEnum):
 
     MONITOR = "monitor"  # the PT's page, and programs that call the API
     PATIENT_PAGE = "patient_page"  # a person who is signed in, on the patient's page
-    TABLET = "tablet"  # the station's paired tablet, with nobody signed in
+    TABLET = "tablet"  # the station's paired tablet, without a signed-in person
 
 
 class ValueKind(StrEnum):
@@ -100,7 +100,7 @@ class ControlledSession(Protocol):
         """Begin a phase."""
 
     def pause(self, reason: PauseReason | None) -> None:
-        """Note that nobody walks, and why."""
+        """Note that walking stopped, and why."""
 
     def resume(self) -> None:
         """Forget why the session was paused."""
@@ -156,14 +156,14 @@ class Control:
         A setting's value at the beginning of a plan.
     apply, current
         Put a checked value into force; return the value in force.
-    tells
-        Who is told of it, and what.
+    payloads
+        Who is notified of it, and with what.
     event_field
         The name that its event gives the value.
     snapshot_field, snapshot_for
         The name that snapshots give the value, and whose snapshots have it.
     requesters
-        Who may ask for it; nobody where only the server makes such changes.
+        Who may ask for it; empty where only the server makes such changes.
     value_format, choices, shows_old, joint
         How a review writes the value: ``choices`` are the labels of single values, ``shows_old``
         writes "old → new", ``joint`` stands between label and value.
@@ -183,7 +183,7 @@ class Control:
     initial: Callable[[SessionPlan], Any] | None = None
     apply: Callable[[ControlledSession, Any], None] | None = None
     current: Callable[[ControlledSession], Any] | None = None
-    tells: Mapping[Audience, Payload] = field(
+    payloads: Mapping[Audience, Payload] = field(
         default_factory=lambda: {Audience.MONITOR: Payload.VALUE}
     )
     event_field: str = "value"
@@ -233,7 +233,7 @@ class Control:
         return value
 
     def value_in_force(self, session: ControlledSession) -> Any:
-        """Return the value as pages are told it; None where the control has none."""
+        """Return the value as pages get it; None where the control has none."""
         if self.current is not None:
             return self.current(session)
         return session.settings.get(self.kind)

@@ -14,11 +14,11 @@ from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Block, Tally
 from rehab.training.plans import SessionPlan
-from rehab.training.schedules import Untold
+from rehab.training.schedules import FeedbackSummary
 from rehab.training.steps import Side
 
 # Rises with every change of the fold that an older checkpoint would not fit; such a one is ignored.
-CHECKPOINT_VERSION = 3
+CHECKPOINT_VERSION = 4
 # What is plain data already.
 PLAIN = (
     *("last_number", "last_time_s", "active_s", "goal", "was_walking"),
@@ -29,7 +29,7 @@ PLAIN = (
 
 def fold_to_json(fold: SessionFold) -> dict[str, Any]:
     """Return the state of a fold as JSON has it."""
-    following, telling = fold.following, fold.telling
+    following, delivery = fold.following, fold.delivery
     planned = {one.slug: one for one in (fold.plan.valence, *fold.plan.alternatives)}
     return {
         "version": CHECKPOINT_VERSION,
@@ -47,9 +47,9 @@ def fold_to_json(fold: SessionFold) -> dict[str, Any]:
         "staircase": asdict(following.staircase),
         "latest": list(following.latest),
         "adapted": following.moved,
-        "untold": asdict(telling.untold),
-        "answer": None if telling.answer is None else asdict(telling.answer),
-        "told": list(telling.told),
+        "pending": asdict(delivery.pending),
+        "answer": None if delivery.answer is None else asdict(delivery.answer),
+        "reported": list(delivery.reported),
         "trained": asdict(fold.trained),
         "feedback": asdict(fold.feedback),
         "phases": [asdict(tally) for tally in fold.phases],
@@ -78,12 +78,12 @@ def fold_from_json(plan: SessionPlan, data: Mapping[str, Any]) -> SessionFold | 
         initial = CONTROLS[kind].initial
         if initial is not None:
             fold.settings[kind] = type(initial(plan))(value)
-    following, telling = fold.following, fold.telling
+    following, delivery = fold.following, fold.delivery
     following.staircase, following.moved = Staircase(**data["staircase"]), data["adapted"]
     following.latest.extend(data["latest"])
-    telling.untold = Untold(**data["untold"])
-    telling.answer = None if data["answer"] is None else Untold(**data["answer"])
-    telling.told.extend(data["told"])
+    delivery.pending = FeedbackSummary(**data["pending"])
+    delivery.answer = None if data["answer"] is None else FeedbackSummary(**data["answer"])
+    delivery.reported.extend(data["reported"])
     fold.trained, fold.feedback = Tally(**data["trained"]), Tally(**data["feedback"])
     fold.phases = tuple(Tally(**tally) for tally in data["phases"])
     fold.blocks = {

@@ -14,9 +14,9 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
+from rehab.training.fold.feedback_delivery import FeedbackDelivery
 from rehab.training.fold.goal_following import GoalFollowing
 from rehab.training.fold.tallies import Block, Tally
-from rehab.training.fold.telling import Telling
 from rehab.training.fold.valence_course import ValenceCourse
 from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
 from rehab.training.measures import InvalidSetting
@@ -76,7 +76,7 @@ class SessionFold:
         self.rest_s: float | None = None  # how long the rest should be that is under way
         self.was_walking = False  # whether the time since the last step was walked
         self.following = GoalFollowing(plan)
-        self.telling = Telling(plan.schedule)
+        self.delivery = FeedbackDelivery(plan.schedule)
         self._begin_phase(0)
 
     @property
@@ -102,7 +102,7 @@ class SessionFold:
 
     @property
     def adaptation_mode(self) -> AdaptationMode:
-        """What becomes of the goal while somebody walks."""
+        """What becomes of the goal while the patient walks."""
         mode: AdaptationMode = self.settings[ChangeKind.GOAL_ADAPTATION]
         return mode
 
@@ -177,7 +177,7 @@ class SessionFold:
             rules_version=version,
         )
         self.last_number = scored.number
-        self.following.moved, self.telling.answer = False, None
+        self.following.moved, self.delivery.answer = False, None
         if scored.side == self.plan.trained_side:
             self._count(scored, running)
         if self.was_walking and not backwards:
@@ -205,7 +205,7 @@ class SessionFold:
             tally.add(step)
             if self.phase.feedback:
                 self.feedback.add(step)
-                self.telling.add(step, self.feedback.judged)
+                self.delivery.add(step, self.feedback.judged)
             if self.phase.adapts and step.valid and step.value is not None:
                 self.following.latest.append(step.value)
                 if self.adaptation_mode is AdaptationMode.AUTOMATIC:
@@ -277,7 +277,7 @@ class SessionFold:
         self.state = state
 
     def pause(self, reason: PauseReason | None) -> None:
-        """Note that the time from here on is not walked, and why; None where nobody knows."""
+        """Note that the time from here on is not walked, and why; None where it is unknown."""
         self.was_walking, self.pause_reason = False, reason
 
     def resume(self) -> None:

@@ -45,7 +45,7 @@ class ValenceCourse:
     def changed_to(self) -> tuple[str, ...]:
         """The valences that the session was changed to, in that order, each once.
 
-        One that was changed again before a step came is none of them: nobody walked with it.
+        One that was changed again before a step came is none of them: no step was walked with it.
         """
         steps = [after for after, _ in self.switches]
         others = dict.fromkeys(

@@ -37,18 +37,6 @@ class Metric:
     higher_is_better: bool = True
 
 
-def _score(fold: SessionFold) -> float | None:
-    return fold.score
-
-
-def _hit_rate(fold: SessionFold) -> float | None:
-    return fold.feedback.hit_rate
-
-
-def _mean_performance(fold: SessionFold) -> float | None:
-    return fold.feedback.mean_performance
-
-
 def _best_streak(fold: SessionFold) -> float | None:
     return fold.feedback.best_streak if fold.feedback.judged else None
 
@@ -89,15 +77,6 @@ def _retention_in_washout(fold: SessionFold) -> float | None:
     return 100 * kept / trained
 
 
-def _steps(fold: SessionFold) -> float | None:
-    """Judged steps of feedback phases, from which hit rate and score follow."""
-    return float(fold.feedback.judged) or None
-
-
-def _active_minutes(fold: SessionFold) -> float | None:
-    return fold.active_s / 60 or None
-
-
 def _attended(fold: SessionFold) -> float | None:
     """1 for a session in which something was walked; sums count sessions."""
     return 1.0 if fold.trained.valid else None
@@ -112,9 +91,14 @@ def _target_met(fold: SessionFold) -> float | None:
 METRICS: dict[str, Metric] = {
     metric.slug: metric
     for metric in (
-        Metric("score", gettext_noop("Score"), "points", _score),
-        Metric("hit_rate", gettext_noop("Hit rate"), "", _hit_rate),
-        Metric("mean_performance", gettext_noop("Mean performance"), "", _mean_performance),
+        Metric("score", gettext_noop("Score"), "points", lambda fold: fold.score),
+        Metric("hit_rate", gettext_noop("Hit rate"), "", lambda fold: fold.feedback.hit_rate),
+        Metric(
+            "mean_performance",
+            gettext_noop("Mean performance"),
+            "",
+            lambda fold: fold.feedback.mean_performance,
+        ),
         Metric("best_streak", gettext_noop("Best streak"), "steps", _best_streak),
         Metric(
             "points_per_100_steps",
@@ -131,8 +115,19 @@ METRICS: dict[str, Metric] = {
         Metric(
             "retention_in_washout", gettext_noop("Retention in washout"), "%", _retention_in_washout
         ),
-        Metric("steps", gettext_noop("Steps"), "steps", _steps),
-        Metric("active_minutes", gettext_noop("Active minutes"), "min", _active_minutes),
+        # Judged steps of feedback phases, from which hit rate and score follow.
+        Metric(
+            "steps",
+            gettext_noop("Steps"),
+            "steps",
+            lambda fold: float(fold.feedback.judged) or None,
+        ),
+        Metric(
+            "active_minutes",
+            gettext_noop("Active minutes"),
+            "min",
+            lambda fold: fold.active_s / 60 or None,
+        ),
         Metric("attended", gettext_noop("Sessions attended"), "sessions", _attended),
         Metric("target_met", gettext_noop("Target met"), "days", _target_met),
     )

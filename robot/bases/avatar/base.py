@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from robot.bases.avatar.page_server import PageServer
-from robot.bases.base import Abilities, Answer, BadOption, BaseLost, BaseState, Indication
+from robot.bases.base import Abilities, Answer, BadOption, BaseLost, Indication
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.motion.twist import Twist
 
@@ -75,7 +75,10 @@ class AvatarBase(KinematicBase):
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity, and show where it has come to."""
         ordered = super().drive(twist)
-        self._show_pose(super().read())
+        if self._pages is not None:
+            pose = super().read().pose
+            at = [round(one, 3) for one in (pose.x_m, pose.y_m, pose.heading_rad)]
+            self._pages.show(pose=at)
         return ordered
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
@@ -96,11 +99,4 @@ class AvatarBase(KinematicBase):
                     "strength": answer.strength,
                     "words": self.words[answer.is_glad],
                 }
-            )
-
-    def _show_pose(self, there: BaseState) -> None:
-        if self._pages is not None:
-            pose = there.pose
-            self._pages.show(
-                pose=[round(pose.x_m, 3), round(pose.y_m, 3), round(pose.heading_rad, 3)]
             )

@@ -33,7 +33,17 @@ class ReportedOdometry:
         self._heading_rad = 0.0  # likewise, full turns included
 
     def update(self, reported: Pose, twist: Twist, now_s: float) -> bool:
-        """Store a reported pose, and return whether it has jumped."""
+        """Store a reported pose, and return whether it has jumped.
+
+        Parameters
+        ----------
+        reported
+            Its pose in the frame of its own odometry.
+        twist
+            Its velocity.
+        now_s
+            The time [s].
+        """
         turned_rad = wrap(reported.heading_rad - self._last.heading_rad)
         jumped = self._home is not None and (
             reported.distance_m(self._last) > JUMP_M or abs(turned_rad) > JUMP_RAD
@@ -103,7 +113,17 @@ class HazardSensors:
         self._unread: set[str] = set()
 
     def update(self, hazard: str, which: int, is_detected: bool) -> None:
-        """Store an event of one sensor."""
+        """Store an event of one sensor.
+
+        Parameters
+        ----------
+        hazard
+            The hazard's code.
+        which
+            Number of the sensor among those of its kind.
+        is_detected
+            Whether it detects the hazard now.
+        """
         pressed = self._pressed.setdefault(hazard, set())
         (pressed.add if is_detected else pressed.discard)(which)
         if is_detected:

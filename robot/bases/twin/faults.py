@@ -76,7 +76,15 @@ class Faults:
     false_header: float = _fault(0.0, 0, 1)
 
     def change(self, name: str, value: Any) -> Any:
-        """Set a fault, and return its value before. Raises BadFault."""
+        """Set a fault, and return its value before. Raises BadFault.
+
+        Parameters
+        ----------
+        name
+            One of the faults.
+        value
+            Its new value, within its bounds of ``LIMITS``.
+        """
         if name not in LIMITS:
             raise BadFault(f"{name} is no fault. There are: {', '.join(LIMITS)}.")
         least, most = LIMITS[name]
@@ -89,7 +97,15 @@ class Faults:
         return was
 
     def damage(self, data: bytes, chance: random.Random) -> bytes:
-        """Return the bytes that arrive of those that were sent."""
+        """Return the bytes that arrive of those that were sent.
+
+        Parameters
+        ----------
+        data
+            What was sent.
+        chance
+            Where chance comes from.
+        """
         if self.false_header and chance.random() < self.false_header:
             data = b"\xaa\x55" + data
         if not self.drop and not self.flip and not self.duplicate:

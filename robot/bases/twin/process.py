@@ -113,7 +113,19 @@ class Twin:
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Run by the clock until ``is_over``."""
+        """Run by the clock until ``is_over``.
+
+        Parameters
+        ----------
+        orders
+            Lines of JSON to the twin; see ``python -m robot twin --help``.
+        answer
+            Called with a line of JSON for each order.
+        is_over
+            Called at each frame.
+        monotonic, sleep
+            The clock [s], and how to wait by it.
+        """
         next_s = monotonic()
         while not is_over():
             now_s = monotonic()

@@ -64,7 +64,7 @@ export function createAlarms({ state }, robot) {
   function show(kind, text) {
     if (!shown.has(kind)) {
       const banner = document.createElement("p");
-      banner.className = "notice alarm";
+      banner.className = "notice alarm row wrap";
       banner.dataset.alarm = kind;
       shown.set(kind, place.appendChild(banner));
       if (kind !== "robot" || !robot.wasStoppedHere) soundAlarm();

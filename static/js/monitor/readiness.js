@@ -26,6 +26,7 @@ export function createReadiness(robot) {
       list.dataset.of = written;
       const items = checks.map(([sign, text]) => {
         const item = document.createElement("li");
+        item.className = "row wrap";
         item.classList.toggle("low", sign === "!");
         item.textContent = `${sign} ${text}`;
         return item;

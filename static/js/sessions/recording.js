@@ -11,10 +11,13 @@ function tell(text) {
   button.disabled = false;
 }
 
-async function send(file, ending) {
+const endingOf = (file) => file.name.slice(file.name.lastIndexOf(".")).toLowerCase();
+
+async function send(file, place) {
+  const ending = endingOf(file);
   const token = form.elements.csrfmiddlewaretoken.value;
   for (let at = 0; at < file.size || at === 0; at += Number(partBytes)) {
-    const answer = await fetch(`${parts}?${new URLSearchParams({ at, ending })}`, {
+    const answer = await fetch(`${parts}?${new URLSearchParams({ at, ending, file: place })}`, {
       method: "POST",
       headers: { "X-CSRFToken": token, "Content-Type": "application/octet-stream" },
       body: file.slice(at, at + Number(partBytes)),
@@ -25,18 +28,18 @@ async function send(file, ending) {
 
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
-  const [file] = form.querySelector("[type=file]").files;
-  const ending = file.name.slice(file.name.lastIndexOf(".")).toLowerCase();
+  const files = [...form.querySelector("[type=file]").files];
   button.disabled = true;
   tell("");
-  if (file.size > Number(bytesMax)) return tell(tooLarge);
+  if (files.some((file) => file.size > Number(bytesMax))) return tell(tooLarge);
   button.disabled = true;
   try {
-    await send(file, ending);
+    for (const [place, file] of files.entries()) await send(file, place);
   } catch (refused) {
     return tell(refused instanceof TypeError ? failed : refused.message || failed);
   }
-  form.elements.ending.value = ending;
+  form.elements.ending.value = files.map(endingOf).join(",");
+  const [file] = files;
   form.elements.name.value = file.name.slice(0, file.name.lastIndexOf(".")).slice(0, 60);
   form.submit();
 });

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 from asgiref.sync import sync_to_async
 
@@ -11,15 +9,10 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import aggregate as aggregates
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
-from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
-from tests.support.callers import change, restart
+from tests.support.callers import change, reread, restart
 
 pytestmark = pytest.mark.postgres
-
-
-async def reread(session: TrainingSession) -> Any:
-    return await TrainingSession.everywhere.aget(pk=session.pk)
 
 
 @pytest.mark.parametrize(("steps", "kept"), [(9, None), (10, 10), (14, 10), (15, 15), (24, 20)])

@@ -56,17 +56,6 @@ async def test_what_a_subscriber_misses_is_limited():
         feed.events_after(slow.position)
 
 
-async def test_a_frame_is_a_sign_of_life():
-    async def send(text: str) -> None:
-        pass
-
-    page = Subscriber(EventFeed(), Audience.PATIENT, send)
-    assert not page.was_sent_something(within_s=1.0)
-    await page.send_frame("events", ["{}"])
-    assert page.was_sent_something(within_s=1.0)
-    assert not page.was_sent_something(within_s=0.0)
-
-
 async def test_pages_have_a_heartbeat_each_interval_unless_they_were_just_sent_a_step(
     place, elsewhere, begun, monkeypatch
 ):

@@ -23,7 +23,7 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.live.session import loading
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from tests.support.callers import a_step, change, turns
+from tests.support.callers import a_step, change, reread, turns
 
 pytestmark = pytest.mark.postgres
 
@@ -130,10 +130,6 @@ def test_what_the_real_ps_tells(tmp_path, monkeypatch):
 
 async def own(session: TrainingSession, owner: str) -> None:
     await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner=owner)
-
-
-async def reread(session: TrainingSession) -> Any:
-    return await TrainingSession.everywhere.aget(pk=session.pk)
 
 
 async def test_a_session_is_claimed_from_the_dead_and_given_up_at_the_drain(place, ready):

@@ -5,19 +5,11 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
-from asgiref.sync import sync_to_async
 
 from rehab.sessions.live.consumers import source as source_module
-from rehab.sessions.log import Step
 from robot.behavior.performer import Performer
-from tests.support.callers import SourceCaller, change
+from tests.support.callers import SourceCaller, change, rows_of
 from tests.support.robot_stage import IdealBase
-
-
-@sync_to_async
-def rows(session, *columns):
-    steps = Step.everywhere.filter(session=session).order_by("number")
-    return list(steps.values_list(*columns, flat=len(columns) == 1))
 
 
 async def test_plain_text_is_numbered_and_timed_by_the_server(place, begun, monkeypatch):
@@ -32,7 +24,7 @@ async def test_plain_text_is_numbered_and_timed_by_the_server(place, begun, monk
     await source.say("inf, 3.9")
     await source.say("2.5,nan")
     await source.acked(4)
-    assert await rows(session, "number", "time_s", "side", "value", "reasons", "hit") == [
+    assert await rows_of(session, "number", "time_s", "side", "value", "reasons", "hit") == [
         (1, 1000.5, "left", 4.02, [], True),
         (2, 1000.5, "left", None, ["missing"], None),
         (3, 1000.5, "left", None, ["missing"], None),
@@ -60,7 +52,7 @@ async def test_the_time_of_plain_text_never_runs_backwards(place, begun, monkeyp
         await source.acked(number)
         ours[0] += 1.0
     first_s = max(wall[0], 1_800_000_001.0)
-    assert await rows(session, "time_s", "reasons") == [
+    assert await rows_of(session, "time_s", "reasons") == [
         (1_800_000_000.0, []),
         (1_800_000_001.0, []),
         (first_s, []),
@@ -93,7 +85,7 @@ async def test_the_pts_goal_wins_and_another_one_is_shown_to_the_pt(place, begun
     await monitor.until_step(2)
     assert not any(event["kind"] == "source_goal" for event in monitor.events[:-2])
     await tablet.until_step(2)
-    assert await rows(session, "goal", "hit") == [(3.0, True), (3.0, True)]
+    assert await rows_of(session, "goal", "hit") == [(3.0, True), (3.0, True)]
     assert not any(event["kind"] == "source_goal" for event in tablet.events)
 
 

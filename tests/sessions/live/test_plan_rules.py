@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rehab.sessions.log import SessionEvent, Step
+from rehab.sessions.log import Step
 from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.cueing import CueTiming
@@ -10,14 +10,9 @@ from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
 from rehab.training.schedules import Schedule, ScheduleKind
 from robot.wire.cue_limits import CueRule
-from tests.support.callers import a_step, restart
+from tests.support.callers import a_step, events_of, restart
 
 TRAINING = make_phase("training")
-
-
-async def events_of(session, kind):
-    rows = SessionEvent.everywhere.filter(session=session, kind=kind).order_by("pk")
-    return [row async for row in rows]
 
 
 async def test_the_robot_gets_the_whole_cue(place, begun):

@@ -42,7 +42,7 @@ CADENCE = Control(
     value=ValueKind.NUMBER,
     check=check_cadence,
     initial=lambda _plan: 60.0,
-    tells={
+    payloads={
         Audience.PATIENT: Payload.STATE,
         Audience.MONITOR: Payload.VALUE,
         Audience.SOURCE: Payload.VALUE,

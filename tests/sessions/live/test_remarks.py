@@ -7,13 +7,13 @@ from asgiref.sync import ThreadSensitiveContext, sync_to_async
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import REMARK_RANGES, Remark, SessionEvent
-from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.sessions.services import change_session
 from rehab.training.changes import ChangeKind
-from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     change,
 )
+from tests.support.walks import make_session
 
 PHASES = (
     make_phase("training", strides=4),
@@ -28,15 +28,7 @@ async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewher
     robot = await place.robot().open()
 
     def view():
-        session = create_session(
-            SessionRequest(
-                patient=place.patient,
-                valence="positive",
-                goal=GoalRule(value=3.0),
-                phases=PHASES,
-                station=place.station,
-            )
-        )
+        session = make_session(place.patient, phases=PHASES, station=place.station)
         change_session(session, ChangeKind.START, by=place.pt)
         change_session(session, ChangeKind.GOAL, 4.0, by=place.pt)
         return session

@@ -19,12 +19,10 @@ from rehab.sessions.live.consumers.robot import RobotConsumer
 from rehab.sessions.live.consumers.screens import MonitorConsumer, PatientConsumer
 from rehab.sessions.live.consumers.source import SourceConsumer
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Device, Station
-from rehab.training.goals import GoalRule
-from rehab.training.phases import make_phase
 from tests.support.callers import OWN_PAGE, Caller
 from tests.support.identities import find_identities, identifying_texts
+from tests.support.walks import make_session
 from tests.support.world import Actor, World, all_actors, build_world, signed_in
 
 # Who gets in, by the words of docs/protocol.md: roles, and kinds of device.
@@ -61,15 +59,8 @@ class Everyone:
 
     @staticmethod
     def _open(world: World) -> TrainingSession:
-        return create_session(
-            SessionRequest(
-                patient=world.patient,
-                valence="positive",
-                goal=GoalRule(value=1.0),
-                phases=(make_phase("training"),),
-                station=world.rows[Station],
-                created_by=world.people[Role.PT],
-            )
+        return make_session(
+            world.patient, station=world.rows[Station], created_by=world.people[Role.PT]
         )
 
     def headers(self, actor: Actor) -> list[tuple[bytes, bytes]]:

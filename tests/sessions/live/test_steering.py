@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 
-from asgiref.sync import sync_to_async
-
 from rehab.people.models import Clinic, User
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live import runtime
@@ -15,15 +13,10 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.controls import Audience
 from rehab.training.phases import make_phase
 from rehab.training.valences import CueGestures
-from tests.support.callers import restart, turns
+from tests.support.callers import events_of, restart, turns
 from tests.support.world import NOW
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
-
-
-async def events_of(session, kind):
-    rows = SessionEvent.everywhere.filter(session=session, kind=kind).order_by("pk")
-    return [row async for row in rows]
 
 
 async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, begun):
@@ -184,18 +177,6 @@ async def test_the_monitor_hears_how_long_sensor_and_tablet_are_silent(place, be
     )
     assert told["presence"]["stride_ago_s"] >= 0
     assert told["presence"]["tablet_ago_s"] >= 0
-
-
-async def test_a_plan_from_before_today_runs_on(place, begun):
-    session = await begun(place, *TWO, valence="positive")
-    await restart()
-    stored = await TrainingSession.everywhere.aget(pk=session.pk)
-    for name in ("alternatives", "language"):
-        del stored.plan[name]
-    await sync_to_async(stored.save)(update_fields=["plan"])
-    monitor = place.monitor(session)
-    assert [one["slug"] for one in (await monitor.watch())["types"]] == ["positive"]
-    assert (await monitor.change("valence", "negative"))["code"] == "refused"
 
 
 # --- beside the socket ----------------------------------------------------------------------------

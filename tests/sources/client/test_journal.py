@@ -62,7 +62,7 @@ def test_what_was_not_acknowledged_is_there_again(tmp_path):
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     said: list[str] = []
     with opened(path, said) as journal:
-        assert (journal.kept.session, journal.kept.side, journal.kept.state) == (
+        assert (journal.saved.session, journal.saved.side, journal.saved.state) == (
             (7, "left", "running")
         )
         again = StepQueue(journal, marks_late=True)
@@ -86,7 +86,7 @@ def test_a_torn_end_costs_nothing_that_was_whole(tmp_path_factory, cut, is_blank
     path.write_bytes(data[:at] + (b"\0" * 700 if is_blank else b""))
     with opened(path) as journal:
         whole = data[:at].count(b"\n") - 3
-        assert values(journal.kept) == [n / 10 for n in range(1, whole + 1)]
+        assert values(journal.saved) == [n / 10 for n in range(1, whole + 1)]
 
 
 def test_a_failing_disk_is_said_and_what_it_holds_is_put_aside(tmp_path):
@@ -97,7 +97,7 @@ def test_a_failing_disk_is_said_and_what_it_holds_is_put_aside(tmp_path):
     damaged = path.read_bytes().replace(b'"value":0.3', b'"value":9.3')
     path.write_bytes(damaged)
     with opened(path, said) as journal:
-        assert values(journal.kept) == [0.1, 0.2]
+        assert values(journal.saved) == [0.1, 0.2]
     assert "is damaged from byte" in said[0]
     assert (tmp_path / "journal.damaged").read_bytes() == damaged
 
@@ -301,7 +301,7 @@ async def test_hours_offline_over_a_restart_end_up_once_in_the_log(tmp_path):
     assert [step["value"] for step in garry.log] == [n / 10 for n in range(1, 17)]
     assert [step["number"] for step in garry.log if step.get("late")] == [6, 7, 8, 9, 10]
     with opened(path) as journal:
-        assert not journal.kept.steps
+        assert not journal.saved.steps
 
 
 def test_the_command_line_names_a_journal_that_cannot_be_used(tmp_path, capsys):

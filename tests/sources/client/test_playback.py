@@ -34,9 +34,9 @@ def steady(times_s, phases=None):
     """Walk at these times; write down the phases."""
     left = list(enumerate(times_s, start=1))
 
-    def walk(phase):
+    def walk(display):
         if phases is not None:
-            phases.append(phase.kind)
+            phases.append(display.phase.kind)
         if not left:
             return None
         number, time_s = left.pop(0)

@@ -202,7 +202,9 @@ async def test_a_simulated_patient_walks_in_the_phases_that_the_server_tells(gar
     strides = iter(range(40))
 
     def open_walk(side):
-        return lambda phase: walker.next_stride(phase) if next(strides, None) is not None else None
+        return lambda shown: (
+            walker.next_stride(shown.phase) if next(strides, None) is not None else None
+        )
 
     ours = Time()
 

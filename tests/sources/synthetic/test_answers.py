@@ -1,5 +1,6 @@
 """Synthetic walkers answer what they are shown, differ from each other, and remember their pace."""
 
+from argparse import Namespace
 from dataclasses import replace
 from itertools import pairwise
 from statistics import correlation, mean, stdev
@@ -7,7 +8,9 @@ from statistics import correlation, mean, stdev
 import numpy as np
 import pytest
 
+from rehab.sources.client import Display
 from rehab.sources.synthetic import ANSWERS, GOOD, PROFILES, SyntheticWalker, walk
+from rehab.sources.synthetic.source import SyntheticSource
 from rehab.training.phases import make_phase
 from rehab.training.steps import Side
 from tests.sources.synthetic.protocols import usable
@@ -23,6 +26,18 @@ def find_plateau(gain, seed=1, goal_w_kg=None, profile=GOOD):
     walker.goal_w_kg = goal_w_kg
     strides = [walker.next_stride(training(gain)) for _ in range(1200)]
     return mean(usable(strides[-300:])) / profile.baseline_w_kg
+
+
+@pytest.mark.parametrize("valence", ["positive", "explicit"])
+def test_a_live_walker_answers_as_a_headless_one(valence):
+    """By the goal and the feedback type that the server sends."""
+    options = Namespace(seed=3, profile="good", side=None, signals=False, strides=None)
+    live = SyntheticSource(options, print).open_walk(Side.LEFT)
+    headless = SyntheticWalker(GOOD, 3, Side.LEFT, valence)
+    headless.goal_w_kg = 4.4
+
+    for _ in range(300):
+        assert live(Display(training(0.9), 4.4, valence)) == headless.next_stride(training(0.9))
 
 
 def test_the_plateau_follows_the_gain():

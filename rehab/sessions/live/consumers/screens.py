@@ -133,7 +133,7 @@ class ScreenConsumer(Socket):
         self, live: LiveSession, subscriber: Subscriber, after: int, until: int
     ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan, announced = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
+        plan, announced = live.aggregate.fold.plan, tuple(live.aggregate.fold.delivery.reported)
         while after < until:
             steps = await read_backlog(live.id, after, until)
             if not steps:

@@ -25,7 +25,7 @@ from rehab.training.changes import OPEN_STATES, State
 
 MAX_ENDED = 40  # ended sessions of today that are listed; open ones are all listed
 OPEN_TOO_LONG = timedelta(hours=3)  # no visit takes as long
-REVOKED_ALERT_FOR = timedelta(days=7)  # how long an alert tells of a revoked device
+REVOKED_ALERT_FOR = timedelta(days=7)  # how long a revoked device is an alert
 # Running sessions come first, then those that can go on, then those that have ended.
 STATE_ORDER = [State.RUNNING, State.PAUSED, State.READY, State.FINISHED, State.ABORTED]
 
@@ -45,7 +45,7 @@ class SessionRow:
 
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """A problem that somebody should solve, and the page where it is solved."""
+    """A problem, and the page where it is solved."""
 
     message: str
     url_name: str
@@ -118,7 +118,7 @@ def find_alerts(
     for row in today:
         too_long = row.is_open and now - row.session.began_at > OPEN_TOO_LONG
         if too_long and may_see_names(user.role):
-            message = gettext("The session of %(name)s is open since %(time)s. End it.")
+            message = gettext("The session of %(name)s has been open since %(time)s. End it.")
             names = {"name": row.patient, "time": row.time}
             yield Alert(message % names, "monitor", row.session.pk)
     for status in stations:

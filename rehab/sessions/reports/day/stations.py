@@ -28,7 +28,7 @@ class StationStatus:
 def station_statuses(
     user: User, open_sessions: list[TrainingSession], now: datetime
 ) -> Iterator[StationStatus]:
-    """Yield the status of each station that somebody sees."""
+    """Yield the status of each station that a user sees."""
     devices: defaultdict[int, list[Device]] = defaultdict(list)
     for device in Device.objects.visible_to(user).order_by("kind", "name"):
         devices[device.station_id].append(device)

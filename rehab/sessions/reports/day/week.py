@@ -21,7 +21,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.trend import with_metrics
+from rehab.sessions.reports.trend import to_percent, with_metrics
 from rehab.training.valences import VALENCES
 
 
@@ -69,8 +69,8 @@ class WeekSummary:
                 {
                     "slug": totals.slug,
                     "label": totals.label,
-                    "hit": totals.hit_rate and round(100 * totals.hit_rate, 1),
-                    "wanted": totals.target_hit_rate and round(100 * totals.target_hit_rate, 1),
+                    "hit": to_percent(totals.hit_rate),
+                    "wanted": to_percent(totals.target_hit_rate),
                 }
                 for totals in self.types
                 if totals.hit_rate is not None

@@ -22,6 +22,11 @@ def test_its_topics_are_chosen():
     assert (base.abilities.bumpers, base.abilities.closed_loop) == (True, False)
 
 
+def test_only_a_base_that_stops_by_itself_needs_no_relay():
+    assert base_of()._client.topics.relay.name == "/garry/cmd_vel"
+    assert base_of("--own-timeout-s", "0.6")._client.topics.relay is None
+
+
 @pytest.mark.parametrize(
     ("words", "cure"),
     [

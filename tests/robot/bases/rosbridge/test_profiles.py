@@ -8,7 +8,7 @@ import pytest
 from robot.bases.base import Indication
 from robot.bases.rosbridge.topics import PROFILES
 from robot.motion.twist import STILL, Twist
-from robot.ros.frames import Publication, read_frame, to_text
+from robot.ros.frames import BadRosFrame, Publication, read_frame, to_text
 from robot.ros.messages import read_event, read_hazards, read_twist, write_twist
 from robot.ros.signals import LIGHT_TYPES, SOUND_TYPES, write_light, write_sound
 from tests.support.rosbridge_stage import Stage, moving
@@ -30,6 +30,14 @@ def test_events_of_ros_1_and_2(package, between, event, field):
     kind = f"{package}{between}{event}"
     assert read_event(kind, {field: 2, "state": 1}) == (2, True)
     assert read_event(kind, {field: 0, "state": 0}) == (0, False)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"bumper": "1"}, {"bumper": 256}, {"state": None}, {"state": True}]
+)
+def test_an_event_that_cannot_be_is_refused(bad):
+    with pytest.raises(BadRosFrame):
+        read_event("kobuki_msgs/BumperEvent", {"bumper": 1, "state": 1} | bad)
 
 
 @pytest.mark.parametrize("kind", ["std_msgs/Bool", "std_msgs/msg/Bool"])

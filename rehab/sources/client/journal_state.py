@@ -1,4 +1,4 @@
-"""What a journal keeps, and its lines: the CRC-32 of a JSON object, and the object."""
+"""What a journal saves, and its lines: the CRC-32 of a JSON object, and the object."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Message = dict[str, Any]
 
 
 @dataclass
-class Kept:
+class JournalState:
     """What a source has to know to go on where it was.
 
     ``unsent_from`` is the first number that was given without a word of the server since the
@@ -27,10 +27,10 @@ class Kept:
     unsent_from: int | None = None
     steps: list[Message] = field(default_factory=list)
 
-    def after(self, entry: Message) -> Kept:
-        """Return what is kept after a line. Raises KeyError, TypeError or ValueError."""
+    def after(self, entry: Message) -> JournalState:
+        """Return the state after a line. Raises KeyError, TypeError or ValueError."""
         if "session" in entry:
-            return Kept(**entry)
+            return JournalState(**entry)
         if "step" in entry:
             step = entry["step"]
             if step["number"] <= self.last:
@@ -69,7 +69,7 @@ def read_line(line: bytes) -> Message | None:
     return entry if isinstance(entry, dict) else None
 
 
-def fitting(
+def select_fitting(
     head: Iterable[bytes], steps: list[Message], max_bytes: int
 ) -> tuple[list[bytes], bool]:
     """Return the lines that have room, oldest steps first, and whether these are all."""

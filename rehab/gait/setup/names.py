@@ -1,0 +1,128 @@
+"""What the label of a column says that it is.
+
+Labels of Plug-in Gait, CGM2, HBM, Visual3D, Theia, Qualisys and OpenSim differ in how they write
+the same words: a side, a joint, a quantity, a plane. Labels are therefore split into words
+(``LAnkleMoment.X``, ``L_ANKLE_MOMENT_X`` and ``Left Ankle Moment X`` alike) and compared with the
+table below.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+SIDE = re.compile(r"\b(?:(left|lt|l)|(right|rt|r))(?=\d?\b| ?ank)")
+ANKLE = re.compile(r"\b[lr]?ank(le)?\b|\b[lr]?ankle|\b[lr]?ank(mom|ang)")
+# Joints and quantities that are none of ours, wherever they stand in a label.
+OTHER = [
+    "knee",
+    "hip",
+    "pelvi",
+    "trunk",
+    "thora",
+    "spine",
+    "neck",
+    "head",
+    "shoulder",
+    "elbow",
+    "wrist",
+    "waist",
+    "lumbar",
+    "subtalar",
+    "mtp",
+    "toe",
+    "abs",
+    "progress",
+    "power",
+    "pow",
+    "vel",
+    "acc",
+    "inver",
+    "ever",
+    "rotation",
+    "adduction",
+    "abduction",
+    "arm",
+    "pressure",
+    "emg",
+]
+MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b")
+ANGLE = re.compile(r"\bang(le)?s?\b|[a-z]angles?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b")
+FORCE = re.compile(
+    r"\bplates (left|right)\b|\bvert(ical)?\b|\bforce n\b|\b[lr]?f ?z ?\d*\b"
+    r"|\b(forces?|for|grfs?|fp ?\d*|plate ?\d*) ?\d*( [lr]| left| right)? ?v? ?[yz] ?\d*\b"
+    r"|\bv[yz]\b"
+)
+NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank")
+PLANE = re.compile(r"\b([xyz])\b(?: theia)?$")
+# Which direction a label counts as positive, by the program that writes it.
+SIGNS = (
+    ("angle", re.compile(r"^(?!.*dorsi).*plantar"), 1),
+    ("angle", re.compile(r"^(?!.*plantar).*dorsi"), -1),
+    ("angle", re.compile(r"^ankle angle [lr]\b"), -1),  # OpenSim
+    ("angle", re.compile(r"^[lr] ankle angles\b"), -1),  # Plug-in Gait, CGM2
+    ("moment", re.compile(r"^(?!.*dorsi).*plantar"), 1),
+    ("moment", re.compile(r"^ankle angle [lr] moment"), -1),  # OpenSim
+)
+UNITS = {
+    "n": "N", "newton": "N", "newtons": "N", "kn": "kN", "mn": "mN", "kgf": "kgf", "lbf": "lbf",
+    "n/kg": "N/kg", "bw": "body weights", "nm": "Nm", "nmm": "Nmm", "knm": "kNm",
+    "nm/kg": "Nm/kg", "nmm/kg": "Nmm/kg", "lbfft": "lbf·ft", "lbfin": "lbf·in", "rad": "rad",
+    "radians": "rad", "mrad": "mrad", "deg": "°", "degree": "°", "degrees": "°", "°": "°",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """What a label says: a channel, the leg (or empty), whether its plane, and its sign (or 0)."""
+
+    channel: str
+    side: str
+    is_sagittal: bool
+    sign: int
+
+
+def read_label(column: str) -> Label | None:
+    """Return what a column's label says, None where it names none of our channels."""
+    words = split_label(column)
+    found = SIDE.findall(words)
+    sides = {"left" if left else "right" for left, _ in found}
+    side = sides.pop() if len(sides) == 1 else ""
+    if any(other in words for other in OTHER):
+        return None
+    if FORCE.search(words) and not NO_FORCE.search(words):
+        return Label("force", side, True, 0)
+    is_own = bool(re.search(r"\b(left|right) (moment nm|angle rad)$", words))
+    if not side or not (ANKLE.search(words) or is_own):
+        return None
+    channel = "moment" if MOMENT.search(words) else "angle" if ANGLE.search(words) else ""
+    if not channel:
+        return None
+    plane = PLANE.search(words)
+    signs = [sign for what, form, sign in SIGNS if what == channel and form.search(words)]
+    is_sagittal = plane is None or plane[1] == "x"
+    return Label(channel, side, is_sagittal, signs[0] if signs else 0)
+
+
+def names_another(column: str) -> bool:
+    """Return whether a label names something that is none of our channels, or a marker's axis."""
+    words = split_label(column)
+    return any(other in words for other in OTHER) or bool(
+        re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words)
+    )
+
+
+def read_unit(column: str, units: dict[str, str]) -> str:
+    """Return a column's unit by its file, or by its label (``Fz [N]``, ``ankle_deg``), or empty."""
+    written = units.get(column, "")
+    if not written:
+        ending = re.search(r"[\[(]([^\])]+)[\])]\s*$|_(nm|n|rad|deg|degrees)$", column.lower())
+        written = (ending[1] or ending[2]) if ending else ""
+    return UNITS.get(re.sub(r"[\s.·*_^-]|newton-?(?=m)", "", written.lower()), "")
+
+
+def split_label(column: str) -> str:
+    """Return a label's words in lower case, without its unit."""
+    bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", column.rpartition(":")[2])
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", bare)
+    return re.sub(r"[\W_]+", " ", spaced).strip().lower()
