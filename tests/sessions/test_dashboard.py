@@ -262,7 +262,7 @@ def test_a_host_sees_clinics_and_the_server_and_no_patient(world, rosa):
 
 def test_models_stand_under_headings_with_a_line_each(world):
     page = front(world.people[Role.LEAD])
-    headings = re.findall(r'<section class="heading[^>]*>\s*<h2>(.*?)</h2>', page)
+    headings = re.findall(r'<section class="module\b[^>]*>\s*<h2>(.*?)</h2>', page)
     assert headings[:5] == [
         "Patients &amp; sessions",
         "Feedback &amp; protocols",

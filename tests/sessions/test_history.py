@@ -114,7 +114,7 @@ def test_phases_and_events_are_told(client, patient):
     of_goal = (2.5 / 2.0 + 2.5 / 2.4 + 1.5 / 2.4 + 1.5 / 2.4) / 4
     assert f"Training Positive 1.00 4 4 2 50 % 2.00 {100 * of_goal:.0f} %" in rows
     told = [
-        words(item) for item in re.findall(r"<li class=\"\w+\">\s*<time.*?</li>", page, re.DOTALL)
+        words(item) for item in re.findall(r"<li class=\"row wrap \w+\">\s*<time.*?</li>", page, re.DOTALL)
     ]
     assert [line.split(" ", 1)[1] for line in told] == [
         "Started",
@@ -127,7 +127,7 @@ def test_phases_and_events_are_told(client, patient):
         "Phase: Baseline after stride 7",
         "Finished after stride 8",
     ]
-    figures = words(re.search(r'<ul class="figures">.*?</ul>', page, re.DOTALL)[0])
+    figures = words(re.search(r'<ul class="figures\b[^>]*>.*?</ul>', page, re.DOTALL)[0])
     assert "Hit rate 50 %" in figures
     assert "Score 2 points" in figures
     assert "Goal 2.40 W/kg, changed 1 ×" in figures

@@ -36,7 +36,7 @@ def history(client: Client, patient: Patient, asked: str = "") -> str:
 
 def items(page: str) -> list[str]:
     """Return the words of each session in the list, markup left out."""
-    return [words(item) for item in re.findall(r'<a class="item".*?</a>', page, re.DOTALL)]
+    return [words(item) for item in re.findall(r'<a class="item\b.*?</a>', page, re.DOTALL)]
 
 
 # --- the list -------------------------------------------------------------------------------------
@@ -67,7 +67,7 @@ def test_chips_count_each_type_and_filter_by_it(client, patient):
     sessions = {v: walk(patient, v, strides(3, 2)) for v in ("positive", "negative", "binary")}
     walk(patient, "positive", strides(4, 2))
     page = history(client, patient)
-    chips = words(re.search(r'<nav class="chips".*?</nav>', page, re.DOTALL)[0])
+    chips = words(re.search(r'<nav class="chips\b.*?</nav>', page, re.DOTALL)[0])
     assert chips == "All 4 Positive 2 Negative 1 Binary 1 Explicit 0"
     page = history(client, patient, "?type=binary")
     assert len(items(page)) == 1

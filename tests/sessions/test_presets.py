@@ -71,7 +71,7 @@ def preset_of(world: World, *, name: str = "Challenge", **options: Any) -> Prese
 
 def filled(page: str) -> dict[str, str]:
     """Return what a set-up would send: checked choices, numbers, selected options."""
-    page = page[page.index('class="set-up"') :]
+    page = page[page.index('class="set-up ') :]
     found = dict(re.findall(r'<input\s+class="num"\s+name="(\w+)"[^>]*\svalue="([^"]*)"', page))
     for tag in re.findall(r"<input\s[^>]*type=\"radio\"[^>]*>", page):
         if "checked" in tag:
@@ -148,7 +148,7 @@ def test_another_clinics_preset_is_not_offered(pt, patient):
     foreign = birch.rows[Preset]
     page = pt.get(f"/patients/{patient.pk}/new/?preset={foreign.pk}").content.decode()
     assert mark("birch", Preset) not in page
-    assert re.search(r'class="preset"\s+href="/patients', page)
+    assert re.search(r'class="preset\b[^"]*"\s+href="/patients', page)
     assert filled(page)["valence"] == "positive"  # like last time
 
 

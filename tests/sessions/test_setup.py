@@ -417,5 +417,5 @@ def test_who_has_not_walked_is_not_offered_what_was_last_time(pt, patient, stati
 def test_a_taken_station_leads_to_its_session(pt, patient, station):
     pt.post(f"/patients/{patient.pk}/new/", choices(station))
     page = pt.post(f"/patients/{patient.pk}/new/", choices(station)).content.decode()
-    problem = re.search(r'<div class="wrong".*?</div>', page, re.DOTALL)[0]
+    problem = re.search(r'<div class="wrong\b.*?</div>', page, re.DOTALL)[0]
     assert f'href="/sessions/{newest().pk}/monitor/"' in problem

@@ -157,7 +157,12 @@ def _read_mass(file: Any) -> float | None:
 
 
 def _read_values(file: Any, group: str, name: str) -> Any:
-    return file["parameters"].get(group, {}).get(name, {}).get("value", [])
+    """Return the values of a parameter; ``?`` stands for a byte that is no character."""
+    values = file["parameters"].get(group, {}).get(name, {}).get("value", [])
+    return [
+        value.encode(errors="replace").decode() if isinstance(value, str) else value
+        for value in values
+    ]
 
 
 def _read_rate(file: Any, group: str) -> float:
