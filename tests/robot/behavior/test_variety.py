@@ -79,6 +79,7 @@ def session(number):
     return stage
 
 
+@pytest.mark.wide
 def test_ten_minutes_repeat_nothing_within_four_and_repeat_exactly():
     stage = session(7)
     answered = [one for one in stage.of("decision") if one["gesture"]]
