@@ -29,7 +29,7 @@ from robot.behavior.performer import Performer, control_loop
 from robot.behavior.safety import BASE_SILENT, BASE_SILENT_S
 from robot.calibration import BadCalibration, apply_calibration
 from robot.motion.gesture import Gesture
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import BUILT_IN
 from robot.motion.limits import TICK_S
 from robot.motion.player import DONE
 from robot.motion.pose import HOME
@@ -153,7 +153,9 @@ def format_result(played: dict[str, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play the gesture of the command line, and return the exit status."""
     parser = make_command_parser("gesture", __doc__)
-    parser.add_argument("name", choices=sorted(GESTURES | ORIGINALS))
+    parser.add_argument(
+        "name", choices=sorted(BUILT_IN), metavar="NAME", help="celebrate, joy_1, …"
+    )
     moving = sorted(name for name, base in BASES.items() if base.abilities.moves)
     add_base_arguments(parser, moving)
     parser.add_argument("--times", type=int, default=1, metavar="N", help="so often, in a row")
@@ -166,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with ending_by_signals(), base:
             apply_calibration(base)
             for _ in range(options.times):
-                played = play_gesture((GESTURES | ORIGINALS)[options.name], base, monotonic, sleep)
+                played = play_gesture(BUILT_IN[options.name], base, monotonic, sleep)
                 text = json.dumps(played) if options.json else format_result(played)
                 print_line(text, sys.stdout)
                 outcome = played["outcome"]

@@ -14,6 +14,7 @@ from itertools import pairwise
 from rehab.training.bands import BANDS_MAX, TEXT_MAX, Band, Confetti
 from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
+from robot.wire.cue_limits import VARIED
 
 # Larger numbers say no more to a patient, and overflow where points are stored.
 POINTS_MAX = 1000
@@ -29,7 +30,10 @@ class Emblem(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CueGestures:
-    """Which gesture a robot performs after a window above or below its threshold; None for none."""
+    """Which gesture a robot performs after a window above or below its threshold; None for none.
+
+    ``VARIED``, or the name of a pool, leaves the variant to the robot; any other name fixes it.
+    """
 
     above: str | None = None
     below: str | None = None
@@ -150,7 +154,7 @@ POSITIVE = Valence(
         Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
         Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
-    cue=CueGestures(above="celebrate"),
+    cue=CueGestures(above=VARIED),
 )
 NEGATIVE = Valence(
     slug="negative",
@@ -163,7 +167,7 @@ NEGATIVE = Valence(
         Band(0.75, gettext_noop("Below the goal.")),
         Band(1, gettext_noop("No points lost.")),
     ),
-    cue=CueGestures(below="droop"),
+    cue=CueGestures(below=VARIED),
 )
 BINARY = Valence(
     slug="binary",
@@ -178,7 +182,7 @@ BINARY = Valence(
         Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
         Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
-    cue=CueGestures(above="celebrate", below="droop"),
+    cue=CueGestures(above=VARIED, below=VARIED),
 )
 EXPLICIT = Valence(
     slug="explicit",

@@ -20,7 +20,6 @@ from robot.motion.response import AT_ONCE
 from robot.motion.twist import STILL
 
 CANNOT_MOVE = "base_cannot_move"
-SAD = ("droop", "original_negative")  # of the gestures that are played alone
 
 
 class Body:
@@ -140,7 +139,7 @@ class Body:
         if not reason and not safety.is_at_home(state):
             reason = AWAY
         if not reason:
-            answer = Answer(gesture.name, gesture.name not in SAD)
+            answer = Answer(gesture.name, gesture.score.mood != "sad")
             self.start(gesture.scaled(safety.share), now_s, state, answer)
         return reason
 

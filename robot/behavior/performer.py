@@ -18,9 +18,10 @@ from robot.behavior.cue import QUIET_PACE, Cue
 from robot.behavior.gesture_library import GestureLibrary
 from robot.behavior.safety import AWAY, LAPSED_S, STOPPED
 from robot.behavior.status import Report
+from robot.behavior.variety import Variety
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import BUILT_IN, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
@@ -69,11 +70,12 @@ class Performer:
         self,
         base: MobileBase,
         limits: Limits = DEFAULT_LIMITS,
-        gestures: Mapping[str, Gesture] = GESTURES | ORIGINALS,
+        gestures: Mapping[str, Gesture] = BUILT_IN,
     ) -> None:
         self.body = Body(base, limits)
         self.gestures = GestureLibrary(gestures, limits)
         self.decider = WindowDecider(Cue())
+        self.variety = Variety(seed=0)
         self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad_message = ""
@@ -202,6 +204,7 @@ class Performer:
                 raise BadFrame("A welcome says in which state the session is.")
             if session != self.session:
                 self.decider = WindowDecider(cue)
+                self.variety = Variety(seed=session)
                 self.reports.clear()
             self._set_cue(cue)
             self.decider.drop_window()
@@ -254,11 +257,13 @@ class Performer:
     def _respond(self, decision: Decision, now_s: float) -> None:
         """Report a decision, and start the gesture that follows from it."""
         state, cue = self.body.read(), self.decider.cue
+        self.variety.observe(decision)
         name, share = cue.gesture(decision.above), self.decider.share
         reason = self.decider.blocking_reason(decision, performing=self.body.player.is_busy)
-        gesture = None
+        gesture = choice = None
         if not reason and name is not None:
-            gesture, reason = self.gestures.find(name)
+            choice = self.variety.choose(name, decision)
+            gesture, reason = (choice.gesture, "") if choice else self.gestures.find(name)
         if gesture is not None:
             reason = self.body.refusal_reason(gesture, state)
         if reason or gesture is None:
@@ -266,12 +271,15 @@ class Performer:
             return
         # The paper's own gestures replicate it, and are the same every time.
         strength = 1.0 if gesture.name in ORIGINALS else decision.strength
-        intensity = round(cue.intensity * strength * self.body.safety.share, 3)
-        self.body.status.report_decision(decision, share, gesture.name, intensity)
-        answer = Answer(gesture.name, decision.above, cue.is_quiet, intensity)
+        intensity, most = cue.intensity * strength, self.body.safety.share
+        size = round(max(intensity, gesture.least) * most, 3)
+        self.body.status.report_decision(decision, share, gesture.name, size, choice=choice)
+        answer = Answer(gesture.name, decision.above, cue.is_quiet, round(intensity * most, 3))
         pace = QUIET_PACE if cue.is_quiet else 1.0
-        self.body.start(gesture.scaled(intensity), now_s, state, answer, pace)
+        self.body.start(gesture.scaled(size), now_s, state, answer, pace)
         self.decider.mark_started(decision)
+        if choice is not None:
+            self.variety.mark_started(choice)
 
     def _state(self, there: BaseState) -> tuple[str, str]:
         """Return the robot's state, and why it would not perform now, as codes."""

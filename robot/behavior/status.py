@@ -9,6 +9,7 @@ from typing import Any
 
 from robot.bases import BaseState, Indication, MobileBase
 from robot.behavior.safety import BATTERY_WARN_V, battery_share
+from robot.behavior.variety import Choice
 from robot.behavior.window_decider import Decision
 from robot.motion.gesture import Gesture
 from robot.motion.score import Color
@@ -93,6 +94,7 @@ class StatusReporter:
         gesture: str | None = None,
         intensity: float | None = None,
         reason: str = "",
+        choice: Choice | None = None,
     ) -> None:
         """Report a decision, and the gesture that follows or why none does.
 
@@ -106,9 +108,18 @@ class StatusReporter:
             The gesture's name, and the share of its size, 0.1 to 1; None where none follows.
         reason
             Why none follows, as a code.
+        choice
+            Which pool the gesture is from, and by which seed; None for one that the cue names.
         """
-        report = {"kind": "decision", "gesture": gesture, "intensity": intensity, "reason": reason}
+        report: Report = {
+            "kind": "decision",
+            "gesture": gesture,
+            "intensity": intensity,
+            "reason": reason,
+        }
         decided = {name: getattr(decision, name) for name in REPORTED}
+        if choice is not None:
+            report |= {"pool": choice.pool, "seed": choice.seed}
         self.report(report | decided | {"activated_share": share})
 
     def report_status(

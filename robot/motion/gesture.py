@@ -72,13 +72,15 @@ class Waypoint:
 class Gesture:
     """What a base performs: waypoints in their order, of which the last is home, and a score.
 
-    Raises BadGesture for what no base with the default limits should or could perform.
+    ``least`` is the share of its size below which no answer performs it. Raises BadGesture for
+    what no base with the default limits should or could perform.
     """
 
     name: str
     label: str
     waypoints: tuple[Waypoint, ...]
     score: Score = NEUTRAL
+    least: float = 0.0
 
     def __post_init__(self) -> None:
         check_gesture(self)

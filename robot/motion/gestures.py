@@ -6,7 +6,9 @@ import math
 
 from robot.marking import gettext_noop
 from robot.motion.gesture import Gesture, Waypoint
+from robot.motion.pools import POOLS, VARIANTS
 from robot.motion.score import FALLING, RISING
+from robot.wire.cue_limits import VARIED
 
 # Up to 3 s each, so that a base that answers late is home and still before the next window of 5 s
 # ends, its announcement included. Out and back is what a patient sees of a round base; it goes out
@@ -93,3 +95,7 @@ ORIGINAL_BINARY = Gesture(
 ORIGINALS: dict[str, Gesture] = {
     gesture.name: gesture for gesture in (ORIGINAL_POSITIVE, ORIGINAL_NEGATIVE, ORIGINAL_BINARY)
 }
+
+BUILT_IN = GESTURES | VARIANTS | ORIGINALS  # all that a robot can play, by name
+# All that a cue may name: a gesture is performed each time, of a pool another variant each time.
+KNOWN_NAMES = frozenset({*BUILT_IN, *POOLS, VARIED})

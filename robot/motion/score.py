@@ -95,26 +95,27 @@ def notes(*frequencies_hz: float, at_s: float = 0.0, each_s: float = 0.12) -> tu
     )
 
 
-C5, E5, G5, C6 = 523.25, 659.26, 783.99, 1046.50
-A4, F4, D4 = 440.0, 349.23, 293.66
+C5, E5, G5, C6, E6, G6 = 523.25, 659.26, 783.99, 1046.50, 1318.51, 1567.98
+A4, F4, D4, A3 = 440.0, 349.23, 293.66, 220.0
 _ANNOUNCED = Light(0.0, Color.ORANGE, Color.OFF)
 
 # Success rises, and its lights with it. What did not succeed falls, low and short: a sigh and
-# never the sound of success.
-RISING = Score(
-    (
-        _ANNOUNCED,
-        Light(0.5, Color.GREEN, Color.OFF),
-        Light(1.3, Color.GREEN, Color.GREEN),
-        Light(1.8, Color.ORANGE, Color.GREEN),
-        Light(2.3, Color.GREEN, Color.GREEN),
-    ),
-    (*notes(C5, E5, G5), *notes(G5, C6, at_s=1.3)),
+# never the sound of success. What nearly did stays on its note.
+_GLAD = (
+    _ANNOUNCED,
+    Light(0.5, Color.GREEN, Color.OFF),
+    Light(1.3, Color.GREEN, Color.GREEN),
+    Light(1.8, Color.ORANGE, Color.GREEN),
+    Light(2.3, Color.GREEN, Color.GREEN),
 )
-FALLING = Score(
-    (_ANNOUNCED, Light(0.5, Color.ORANGE, Color.ORANGE), Light(1.8, Color.OFF, Color.ORANGE)),
-    notes(A4, F4, D4, each_s=0.15),
-)
+_SAD = (_ANNOUNCED, Light(0.5, Color.ORANGE, Color.ORANGE), Light(1.8, Color.OFF, Color.ORANGE))
+RISING = Score(_GLAD, (*notes(C5, E5, G5), *notes(G5, C6, at_s=1.3)))
+RISING_HIGH = Score(_GLAD, (*notes(E5, G5, C6), *notes(C6, E6, at_s=1.3)))
+RISING_LONG = Score(_GLAD, (*notes(C5, E5, G5, C6, each_s=0.1), *notes(C6, E6, G6, at_s=1.3)))
+FALLING = Score(_SAD, notes(A4, F4, D4, each_s=0.15))
+LOW_FALLING = Score(_SAD, notes(F4, D4, A3, each_s=0.15))
+SIGHING = Score(_SAD, notes(A4, F4, each_s=0.2))
+ASKING = Score(_SAD[:2], notes(A4, A4, each_s=0.15))
 # Neither: one note tells that it is about to move.
 NEUTRAL = Score((_ANNOUNCED,), notes(A4))
 

@@ -11,6 +11,8 @@ WINDOW_MIN_S, WINDOW_MAX_S = 2.0, 60.0  # two steps at least, and still an answe
 REST_MAX_S = 600.0
 COUNT_MAX = 100
 
+VARIED = "varied"  # in place of a gesture: one of a pool that follows from the walking
+
 
 class CueRule(StrEnum):
     """What a gesture answers."""

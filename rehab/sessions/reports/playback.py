@@ -34,7 +34,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.steps import InvalidMeasurement, Measurement
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import parse_gesture
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import BUILT_IN
 from robot.motion.preview import preview
 from robot.wire.frames import BadFrame
 
@@ -148,7 +148,7 @@ def _ordered(
     session: TrainingSession, rows: list[tuple[datetime, Row]], began: datetime
 ) -> Iterator[Message]:
     """Yield the gestures that its robot began, as they were ordered."""
-    known = {**GESTURES, **ORIGINALS}
+    known = dict(BUILT_IN)
     for data in session.to_plan().gestures:
         try:
             known[str(data["name"])] = parse_gesture(data)

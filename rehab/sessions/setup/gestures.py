@@ -17,7 +17,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import KNOWN_NAMES
 
 # Choices beside gestures, whose names have no parentheses.
 DEFAULT_GESTURE, NO_GESTURE = "(usual)", "(nothing)"
@@ -35,7 +35,7 @@ def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
 def known_gesture_choices(by: User) -> set[str]:
     """Return all choices without their labels."""
     composed = ComposedGesture.objects.visible_to(by).values_list("name", flat=True)
-    return {DEFAULT_GESTURE, NO_GESTURE, *GESTURES, *ORIGINALS, *composed}
+    return {DEFAULT_GESTURE, NO_GESTURE, *KNOWN_NAMES, *composed}
 
 
 def cue_from_choices(above: str, below: str, valence: str, patient: Patient) -> CueGestures:
@@ -52,7 +52,7 @@ def choices_from_cue(cue: CueGestures, valence: str, patient: Patient, by: User)
     """Return the choices for a cue; the default for a gesture that was deleted."""
     default = valences_of(patient.clinic_id)[valence].cue
     composed = ComposedGesture.objects.visible_to(by).values_list("name", flat=True)
-    known = {None, *GESTURES, *ORIGINALS, *composed}
+    known = {None, *KNOWN_NAMES, *composed}
     return _choice(cue.above, default.above, known), _choice(cue.below, default.below, known)
 
 
@@ -68,7 +68,7 @@ def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, 
     Raises InvalidSetting for an unknown gesture, and for one that no robot would play.
     """
     named = {name for name in (cue.above, cue.below) if name is not None}
-    for name in sorted(named - GESTURES.keys() - ORIGINALS.keys()):
+    for name in sorted(named - KNOWN_NAMES):
         row = ComposedGesture.everywhere.filter(clinic=patient.clinic_id, name=name).first()
         if row is None:
             raise InvalidSetting(

@@ -11,7 +11,7 @@ from robot.bases import Abilities, BaseState, SensorState
 from robot.behavior import safety as rules
 from robot.behavior.resistance import MISSED_M, WORK_J
 from robot.behavior.safety import Safety
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import BUILT_IN
 from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL, Twist
 from tests.support.extent import examples
@@ -308,7 +308,7 @@ def test_a_battery_s_share_follows_from_its_voltage(battery_v, share):
 OPEN = Abilities(simulated=False, moves=True, closed_loop=False)
 
 
-@pytest.mark.parametrize("gesture", (GESTURES | ORIGINALS).values(), ids=lambda one: one.name)
+@pytest.mark.parametrize("gesture", BUILT_IN.values(), ids=lambda one: one.name)
 def test_an_open_loop_refuses_long_gestures_and_halves_the_others(gesture):
     closed, opened = Safety(REAL), Safety(OPEN)
     assert (closed.rejection_reason(gesture), closed.share) == ("", 1.0)

@@ -10,12 +10,14 @@ from robot.motion.gesture import TETHER_M, Gesture, Waypoint
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import Limits
 from robot.motion.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
+from robot.motion.pools import VARIANTS
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
 from tests.support.extent import examples
 
-each_gesture = pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda g: g.name)
-gestures = st.sampled_from(list(GESTURES.values()))
+SHORT = GESTURES | VARIANTS
+each_gesture = pytest.mark.parametrize("gesture", SHORT.values(), ids=lambda g: g.name)
+gestures = st.sampled_from(list(SHORT.values()))
 
 
 class Floor:
@@ -44,12 +46,12 @@ def is_at_home(pose):
 
 
 @each_gesture
-def test_a_gesture_is_over_within_3_s_and_ends_at_home(gesture):
+def test_a_gesture_is_over_in_about_3_s_and_ends_at_home(gesture):
     player, floor = Player(Limits()), Floor()
     player.start(gesture, 0.0, HOME)
     floor.play(player)
     assert player.outcome == DONE
-    assert floor.time_s <= 3.0
+    assert floor.time_s <= (3.0 if gesture.name in GESTURES else 3.3)
     assert floor.farthest_m + abs(floor.pose.heading_rad) > 0  # something was to be seen
     assert is_at_home(floor.pose)
     assert floor.orders[-1] == STILL

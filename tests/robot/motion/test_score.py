@@ -13,12 +13,13 @@ from robot.behavior.expression import Expression
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, parse_gesture, to_data
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import BUILT_IN, GESTURES
+from robot.motion.pools import POOLS
 from robot.motion.preview import ANNOUNCED_S, preview
 from robot.motion.score import MAX_ENTRIES, NEUTRAL, Color, Light, Melody, Note, Score, read_score
 from tests.support.json_values import ANYTHING
 
-EVERY = GESTURES | ORIGINALS
+ABOVE = ("joy", "streak_3", "streak_5", "streak_10", "comeback")
 
 
 def pitches(gesture):
@@ -26,16 +27,20 @@ def pitches(gesture):
 
 
 def test_success_rises_and_failure_falls():
-    for valence in VALENCES.values():
-        if valence.cue.above:
-            rising = pitches(EVERY[valence.cue.above])
-            assert len(rising) > 2
-            assert all(low <= high for low, high in pairwise(rising))
-        if valence.cue.below:
-            falling = pitches(EVERY[valence.cue.below])
-            assert all(high > low for high, low in pairwise(falling))
-            if valence.cue.above:
-                assert max(falling) < min(rising)  # never the sound of success
+    glad = [GESTURES["celebrate"], *(one for pool in ABOVE for one in POOLS[pool])]
+    sad = [GESTURES["droop"], *POOLS["disappointment"]]
+    for gesture in glad:
+        rising = pitches(gesture)
+        assert len(rising) > 2
+        assert all(low <= high for low, high in pairwise(rising))
+        assert gesture.score.mood == "glad"
+    lowest_hz = min(min(pitches(gesture)) for gesture in glad)
+    for gesture in sad:
+        assert all(high > low for high, low in pairwise(pitches(gesture)))
+        assert gesture.score.mood == "sad"
+    for gesture in (*sad, *POOLS["near_miss"], *POOLS["effort"]):
+        assert gesture.score.mood != "glad"
+        assert max(pitches(gesture)) < lowest_hz  # never the sound of success
 
 
 def test_explicit_feedback_stays_still():
@@ -43,7 +48,7 @@ def test_explicit_feedback_stays_still():
     assert (cue.above, cue.below) == (None, None)
 
 
-@pytest.mark.parametrize("gesture", EVERY.values(), ids=lambda gesture: gesture.name)
+@pytest.mark.parametrize("gesture", BUILT_IN.values(), ids=lambda gesture: gesture.name)
 def test_a_score_is_over_before_its_motion_and_tells_that_it_begins(gesture):
     ends_s = ANNOUNCED_S + dry_run(gesture).took_s
     for entry in (*gesture.score.lights, *gesture.score.notes):

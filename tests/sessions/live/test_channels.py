@@ -103,7 +103,7 @@ async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monke
     session = await begun(place)
     robot = await place.robot().dial()
     welcome = await robot.hello()
-    assert welcome["cue"]["above"] == "celebrate"
+    assert welcome["cue"]["above"] == "varied"
     assert welcome["cue"]["threshold"] == 0.9
     monitor = await place.monitor(session).open()
     await robot.hear("heartbeat")

@@ -186,7 +186,7 @@ async def test_a_pt_calms_the_robot_with_one_tap(place, begun):
     for level in (0.5, 0):
         assert (await monitor.change("robot_intensity", level))["type"] == "done"
         cue = (await robot.hear("cue"))["cue"]
-        assert (cue["intensity"], cue["above"], cue["threshold"]) == (level, "celebrate", 0.9)
+        assert (cue["intensity"], cue["above"], cue["threshold"]) == (level, "varied", 0.9)
         await monitor.until(
             lambda event, v=level: event["kind"] == "robot_intensity" and event["value"] == v
         )

@@ -46,7 +46,11 @@ async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, be
         None,
     )
     cue = await robot.hear("cue")
-    assert (cue["valence"], cue["cue"]["above"], cue["cue"]["below"]) == ("negative", None, "droop")
+    assert (cue["valence"], cue["cue"]["above"], cue["cue"]["below"]) == (
+        "negative",
+        None,
+        "varied",
+    )
     await source.walk(2.0)
     step = await tablet.until_step(3)
     assert (step["points"], step["score"], step["emblem"]) == (-1, 0, "loss")
@@ -63,7 +67,7 @@ async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, be
     again = await place.monitor(session).watch()
     assert (again["valence"], again["changed_to"], again["score"]) == ("negative", ["negative"], 0)
     assert {"after": 2, "kind": "type", "value": "Negative"} in again["marks"]
-    assert (await (await place.robot().dial()).hello())["cue"]["below"] == "droop"
+    assert (await (await place.robot().dial()).hello())["cue"]["below"] == "varied"
     assert (await place.tablet(session).watch())["last"]["words"] == "Far below the goal."
 
 
@@ -74,8 +78,8 @@ async def test_a_robot_that_was_silenced_stays_so_in_every_type(place, ready):
     other = await ready(place, *TWO, valence="positive", at_station=False)
     cues = {one.slug: one.cue for one in other.to_plan().alternatives}
     assert cues == {
-        "negative": CueGestures(below="droop"),
-        "binary": CueGestures("celebrate", "droop"),
+        "negative": CueGestures(below="varied"),
+        "binary": CueGestures("varied", "varied"),
         "explicit": CueGestures(),
     }
 

@@ -105,6 +105,8 @@ class _Decision(Struct):
     reason: Code
     gesture: Name | None = None
     intensity: Number | None = None
+    pool: Name | None = None
+    seed: Whole | None = None
 
 
 class _Gesture(Struct):

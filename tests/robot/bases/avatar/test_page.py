@@ -156,6 +156,26 @@ def test_it_is_seen_and_heard_to_celebrate_and_to_droop(page, avatar):
 
 
 @pytest.mark.browser
+def test_it_acts_each_gesture_and_its_variants_differ(page, avatar):
+    def acts(gesture, act, *, is_glad=True):
+        avatar.answer(Answer(gesture, is_glad, is_quiet=True))
+        page.wait_for_selector(f"body[data-act={act}]")
+        return page.evaluate("[document.body.dataset.mood, document.body.style.cssText]")
+
+    assert acts("sway", "swaying")[0] == "calm"
+    assert acts("effort_2", "trying", is_glad=False)[0] == "calm"
+    assert acts("joy_1", "droop", is_glad=False)[0] == "droop"  # never glad after weak walking
+    first = acts("joy_1", "celebrate")
+    avatar.show(Indication.READY, aloud=False)
+    mood(page, "rest")
+    second = acts("joy_2", "celebrate")
+    assert first[0] == second[0] == "celebrate"
+    assert first[1] != second[1]
+    assert acts("streak_10_3", "celebrate")[0] == "celebrate"
+    assert acts("wave", "droop", is_glad=False)[0] == "droop"  # a clinic's own
+
+
+@pytest.mark.browser
 def test_quiet_is_seen_only_and_a_stop_is_silent_at_once(page, avatar):
     avatar.answer(Answer("celebrate", is_glad=True, is_quiet=True))
     mood(page, "celebrate")

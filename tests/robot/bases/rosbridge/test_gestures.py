@@ -5,7 +5,8 @@ import math
 import pytest
 
 from robot.behavior.safety import OPEN_LOOP_MAX_GESTURES
-from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import BUILT_IN, GESTURES, ORIGINALS
+from robot.motion.pools import VARIANTS
 from robot.play_gesture import play_gesture
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import OPEN, Stage, moving
@@ -13,7 +14,7 @@ from tests.support.rosbridge_stage import OPEN, Stage, moving
 pytestmark = pytest.mark.matrix
 
 
-@pytest.mark.parametrize("name", GESTURES | ORIGINALS)
+@pytest.mark.parametrize("name", BUILT_IN)
 @pytest.mark.parametrize("goes", [1.0, 0.93])
 def test_every_gesture_closed_on_odometry_ends_at_home(name, goes):
     stage = Stage()
@@ -23,7 +24,7 @@ def test_every_gesture_closed_on_odometry_ends_at_home(name, goes):
         stage.now_s += span_s
         stage.pass_on()
 
-    played = play_gesture((GESTURES | ORIGINALS)[name], stage.base, lambda: stage.now_s, sleep)
+    played = play_gesture(BUILT_IN[name], stage.base, lambda: stage.now_s, sleep)
     assert played["outcome"] == "done"
     assert played["abilities"]["closed_loop"]
     x_m, y_m = stage.robot.x_m - 3.0, stage.robot.y_m + 2.0
@@ -39,7 +40,7 @@ def test_a_session_s_gesture_in_a_closed_loop(stage):
     assert (status["open_loop"], status["bumpers"]) == (False, True)
 
 
-@pytest.mark.parametrize("name", GESTURES)
+@pytest.mark.parametrize("name", GESTURES | VARIANTS)
 def test_an_open_loop_is_short_timed_and_told(name):
     stage = Stage(OPEN)
     stage.robot.odometry = ""
