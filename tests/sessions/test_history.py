@@ -114,7 +114,8 @@ def test_phases_and_events_are_told(client, patient):
     of_goal = (2.5 / 2.0 + 2.5 / 2.4 + 1.5 / 2.4 + 1.5 / 2.4) / 4
     assert f"Training Positive 1.00 4 4 2 50 % 2.00 {100 * of_goal:.0f} %" in rows
     told = [
-        words(item) for item in re.findall(r"<li class=\"row wrap \w+\">\s*<time.*?</li>", page, re.DOTALL)
+        words(item)
+        for item in re.findall(r"<li class=\"row wrap \w+\">\s*<time.*?</li>", page, re.DOTALL)
     ]
     assert [line.split(" ", 1)[1] for line in told] == [
         "Started",
