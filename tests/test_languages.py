@@ -36,8 +36,8 @@ ALIKE_IN = {
     "de": "arm code codes design feedback hedges minus monitor name normal passkey patient pause "
     "person phase plan plus sensor start tablet tablets training",
     "fr": "code correction corrections date description effort migrations minutes moment normal "
-    "options pages participant participants patient patients pause performance phase phases plan plus "
-    "point points position questionnaire questionnaires questions robot signature source type "
+    "options pages participant participants patient patients pause performance phase phases plan "
+    "plus point points position questionnaire questionnaires questions robot signature source type "
     "variation version",
 }
 
