@@ -37,6 +37,7 @@ class TokenAdmin(ScopedAdmin):
         """Save the row, a new one with a token."""
         if not change:
             obj.token = obj.new_token()
+            obj.note_issuer(request.user, timezone.now())
         super().save_model(request, obj, form, change)
 
     def response_add(self, request: HttpRequest, obj: Any, *args: Any, **kwargs: Any) -> Any:
