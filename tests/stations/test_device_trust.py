@@ -10,6 +10,7 @@ from django.core.cache import cache
 from django.test import Client
 from django.utils import timezone
 
+from rehab.boards import views
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
@@ -262,6 +263,19 @@ def test_outside_the_clinic_a_tablet_needs_the_patients_consent_as_a_person_does
     assert home.get(walk).status_code == 404
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
     assert home.get(walk).status_code == 200
+
+
+def test_a_tablet_outside_the_clinic_shows_no_boards(world, pt, station, monkeypatch):
+    asked: list[Any] = []
+    monkeypatch.setattr(views, "make_waiting_panels", lambda *made: asked.append(made))
+    set_networks(world)
+    tablet = pair_tablet(pt, station, Client(REMOTE_ADDR=CLINIC))
+    home = Client(REMOTE_ADDR=HOME)
+    home.cookies = tablet.cookies
+    assert tablet.get("/tablet/board/").status_code == 204
+    assert len(asked) == 1
+    assert home.get("/tablet/board/").status_code == 204
+    assert len(asked) == 1
 
 
 # --- a reload at the wrong moment -----------------------------------------------------------------

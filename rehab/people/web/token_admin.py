@@ -57,8 +57,9 @@ class TokenAdmin(ScopedAdmin):
         )
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
+    @asks_who_it_is
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
-        """Revoke the tokens of the chosen rows."""
+        """Revoke the tokens of the chosen rows; ask for the password."""
         valid = list(holders.filter(revoked_at__isnull=True))
         for holder in valid:  # one by one, so that the change history records each
             holder.revoked_at = timezone.now()
