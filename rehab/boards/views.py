@@ -63,9 +63,11 @@ def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
 @never_cache
 @require_safe
 def show_waiting_board(request: HttpRequest) -> HttpResponse:
-    """Show a board of the clinic on a waiting tablet, each in turn; 204 where there is none."""
-    now = timezone.now()
-    boards = make_waiting_panels(actor_of(request).clinic, now)
+    """Show a board of the clinic on a waiting tablet, each in turn; 204 where there is none, and
+    outside the clinic's networks."""
+    now, actor = timezone.now(), actor_of(request)
+    is_away = not isinstance(actor, User) and actor.is_away  # who is on a board said nothing of it
+    boards = [] if is_away else make_waiting_panels(actor.clinic, now)
     if not boards:
         return HttpResponse(status=204)
     turn = int(now.timestamp() // ROTATION_S) % len(boards)

@@ -7,6 +7,7 @@ writer, migrations, tests), whose results are shown to nobody directly.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, NoReturn, Protocol, Self, TypeVar
 
@@ -149,14 +150,17 @@ class ClinicModel(ScopedModel):
 
     def save(self, *args: Any, **kwargs: Any) -> None:
         """Save the row. Raises CrossClinicReference for a related row of another clinic."""
-        self.check_one_clinic()
+        self.check_one_clinic(kwargs.get("update_fields"))
         super().save(*args, **kwargs)
 
-    def check_one_clinic(self) -> None:
-        """Raise CrossClinicReference for a related row of another clinic."""
+    def check_one_clinic(self, update_fields: Iterable[str] | None = None) -> None:
+        """Raise CrossClinicReference for a related row of another clinic, of those to be saved."""
+        saved = None if update_fields is None else set(update_fields)
         mine = getattr(self, "clinic_id", None)
         for field in self._meta.concrete_fields:
             if not field.is_relation or field.name == "clinic":
+                continue
+            if saved is not None and not saved & {field.name, "clinic"}:
                 continue
             related = getattr(self, field.name)
             theirs = getattr(related, "clinic_id", None)

@@ -16,6 +16,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.translation import valence_choices
 from rehab.people.consent.models import PatientScope
+from rehab.people.consent.services import allows_remote_view
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.policy import erased, personal_fields, retained
 from rehab.people.scope import ClinicModel
@@ -34,7 +35,8 @@ SCORES_SHOWN_FOR = timedelta(minutes=15)
 class SessionScope(PatientScope):
     """Rows of sessions: of its station's, a tablet sees those open and the one just ended.
 
-    Everybody at the treadmill can use the tablet, also after a patient has left. ``session`` is the
+    Everybody at the treadmill can use the tablet, also after a patient has left. Outside the
+    clinic's networks it needs the consent to remote view that a person needs. ``session`` is the
     lookup of the session's key.
     """
 
@@ -49,6 +51,8 @@ class SessionScope(PatientScope):
             return Q()
         open_or_ended = Q(**_in_states(OPEN_STATES)) | Q(pk__in=_just_ended(device, timezone.now()))
         here = TrainingSession.everywhere.filter(open_or_ended, station=device.station_id)
+        if device.is_away:
+            here = here.filter(allows_remote_view("patient"))
         return Q(**{f"{self.session}__in": here.values("pk")})
 
 

@@ -125,7 +125,8 @@ class DeviceAdmin(TokenAdmin):
     list_select_related = ("station",)
     search_fields = ("name", "station__name")
     fields = ("station", "kind", "name", "state", "created_at", "last_seen_at", "revoked_at")
-    readonly_fields = ("state", *TokenAdmin.readonly_fields)
+    fields += ("approver", "approved_at", "network", "browser")
+    readonly_fields = ("state", *TokenAdmin.readonly_fields, *fields[-4:])
     radio_fields = {"kind": admin.HORIZONTAL}
 
     @admin.display(description=_("state"), ordering="last_seen_at")

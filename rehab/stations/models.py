@@ -8,7 +8,8 @@ from typing import ClassVar
 from django.db import models
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.models import Clinic
+from rehab.people.models import Clinic, User
+from rehab.people.networks import is_in_networks
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.sign_in.tokens import TokenModel
 
@@ -69,6 +70,21 @@ class Device(TokenModel):
     token_expires_at = models.DateTimeField(_("valid until"), null=True, editable=False)
     copy_seen_at = models.DateTimeField(_("old token seen"), null=True, editable=False)
 
+    # Of a tablet: who let it in (``device_trust``), and what it was then.
+    approver = models.ForeignKey(
+        User,
+        on_delete=models.SET_NULL,
+        related_name="+",
+        null=True,
+        editable=False,
+        verbose_name=_("let in by"),
+    )
+    approved_at = models.DateTimeField(_("let in at"), null=True, editable=False)
+    network = models.CharField(_("network"), max_length=45, blank=True, editable=False)
+    browser = models.CharField(_("browser"), max_length=32, blank=True, editable=False)
+
+    is_approved = True  # `device_trust.is_trusted`, on objects of queries that ask for it
+    address = ""  # from which this object's holder connects
     given_hash = ""  # of the successor that this object's holder was given
 
     class Meta(TokenModel.Meta):
@@ -82,6 +98,17 @@ class Device(TokenModel):
     def has_expired(self, now: datetime) -> bool:
         """Return whether its token was valid until then."""
         return self.token_expires_at is not None and self.token_expires_at <= now
+
+    @property
+    def is_away(self) -> bool:
+        """Return whether it is outside its clinic's networks, or nobody knows where."""
+        networks = self.clinic.networks
+        return bool(networks) and not (self.address and is_in_networks(networks, self.address))
+
+    def note_issuer(self, by: User, now: datetime) -> None:
+        """Make the person who gives a tablet its token the one who answers for it."""
+        if self.kind == self.Kind.TABLET:
+            self.approver, self.approved_at, self.last_seen_at = by, now, None
 
     def new_token(self) -> str:
         """Set and return a new token, as if there had been none before."""
@@ -98,6 +125,8 @@ class Pairing(ScopedModel):
     code = models.CharField(max_length=8, unique=True)
     secret_hash = models.CharField(max_length=64, unique=True)
     expires_at = models.DateTimeField()
+    address = models.CharField(max_length=45, blank=True)  # of the tablet, and its browser
+    browser = models.CharField(max_length=32, blank=True)
     device = models.ForeignKey(Device, on_delete=models.CASCADE, related_name="+", null=True)
 
     class Meta(ScopedModel.Meta):

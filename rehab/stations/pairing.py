@@ -6,13 +6,16 @@ import secrets
 from datetime import datetime, timedelta
 
 from django.core.cache import cache
+from django.db import transaction
 from django.utils.translation import gettext as _
 
-from rehab.people.audit.audit_log import Act, AuditEntry, truncate_address
+from rehab.people.audit.audit_log import Act, AuditEntry, record, truncate_address
+from rehab.people.models import User
 from rehab.people.random_codes import random_code
 from rehab.people.rate_limits import TokenBuckets
 from rehab.people.row_values import read_values, save_changes
 from rehab.people.sign_in.tokens import hash_token
+from rehab.stations.device_trust import NotTrusted, check_approval
 from rehab.stations.models import Device, Pairing, Station
 
 LIFETIME = timedelta(minutes=5)
@@ -35,7 +38,7 @@ class PairingRateLimited(PairingRefused):
     """An address has started more pairings than its tablets can need."""
 
 
-def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
+def start_pairing(address: str, now: datetime, browser: str = "") -> tuple[Pairing, str]:
     """Start a pairing. Return it, and the secret that identifies the tablet until its approval.
 
     The oldest pairing of an address with too many pending ones is removed. Raises
@@ -61,8 +64,13 @@ def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
         )
     secret = secrets.token_urlsafe(32)
     code = random_code(CODE_LENGTH)
-    pairing = Pairing(code=code, secret_hash=hash_token(secret), expires_at=now + LIFETIME)
-    pairing.save()
+    pairing = Pairing.everywhere.create(
+        code=code,
+        secret_hash=hash_token(secret),
+        expires_at=now + LIFETIME,
+        address=address,
+        browser=browser[:32],
+    )
     cache.set(pending, [*kept, pairing.pk], LIFETIME.total_seconds())
     return pairing, secret
 
@@ -79,33 +87,56 @@ def find_pairing(secret: str, now: datetime) -> Pairing | None:
     return started.select_related("device").first()
 
 
-def approve_pairing(code: str, station: Station, approver_id: int, now: datetime) -> Device:
-    """Pair the tablet that shows this code with a station. Attempts count per ``approver_id``.
+def find_by_code(code: str, by: User, now: datetime) -> Pairing:
+    """Return the pairing of the tablet that shows a code, for a person who may let it in.
 
-    Raises PairingRefused.
+    Attempts count per person. Raises PairingRefused, and NotTrusted, which the audit log has.
     """
-    if attempts.take(approver_id, now.timestamp()):
+    if attempts.take(by.pk, now.timestamp()):
         raise PairingRefused(_("Too many wrong codes. Wait five minutes."))
-    wanted = Pairing.everywhere.filter(
-        code=code.strip().upper(), device__isnull=True, expires_at__gt=now
-    )
-    if not wanted.exists():
+    waiting = Pairing.everywhere.filter(device__isnull=True, expires_at__gt=now)
+    pairing = waiting.filter(code=code.strip().upper()).first()
+    if pairing is None:
         raise PairingRefused(
             _("No tablet shows this code now. Codes last five minutes; look at the tablet again.")
         )
+    try:
+        check_approval(by, pairing.address)
+    except NotTrusted:
+        about = " ".join(("tablet:", truncate_address(pairing.address), pairing.browser))
+        record(Act.REFUSED, by, about=about, now=now)
+        raise
+    return pairing
+
+
+def approve_pairing(
+    pairing: Pairing, station: Station, by: User, address: str, now: datetime
+) -> Device:
+    """Pair a tablet that waits (`find_by_code`) with a station, by a person at an address.
+
+    Raises PairingRefused.
+    """
     count = Device.everywhere.filter(station=station, kind=Device.Kind.TABLET).count()
     device = Device(
         clinic_id=station.clinic_id,
         station=station,
         kind=Device.Kind.TABLET,
         name=_("Tablet %(number)s") % {"number": count + 1},
+        approver=by,
+        approved_at=now,
+        network=truncate_address(pairing.address),
+        browser=pairing.browser,
     )
     device.new_token()  # never shown: the tablet claims its own when it asks again
-    device.save()
-    if not wanted.update(device=device):  # another request was faster
-        device.delete()
-        raise PairingRefused(_("This tablet has just been paired."))
-    attempts.forget(approver_id)
+    with transaction.atomic():
+        device.save()
+        # It has the whole time again to claim its token.
+        waiting = Pairing.everywhere.filter(pk=pairing.pk, device__isnull=True, expires_at__gt=now)
+        if not waiting.update(device=device, expires_at=now + LIFETIME):
+            raise PairingRefused(_("This tablet has just been paired."))
+        about = f"{device}, {station}: {device.network} {device.browser}"
+        record(Act.TABLET_IN, by, about=about, address=address, now=now)
+    attempts.forget(by.pk)
     return device
 
 

@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from django.utils.dateformat import format as format_date
 from django.utils.translation import gettext, ngettext
 
+from rehab.stations.device_trust import is_unused
 from rehab.stations.models import Device
 
 JUST_NOW = timedelta(minutes=2)  # `last_seen_at` is stored once a minute
@@ -39,6 +40,8 @@ def format_device_state(device: Device, now: datetime) -> str:
     """Return what is wrong with a device's token, else when it last connected."""
     if device.is_revoked:
         return gettext("revoked")
+    if not device.is_approved or is_unused(device, now):
+        return gettext("ended with its approver’s rights or unused: let it in again")
     if device.has_expired(now):
         return gettext("its token has expired: give it a new one")
     if device.copy_seen_at is not None:

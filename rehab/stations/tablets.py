@@ -9,16 +9,18 @@ from django.conf import settings
 from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 
+from rehab.people.networks import client_address
+from rehab.stations.device_trust import UNUSED_FOR
 from rehab.stations.models import Device
 from rehab.stations.tokens import find_device
 
 COOKIE = "garry_tablet"
-COOKIE_AGE_S = 400 * 24 * 3600  # the longest that browsers keep a cookie; each visit renews it
+COOKIE_AGE_S = UNUSED_FOR.total_seconds()  # each visit renews it
 
 
-def find_tablet(token: str | None, now: datetime) -> Device | None:
+def find_tablet(token: str | None, now: datetime, address: str = "") -> Device | None:
     """Return the tablet that this token belongs to; None for any other device."""
-    device = find_device(token, now) if token and token.isascii() else None
+    device = find_device(token, now, address) if token and token.isascii() else None
     return device if device is not None and device.kind == Device.Kind.TABLET else None
 
 
@@ -46,5 +48,7 @@ class TabletMiddleware:
         scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")
         if token is None and scheme.lower() == "bearer":
             token = bearer.strip()
-        request.tablet = find_tablet(token, timezone.now())  # type: ignore[attr-defined]
+        request.tablet = find_tablet(  # type: ignore[attr-defined]
+            token, timezone.now(), client_address(request)
+        )
         return self.get_response(request)

@@ -14,6 +14,7 @@ from django.db.models import Q
 
 from rehab.people.audit.audit_log import Act, build_entry, record, record_counted
 from rehab.people.sign_in.tokens import draw_token, find_by_token, hash_token
+from rehab.stations import device_trust
 from rehab.stations.models import Device
 
 ROTATE_AFTER = timedelta(days=30)
@@ -30,6 +31,11 @@ def find_device(token: str, now: datetime, address: str = "") -> Device | None:
         known = Q(token_hash=hashed) | Q(successor_hash=hashed) | Q(retired_hash=hashed)
         device = rows.filter(known).first()
     if device is None:
+        return None
+    device.address = address
+    if device_trust.has_ended(device, now):
+        device.revoked_at = now  # it does not come back with its approver's account or role
+        device.save(update_fields=["revoked_at"])
         return None
     if device.token_hash == hashed:
         return None if device.has_expired(now) else device

@@ -28,8 +28,8 @@ from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.sessions.questionnaires import ask
 from rehab.stations.builtin import first_station
-from rehab.stations.models import Device
 from rehab.stations.tablets import COOKIE
+from tests.support.tablets import approved
 from tests.support.walks import make_patient, walk
 clinic = first_clinic()
 rosa = make_patient(clinic, code="R1", language="es", screen_text="largest")
@@ -37,9 +37,7 @@ session = walk(rosa, "positive", [2.5, 1.5] * 10, now=timezone.now())
 session.station = first_station(clinic)
 session.save()
 ask(session, ["sus", "tlx"], timezone.now())
-tablet = Device(clinic=clinic, station=session.station, kind="tablet", name="t")
-token = tablet.new_token()
-tablet.save()
+_, token = approved(session.station)
 print(json.dumps({"session": session.pk, "name": COOKIE, "value": token}))
 """
 

@@ -30,6 +30,7 @@ from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.extent import EVERYTHING
 from tests.support.marks import mark
+from tests.support.tablets import approved
 from tests.support.tenancy import Route, all_routes, walk_patterns
 from tests.support.world import NOW, client_of
 
@@ -165,9 +166,7 @@ def test_a_program_is_noted_by_its_name_and_no_code_of_a_patient_is_kept(world):
 
 
 def test_a_tablet_is_noted_as_itself(world):
-    device = Device(clinic=world.clinic, station=world.device.station, kind="tablet", name="Door")
-    token = device.new_token()
-    device.save()
+    _, token = approved(world.device.station, "Door")
     url = reverse("scores", kwargs={"session_id": world.session.pk})
     Client(headers={"Authorization": f"Bearer {token}"}).get(url)
     entry = entries().get()

@@ -61,6 +61,7 @@ def calls(lead: User, pt: User) -> dict[str, tuple[str, str, dict[str, Any]]]:
     token.new_token()
     token.save()
     renew = {"action": "renew_tokens", "_selected_action": token.pk}
+    end = {"action": "revoke_tokens", "_selected_action": token.pk}
     remove = {"action": "remove_second_factors", "_selected_action": pt.pk}
     password = reverse("admin:auth_user_password_change", args=[pt.pk])
     account = reverse("admin:rehab_user_change", args=[pt.pk])
@@ -72,6 +73,9 @@ def calls(lead: User, pt: User) -> dict[str, tuple[str, str, dict[str, Any]]]:
         "adding a passkey": ("get", reverse("add-passkey"), {}),
         "minting a token": ("get", reverse("admin:rehab_apitoken_add"), {}),
         "renewing a token": ("post", reverse("admin:rehab_apitoken_changelist"), renew),
+        "ending a program": ("post", reverse("admin:rehab_apitoken_changelist"), end),
+        "revealing an arm": ("post", reverse("reveal", args=[1]), {"reason": "curious"}),
+        "an incident's file": ("get", reverse("incident-file", args=[1]), {}),
         "a device's token": ("get", reverse("admin:rehab_device_add"), {}),
         "another's password": ("get", password, {}),
         "another's factors": ("post", reverse("admin:rehab_user_changelist"), remove),

@@ -106,6 +106,7 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.presets import Preset
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station
+from tests.support.tablets import approved
 from tests.support.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
@@ -157,9 +158,7 @@ for station, kind, name, seen in (
     ("Treadmill 2", "tablet", "Old tablet", True),
 ):
     place, _ = Station.everywhere.get_or_create(clinic=first_clinic(), name=station)
-    device = Device(clinic=first_clinic(), station=place, kind=kind, name=name)
-    device.new_token()
-    device.save()
+    device, _ = approved(place, name, kind=kind, browser="Safari, iPad", network="192.168.7.0/24")
     if seen:
         Device.everywhere.filter(pk=device.pk).update(last_seen_at=timezone.now())
     Device.everywhere.filter(name="Kobuki").update(

@@ -19,8 +19,7 @@ from rehab.sessions.questionnaires import (
     find_instrument,
 )
 from rehab.sessions.setup.protocols import Protocol
-from rehab.stations.models import Device, Station
-from rehab.stations.tablets import COOKIE
+from rehab.stations.models import Station
 from rehab.training.measures import InvalidSetting
 from tests.support.walks import make_session
 from tests.support.world import NOW, World, build_world, client_of
@@ -47,12 +46,7 @@ def planned(world: World, *slugs: str, language: str = "en") -> TrainingSession:
 
 
 def tablet_of(world: World) -> Client:
-    tablet = Device(clinic=world.clinic, station=world.rows[Station], kind="tablet", name="t")
-    token = tablet.new_token()
-    tablet.save()
-    client = Client()
-    client.cookies[COOKIE] = token
-    return client
+    return world.add_tablet()[0]
 
 
 def tap(client: Client, session: TrainingSession, **sent: object) -> int:

@@ -14,6 +14,7 @@ from rehab.people.random_codes import ALPHABET
 from rehab.people.rate_limits import TokenBuckets
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
+from tests.support.tablets import enter_code, let_in, pair_tablet, shown_code
 from tests.support.world import World, build_world
 
 pytestmark = pytest.mark.django_db
@@ -29,14 +30,8 @@ def station(world: World) -> Station:
     return world.add_station()
 
 
-def shown_code(tablet: Client) -> str:
-    code: str = tablet.get("/tablet/").context["code"]
-    return code
-
-
 def paired(tablet: Client, pt: Client, station: Station) -> Device:
-    pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
-    tablet.get("/tablet/state/")
+    pair_tablet(pt, station, tablet)
     return Device.everywhere.get(station=station, kind="tablet")
 
 
@@ -48,7 +43,7 @@ def test_a_tablet_shows_one_code_until_it_is_let_in(pt, station):
     assert shown_code(tablet) == code  # also after a reload
     assert shown_code(Client()) != code
     assert tablet.get("/tablet/state/").json() == {"paired": False, "go": ""}
-    answer = pt.post("/tablets/pair/", {"code": code.lower(), "station": station.pk})
+    answer = let_in(pt, code.lower(), station)
     assert answer.headers["Location"] == "/start/"
     assert tablet.get("/tablet/state/").json() == {"paired": True, "go": "/tablet/"}
     cookie = tablet.cookies[tablets.COOKIE]
@@ -64,13 +59,13 @@ def test_a_code_opens_once_and_for_five_minutes(pt, station):
     tablet = Client()
     code = shown_code(tablet)
     Pairing.everywhere.update(expires_at=timezone.now() - timedelta(seconds=1))
-    page = pt.post("/tablets/pair/", {"code": code, "station": station.pk}).content.decode()
+    page = let_in(pt, code, station).content.decode()
     assert "No tablet shows this code now" in page
     assert tablet.get("/tablet/state/").json()["go"] == "/tablet/"
     new = shown_code(tablet)
     assert new != code
     for expected in (302, 200):
-        answer = pt.post("/tablets/pair/", {"code": new, "station": station.pk})
+        answer = let_in(pt, new, station)
         assert answer.status_code == expected
     assert Device.everywhere.filter(station=station).count() == 1
 
@@ -79,7 +74,7 @@ def test_the_token_is_given_to_the_tablet_that_showed_the_code_and_once(pt, stat
     tablet, thief = Client(), Client()
     code = shown_code(tablet)
     shown_code(thief)
-    pt.post("/tablets/pair/", {"code": code, "station": station.pk})
+    let_in(pt, code, station)
     assert not thief.get("/tablet/state/").json()["paired"]
     copy = Client()
     copy.cookies["garry_pairing"] = tablet.cookies["garry_pairing"].value
@@ -90,10 +85,10 @@ def test_the_token_is_given_to_the_tablet_that_showed_the_code_and_once(pt, stat
 def test_wrong_codes_are_few(pt, station, monkeypatch):
     monkeypatch.setattr(pairing, "attempts", TokenBuckets(pairing.MAX_ATTEMPTS, 300.0))
     for _ in range(pairing.MAX_ATTEMPTS):
-        page = pt.post("/tablets/pair/", {"code": "XXXXXX", "station": station.pk})
+        page = enter_code(pt, "XXXXXX", station)
         assert "No tablet shows this code" in page.content.decode()
     code = shown_code(Client())
-    page = pt.post("/tablets/pair/", {"code": code, "station": station.pk}).content.decode()
+    page = let_in(pt, code, station).content.decode()
     assert "Too many wrong codes" in page
     assert not Device.everywhere.filter(station=station).exists()
 
@@ -150,7 +145,7 @@ def test_a_flood_from_one_address_shuts_no_other_clinic_out(monkeypatch):
 def test_a_tablet_that_was_let_in_gives_way_to_none(pt, station, monkeypatch):
     monkeypatch.setattr(pairing, "MAX_PENDING_PER_ADDRESS", 1)
     tablet = Client()
-    pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
+    let_in(pt, shown_code(tablet), station)
     assert shown_code(Client())
     assert tablet.get("/tablet/state/").json()["paired"] is True
 
@@ -192,7 +187,7 @@ def test_a_revoked_tablet_shows_a_code_again(pt, station):
 
 def test_a_tablet_that_is_revoked_while_it_claims_its_token_stays_revoked(pt, station):
     tablet = Client()
-    pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
+    let_in(pt, shown_code(tablet), station)
     secret = tablet.cookies["garry_pairing"].value
     found = pairing.find_pairing(secret, timezone.now())
     assert found is not None

@@ -13,7 +13,8 @@ from rehab.boards.panels.shared_panels import make_session_panels
 from rehab.boards.ranking.standings import RankedRow, Standings
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
-from rehab.stations.models import Device, Station
+from rehab.stations.models import Station
+from tests.support.tablets import approved
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, agreeing
 
@@ -94,7 +95,5 @@ def page_of(session: TrainingSession, client: Client | None = None) -> str:
 
 def tablet_at(station: Station) -> Client:
     """Return a browser that is a station's tablet."""
-    tablet = Device(clinic=station.clinic, station=station, kind="tablet", name="T")
-    token = tablet.new_token()
-    tablet.save()
+    _, token = approved(station)
     return Client(headers={"Authorization": f"Bearer {token}"})

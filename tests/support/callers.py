@@ -25,6 +25,7 @@ from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
 from rehab.training.valences import CueGestures
+from tests.support.tablets import approved
 from tests.support.world import signed_in
 
 PATIENCE_S = 10.0  # only a failing test waits so long
@@ -340,10 +341,7 @@ def build_place(name: str, clinic: Clinic | None = None, spares: int = 0) -> Pla
     tokens, devices = {}, {}
     kinds = ["source", "tablet", "robot", *(f"source {i}" for i in range(spares))]
     for kind in kinds:
-        device = Device(clinic=clinic, station=station, kind=kind.split()[0], name=kind)
-        tokens[kind] = device.new_token()
-        device.save()
-        devices[kind] = device
+        devices[kind], tokens[kind] = approved(station, kind, kind=kind.split()[0])
     place = Place(clinic, station, patient, people, tokens, devices, keys)
     remember(place)
     return place

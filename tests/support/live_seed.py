@@ -29,6 +29,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.goals import GoalRule
     from rehab.training.phases import make_phase
+    from tests.support.tablets import approved
     from tests.support.world import store
 
     prepare_database()
@@ -49,9 +50,7 @@ def seed(count: int) -> list[dict[str, Any]]:
             )
             tokens = {}
             for kind in Device.Kind.values:
-                device = Device(clinic=clinic, station=station, kind=kind, name=kind)
-                tokens[kind] = device.new_token()
-                device.save()
+                _, tokens[kind] = approved(station, kind, kind=kind)
             session = create_session(
                 SessionRequest(
                     patient=patient,

@@ -149,6 +149,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from rehab.stations.pins import set_pin
     from rehab.training.goals import GoalRule, Target
     from rehab.training.phases import make_phase
+    from tests.support.tablets import approved
 
     clinic = first_clinic()
     count = User.everywhere.count()
@@ -169,9 +170,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
         )
         tokens = {}
         for kind in Device.Kind.values:
-            device = Device(clinic=clinic, station=station, kind=kind, name=kind)
-            tokens[kind] = device.new_token()
-            device.save()
+            _, tokens[kind] = approved(station, kind, kind=kind)
         phases = [make_phase(**phase) for phase in wish.get("phases", [{"kind": "training"}])]
         protocol = None
         if "close_percent" in wish:

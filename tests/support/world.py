@@ -53,6 +53,7 @@ from robot.wire.incident import pack
 from tests.support.clock import START
 from tests.support.closed_study import close_study
 from tests.support.marks import mark
+from tests.support.tablets import approved
 
 NOW = START  # the moment at which a test begins
 # What a robot recorded around a bump.
@@ -116,10 +117,8 @@ class World:
     def add_tablet(self, station: Station | None = None) -> tuple[Client, Device]:
         """Return a paired tablet's browser and row; at the clinic's own station by default."""
         at = station or self.rows[Station]
-        device = Device(clinic=self.clinic, station=at, kind=Device.Kind.TABLET, name="T")
         client = Client()
-        client.cookies[COOKIE] = device.new_token()
-        device.save()
+        device, client.cookies[COOKIE] = approved(at)
         return client, device
 
     def begin_session(self, patient: Patient | None = None, **chosen: Any) -> TrainingSession:

@@ -58,8 +58,11 @@ def _act(request: HttpRequest, slug: str, context: dict[str, Any]) -> HttpRespon
     if gives_a_token and sent is not None and not step_up.is_confirmed(request, timezone.now()):
         return step_up.ask(request)
     if slug == "tablet" and sent is not None:
-        context["problem"] = let_in(request)
-        return None if context["problem"] else redirect(there)
+        asked = let_in(request)
+        if asked is None:
+            return redirect(there)
+        context |= asked
+        return None
     if not context["may_edit"]:
         return None
     if slug == "station":

@@ -59,6 +59,7 @@ class Act(models.TextChoices):
     TOKEN_USE = "token_use", _("Used a token from a new network")
     REFUSED = "refused", _("Was refused")
     TOKEN = "token", _("Gave a new token")
+    TABLET_IN = "tablet_in", _("Let a tablet in")
     TOKEN_COPY = "token_copy", _("Used a token that was replaced")
     FAMILY_LINK = "family_link", _("Gave a family a link")
     FAMILY_END = "family_end", _("Ended a family's link")

@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Any
 
 from django.db import transaction
+from django.db.models import Q
 from django.dispatch import Signal
 from django.utils.translation import gettext_lazy as _
 from django.utils.translation import override
@@ -91,6 +92,12 @@ def is_remote_view_allowed(patient: Patient, address: str) -> bool:
     if not networks or patient.simulated or is_in_networks(networks, address):
         return True
     return Purpose.REMOTE in active_consents(patient)
+
+
+def allows_remote_view(patient: str) -> Q:
+    """Return the condition that the patient at a lookup may be watched from anywhere."""
+    agreed = Consent.everywhere.filter(purpose=Purpose.REMOTE, withdrawn_at=None)
+    return Q(**{f"{patient}__simulated": True}) | Q(**{f"{patient}__in": agreed.values("patient")})
 
 
 def is_care_allowed(patient: Patient) -> bool:

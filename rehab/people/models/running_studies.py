@@ -28,6 +28,17 @@ def hidden_patients(user: User) -> QuerySet[Patient]:
     return _marked(user, "assessor")
 
 
+def assessors() -> QuerySet[User]:
+    """Return the accounts that assess in a running study, and so must not know an arm."""
+    from rehab.people.models.accounts import User
+
+    return User.everywhere.filter(
+        study_marks__study__state=RUNNING,
+        study_marks__task="assessor",
+        study_marks__ended_at=None,
+    )
+
+
 def is_in_running_study(patient: Patient) -> bool:
     """Return whether a study that is not closed has, or had, this patient.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import secrets
 from datetime import datetime, timedelta
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 from django.core.exceptions import ValidationError
 from django.db import models, transaction
@@ -46,6 +46,9 @@ class TokenModel(ClinicModel):
         """Return whether the token is revoked."""
         return self.revoked_at is not None
 
+    def note_issuer(self, by: User, now: datetime) -> None:
+        """Note who gives the row a token by hand, where that matters. Usually it does not."""
+
     def new_token(self) -> str:
         """Set and return a new token; the old one stops working once the row is saved.
 
@@ -68,6 +71,7 @@ def renew_token(holder: TokenModel, request: HttpRequest, now: datetime) -> str:
     with transaction.atomic():
         record_security_change(Act.TOKEN, request, holder, now)
         token = holder.new_token()
+        holder.note_issuer(cast(User, request.user), now)
         holder.revoked_at = None
         holder.save()
     return token

@@ -37,6 +37,7 @@ class TokenAdmin(ScopedAdmin):
         """Save the row, a new one with a token."""
         if not change:
             obj.token = obj.new_token()
+            obj.note_issuer(request.user, timezone.now())
         super().save_model(request, obj, form, change)
 
     def response_add(self, request: HttpRequest, obj: Any, *args: Any, **kwargs: Any) -> Any:
@@ -56,8 +57,9 @@ class TokenAdmin(ScopedAdmin):
         )
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
+    @asks_who_it_is
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
-        """Revoke the tokens of the chosen rows."""
+        """Revoke the tokens of the chosen rows; ask for the password."""
         valid = list(holders.filter(revoked_at__isnull=True))
         for holder in valid:  # one by one, so that the change history records each
             holder.revoked_at = timezone.now()

@@ -25,6 +25,7 @@ from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.flow import is_session_valid
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.stations import tablets
+from rehab.stations.device_trust import is_trusted
 from rehab.stations.models import Device
 from rehab.stations.tablets import find_tablet
 from rehab.stations.tokens import adopt_successor, find_device, give_successor, is_successor_due
@@ -79,7 +80,7 @@ def authenticate(scope: Mapping[str, Any]) -> Actor:
     if not is_own_origin(scope):
         return None
     return _signed_in(scope) or find_tablet(
-        socket_cookies(scope).get(tablets.COOKIE), timezone.now()
+        socket_cookies(scope).get(tablets.COOKIE), timezone.now(), socket_address(scope)
     )
 
 
@@ -135,13 +136,13 @@ def find_unauthorized(
 ) -> list[int]:
     """Return the indexes of clients, given with their scopes, that are no longer authorized.
 
-    These are devices whose token was revoked or renewed, tablets whose session has ended and is not
-    theirs to show any more, and people whose sign-in has ended.
+    These are devices whose token was revoked or renewed, tablets whose approver may let none in any
+    more or whose session is not theirs to show any more, and people whose sign-in has ended.
     """
     devices = {actor.pk for actor, _ in clients if isinstance(actor, Device)}
     people = {actor.pk for actor, _ in clients if isinstance(actor, User)}
     digests = {browser_session_digest(scope) for actor, scope in clients if isinstance(actor, User)}
-    valid = Device.everywhere.filter(pk__in=devices, revoked_at__isnull=True)
+    valid = Device.everywhere.filter(is_trusted(), pk__in=devices, revoked_at__isnull=True)
     hashes = dict(valid.values_list("pk", "token_hash"))
     accounts = User.everywhere.select_related("clinic").in_bulk(people)
     live = Session.objects.filter(session_key__in=digests, expire_date__gt=now)
@@ -158,7 +159,8 @@ def find_unauthorized(
             if hashes.get(actor.pk) not in {actor.token_hash, actor.given_hash}:
                 return False
             shown = _session_id(scope)
-            return shown not in ended_ids or _is_visible(actor, shown)
+            is_asked = shown in ended_ids or (shown and actor.is_away)
+            return not is_asked or _is_visible(actor, shown)
         if actor is None:
             return True
         account, data = accounts.get(actor.pk), signed_in.get(browser_session_digest(scope))
@@ -198,7 +200,7 @@ def socket_address(scope: Mapping[str, Any]) -> str:
 
 @database_sync_to_async
 def may_watch(actor: Actor, session_id: int, scope: Mapping[str, Any]) -> bool:
-    """Return whether a person may watch from a socket's address; a device always may."""
+    """Return whether a person may watch from a socket's address; `may_open` asks for a device."""
     if not isinstance(actor, User):
         return True
     patients = Patient.everywhere.filter(sessions=session_id).select_related("clinic")

@@ -13,6 +13,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.reports.incident import review_incident
@@ -41,6 +42,7 @@ def show_incident(request: HttpRequest, incident_id: int) -> HttpResponse:
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
+@step_up.required_for_download
 @require_GET
 def download_incident(request: HttpRequest, incident_id: int) -> HttpResponse:
     """Return the recording as a file, which `python -m robot replay` plays."""

@@ -14,6 +14,7 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import public, tablet_of
 from rehab.people.networks import client_address
+from rehab.people.sign_in.devices import describe_browser
 from rehab.sessions.models import TrainingSession
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device
@@ -38,13 +39,17 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
         session = current_session(tablet)
         if session is not None:
             return redirect("walk", session_id=session.pk)
-        return render(request, "sessions/tablet.html", {"station": tablet.station})
+        context = {"station": tablet.station, "is_away": tablet.is_away}
+        return render(request, "sessions/tablet.html", context)
     now = timezone.now()
     begun = pairing.find_pairing(request.COOKIES.get(PAIRING_COOKIE, ""), now)
     if begun is not None and begun.device is None:
         return _show_code(request, begun.code)
+    if begun is not None and (token := pairing.claim_token(begun)) is not None:
+        return _set_paired(redirect("tablet"), token)
+    agent = describe_browser(request.headers.get("User-Agent", ""))
     try:
-        begun, secret = pairing.start_pairing(client_address(request), now)
+        begun, secret = pairing.start_pairing(client_address(request), now, agent)
     except pairing.PairingRefused as refused:
         status = 429 if isinstance(refused, pairing.PairingRateLimited) else 503
         return render(request, "sessions/tablet.html", {"problem": refused}, status=status)
@@ -54,10 +59,17 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
 
 
 def _show_code(request: HttpRequest, code: str) -> HttpResponse:
-    place = request.build_absolute_uri(f"{reverse('pair')}?code={code}")
+    place = request.build_absolute_uri(reverse("pair"))  # without the code: a person compares it
     drawing = segno.make(place, micro=False).svg_inline(omitsize=True, border=2)
-    context = {"code": code, "qr": drawing, "place": request.build_absolute_uri(reverse("pair"))}
+    context = {"code": code, "qr": drawing, "place": place}
     return render(request, "sessions/tablet.html", context)
+
+
+def _set_paired(response: HttpResponse, token: str) -> HttpResponse:
+    """Let the browser of an approved tablet store its token."""
+    tablets.set_secret_cookie(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
+    response.delete_cookie(PAIRING_COOKIE)
+    return response
 
 
 @public
@@ -97,7 +109,4 @@ def tablet_state(request: HttpRequest) -> HttpResponse:
         return JsonResponse({"paired": False, "go": reverse("tablet")})  # for a new code
     token = pairing.claim_token(begun)
     response = JsonResponse({"paired": token is not None, "go": reverse("tablet") if token else ""})
-    if token is not None:
-        tablets.set_secret_cookie(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
-        response.delete_cookie(PAIRING_COOKIE)
-    return response
+    return response if token is None else _set_paired(response, token)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import segno
 from django.conf import settings
 from django.contrib import messages
@@ -13,13 +15,17 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import actor_of, clinic_of, for_roles, tablet_of, user_of
+from rehab.people.audit.audit_log import truncate_address
+from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
+from rehab.people.sign_in.devices import describe_browser
 from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
+from rehab.stations.device_trust import NotTrusted
 from rehab.stations.models import Station
-from rehab.stations.pairing import PairingRefused, approve_pairing
+from rehab.stations.pairing import PairingRefused, approve_pairing, find_by_code
 from rehab.stations.pins import PinRefused, check_pin
 from rehab.stations.tablets import COOKIE
 
@@ -31,34 +37,42 @@ def pair(request: HttpRequest) -> HttpResponse:
     """Approve the tablet that shows a code, for a station of the person's own clinic."""
     user = user_of(request)
     first_station(clinic_of(user))
-    problem = ""
-    if request.method == "POST":
-        problem = let_in(request)
-        if not problem:
-            return redirect("start")
-    context = {
-        "stations": Station.objects.visible_to(user),
-        "code": request.POST.get("code", request.GET.get("code", ""))[:16],
-        "problem": problem,
-    }
-    return render(request, "stations/pair.html", context | tablet_address(request))
+    asked = let_in(request) if request.method == "POST" else {}
+    if asked is None:
+        return redirect("start")
+    context = {"stations": Station.objects.visible_to(user), **asked, **tablet_address(request)}
+    return render(request, "stations/pair.html", context)
 
 
-def let_in(request: HttpRequest) -> str:
-    """Approve the tablet that shows the code that was sent; return why not, "" where it worked."""
-    user = user_of(request)
+def let_in(request: HttpRequest) -> dict[str, Any] | None:
+    """Let in the tablet that shows the code that was sent, once a person has compared it.
+
+    Return None where that is done; else the context of `stations/pair_form.html`: why not, or what
+    there is to compare.
+    """
+    user, now = user_of(request), timezone.now()
+    code, here = request.POST.get("code", "")[:16], client_address(request)
     stations = Station.objects.visible_to(user)
     station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
     if station is None:
-        return _("Choose a station.")
+        return {"code": code, "problem": _("Choose a station.")}
     try:
-        code = request.POST.get("code", "")[:16]
-        device = approve_pairing(code, station, user.pk, timezone.now())
-    except PairingRefused as refused:
-        return str(refused)
+        pairing = find_by_code(code, user, now)
+        if request.POST.get("compared") != "yes":
+            theirs, own = truncate_address(pairing.address), truncate_address(here)
+            agent = describe_browser(request.headers.get("User-Agent", ""))
+            return {
+                "asking": {"code": pairing.code, "network": theirs, "browser": pairing.browser},
+                "station": station,
+                "own": {"network": own, "browser": agent},
+                "is_elsewhere": theirs != own and not station.clinic.networks,
+            }
+        device = approve_pairing(pairing, station, user, here, now)
+    except (PairingRefused, NotTrusted) as refused:
+        return {"code": code, "problem": str(refused)}
     names = {"tablet": device.name, "station": station}
     messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
-    return ""
+    return None
 
 
 def tablet_address(request: HttpRequest) -> dict[str, str]:

@@ -13,6 +13,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
 from rehab.studies.blinding import reveal_arms
 from rehab.studies.enrolling import enroll, withdraw
@@ -112,6 +113,7 @@ def leave_study(request: HttpRequest, enrollment_id: int) -> HttpResponse:
 
 
 @for_roles(Role.LEAD, Role.PT)
+@step_up.required
 @require_POST
 def reveal(request: HttpRequest, enrollment_id: int) -> HttpResponse:
     """Show a participant's arms, with a reason; the study's events and the audit log have it."""

@@ -10,6 +10,8 @@ from asgiref.sync import sync_to_async
 from django.contrib.sessions.models import Session
 from django.utils import timezone
 
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.browser_sessions import digest_of
@@ -23,7 +25,7 @@ from tests.support.callers import (
 )
 
 
-async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(place, begun):
+async def test_from_elsewhere_people_and_tablets_watch_with_consent_alone(place, begun):
     session = await begun(place)
     await sync_to_async(Clinic.everywhere.update)(networks="192.168.1.0/24")
 
@@ -32,7 +34,7 @@ async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(pla
     ) -> int | None:
         page = kind(session.pk, **who)
         page.wire.scope["client"] = (address, 1)
-        if address == "192.168.1.7" or "token" in who:
+        if address == "192.168.1.7":
             await page.watch()
             await page.hang_up()
             return None
@@ -42,7 +44,21 @@ async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(pla
     for kind in (PatientPage, MonitorPage):
         assert await code_of(kind, "192.168.1.7", user=place.pt) is None
         assert await code_of(kind, "203.0.113.9", user=place.pt) == 4004
-    assert await code_of(PatientPage, "203.0.113.9", token=place.tokens["tablet"]) is None
+    assert await code_of(PatientPage, "192.168.1.7", token=place.tokens["tablet"]) is None
+    assert await code_of(PatientPage, "203.0.113.9", token=place.tokens["tablet"]) == 4004
+
+
+async def test_a_tablets_open_socket_goes_with_the_consent_that_it_needs(place, begun):
+    session = await begun(place)
+    await sync_to_async(Clinic.everywhere.update)(networks="192.168.1.0/24")
+    now = timezone.now()
+    await sync_to_async(record_consent)(place.patient, Purpose.REMOTE, None, now)
+    tablet = place.tablet(session)
+    tablet.wire.scope["client"] = ("203.0.113.9", 1)
+    await tablet.watch()
+    await sync_to_async(withdraw_consent)(place.patient, Purpose.REMOTE, None, now)
+    await runtimes.current().routines.check_sign_ins()
+    assert (await tablet.sent_away())[0] == 4001
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from asgiref.sync import sync_to_async
 from django.contrib.sessions.models import Session
 from django.utils import timezone
 
-from rehab.people.models import Clinic
+from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
 from rehab.sessions.live import auth, routines
@@ -77,6 +77,17 @@ async def test_tablets_of_open_sessions_are_asked_for_together(place, begun, mon
     clients = [(one.actor, one.scope) for one in runtimes.current().sockets]
     assert len(clients) == 1
     assert await auth.find_unauthorized(clients, timezone.now()) == []
+
+
+async def test_a_tablet_goes_with_the_account_that_let_it_in(place, begun):
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    await User.everywhere.filter(clinic=place.clinic.pk).aupdate(is_active=False)
+    assert (await tablet.sent_away())[0] == 4001
+    again = await place.tablet(session).dial()
+    assert (await again.sent_away())[0] == 4001
+    await place.source().open()  # a program has no approver
 
 
 async def test_a_new_password_ends_open_sockets(place, begun):

@@ -22,6 +22,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
 from tests.support.callers import OWN_PAGE, Caller
 from tests.support.identities import find_identities, identifying_texts
+from tests.support.tablets import approved
 from tests.support.walks import make_session
 from tests.support.world import Actor, World, all_actors, build_world, signed_in
 
@@ -46,9 +47,7 @@ class Everyone:
         for world in self.worlds:
             station = world.rows[Station]
             for kind in (Device.Kind.TABLET, Device.Kind.ROBOT):
-                device = Device(clinic=world.clinic, station=station, kind=kind, name=kind)
-                token = device.new_token()
-                device.save()
+                device, token = approved(station, kind, kind=kind)
                 self.tokens[device.pk] = token
                 self.actors.append(Actor(f"{kind} of {world.name}", device, world.name, "device"))
         self.cookies: dict[str, str] = {}
