@@ -108,8 +108,8 @@ class Leaderboard(ClinicModel):
         null=True,
         blank=True,
         help_text=_(
-            "For a report: the board stays as it was at the end of this day. Nobody enters it "
-            "afterwards, and who leaves the boards leaves it."
+            "For a report: the board stays as it was at the end of this day. No patient is "
+            "added afterwards; patients who leave the boards are removed from it, too."
         ),
     )
     display = models.CharField(

@@ -609,6 +609,33 @@ class Migration(migrations.Migration):
                     models.DateTimeField(editable=False, null=True, verbose_name="old token seen"),
                 ),
                 (
+                    "approved_at",
+                    models.DateTimeField(editable=False, null=True, verbose_name="let in at"),
+                ),
+                (
+                    "network",
+                    models.CharField(
+                        blank=True, editable=False, max_length=45, verbose_name="network"
+                    ),
+                ),
+                (
+                    "browser",
+                    models.CharField(
+                        blank=True, editable=False, max_length=32, verbose_name="browser"
+                    ),
+                ),
+                (
+                    "approver",
+                    models.ForeignKey(
+                        editable=False,
+                        null=True,
+                        on_delete=django.db.models.deletion.SET_NULL,
+                        related_name="+",
+                        to=settings.AUTH_USER_MODEL,
+                        verbose_name="let in by",
+                    ),
+                ),
+                (
                     "clinic",
                     models.ForeignKey(
                         on_delete=django.db.models.deletion.PROTECT,
@@ -971,7 +998,7 @@ class Migration(migrations.Migration):
                     "by",
                     models.ForeignKey(
                         null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
+                        on_delete=django.db.models.deletion.PROTECT,
                         related_name="+",
                         to=settings.AUTH_USER_MODEL,
                         verbose_name="by",
@@ -1161,7 +1188,7 @@ class Migration(migrations.Migration):
                     "frozen_on",
                     models.DateField(
                         blank=True,
-                        help_text="For a report: the board stays as it was at the end of this day. Nobody enters it afterwards, and who leaves the boards leaves it.",
+                        help_text="For a report: the board stays as it was at the end of this day. No patient is added afterwards; patients who leave the boards are removed from it, too.",
                         null=True,
                         verbose_name="frozen on",
                     ),
@@ -1469,6 +1496,8 @@ class Migration(migrations.Migration):
                 ("code", models.CharField(max_length=8, unique=True)),
                 ("secret_hash", models.CharField(max_length=64, unique=True)),
                 ("expires_at", models.DateTimeField()),
+                ("address", models.CharField(blank=True, max_length=45)),
+                ("browser", models.CharField(blank=True, max_length=32)),
                 (
                     "device",
                     models.ForeignKey(
@@ -1939,6 +1968,7 @@ class Migration(migrations.Migration):
                             ("token_use", "Used a token from a new network"),
                             ("refused", "Was refused"),
                             ("token", "Gave a new token"),
+                            ("tablet_in", "Let a tablet in"),
                             ("token_copy", "Used a token that was replaced"),
                             ("family_link", "Gave a family a link"),
                             ("family_end", "Ended a family's link"),
@@ -2562,7 +2592,7 @@ class Migration(migrations.Migration):
                     "months_since_stroke",
                     models.PositiveSmallIntegerField(
                         blank=True,
-                        help_text="Whom the study takes in. Empty: anybody, also days after it.",
+                        help_text="Who may enroll. Empty: every patient, however recent the stroke.",
                         null=True,
                         verbose_name="least months since the stroke",
                     ),

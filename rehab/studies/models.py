@@ -93,7 +93,7 @@ class Study(ClinicModel):
         _("least months since the stroke"),
         null=True,
         blank=True,
-        help_text=_("Whom the study takes in. Empty: anybody, also days after it."),
+        help_text=_("Who may enroll. Empty: every patient, however recent the stroke."),
     )
     visits = models.PositiveSmallIntegerField(_("visits in each period"), default=1)
     days_between = models.PositiveSmallIntegerField(_("days between visits"), default=1)
