@@ -124,9 +124,12 @@ class DeviceAdmin(TokenAdmin):
     )
     list_select_related = ("station",)
     search_fields = ("name", "station__name")
-    fields = ("station", "kind", "name", "state", "created_at", "last_seen_at", "revoked_at")
-    fields += ("approver", "approved_at", "network", "browser")
-    readonly_fields = ("state", *TokenAdmin.readonly_fields, *fields[-4:])
+    approval = ("approver", "approved_at", "network", "browser")
+    fields = (
+        *("station", "kind", "name", "state", "created_at", "last_seen_at", "revoked_at"),
+        *approval,
+    )
+    readonly_fields = ("state", *TokenAdmin.readonly_fields, *approval)
     radio_fields = {"kind": admin.HORIZONTAL}
 
     @admin.display(description=_("state"), ordering="last_seen_at")

@@ -83,7 +83,6 @@ class Device(TokenModel):
     network = models.CharField(_("network"), max_length=45, blank=True, editable=False)
     browser = models.CharField(_("browser"), max_length=32, blank=True, editable=False)
 
-    is_approved = True  # `device_trust.is_trusted`, on objects of queries that ask for it
     address = ""  # from which this object's holder connects
     given_hash = ""  # of the successor that this object's holder was given
 

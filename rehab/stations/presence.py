@@ -40,7 +40,7 @@ def format_device_state(device: Device, now: datetime) -> str:
     """Return what is wrong with a device's token, else when it last connected."""
     if device.is_revoked:
         return gettext("revoked")
-    if not device.is_approved or is_unused(device, now):
+    if not getattr(device, "has_approver", True) or is_unused(device, now):  # where it was asked
         return gettext("ended with its approver’s rights or unused: let it in again")
     if device.has_expired(now):
         return gettext("its token has expired: give it a new one")

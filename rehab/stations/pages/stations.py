@@ -29,7 +29,7 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     """List the clinic's stations with their devices, and how well each is heard."""
     user, now = user_of(request), timezone.now()
     first_station(clinic_of(user))
-    devices = Device.objects.visible_to(user).annotate(is_approved=is_trusted())
+    devices = Device.objects.visible_to(user).annotate(has_approver=is_trusted())
     devices = devices.select_related("approver").order_by("kind", "name")
     stations = Station.objects.visible_to(user).prefetch_related(Prefetch("devices", devices))
     context = {
