@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from rehab.gait.settings import CUTOFF_HZ
 from rehab.gait.signals.filters import Floats, ZeroPhaseFilter
 from rehab.gait.signals.samples import LegSamples
-from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import GaitInputError, Stride
 
 # Okabe and Ito's colors, which people tell apart however they see colors; marks differ as well.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rehab.gait.settings import CUTOFF_HZ
 from rehab.gait.signals.filters import (
     Floats,
     ZeroPhaseFilter,
@@ -20,7 +21,6 @@ from rehab.gait.stances.resampling import ResampledStance
 # (docs/reference/gait.md#center-of-pressure).
 COP_FORCE_N = 40.0
 COP_REACH_M = 0.35  # from the ankle; no shoe is longer
-CUTOFF_HZ = 6.0
 # Of stance; the peak comes at 0.88-0.90 of it (docs/reference/gait.md#push-off).
 PUSH_OFF_FROM = 0.4
 # How the signals are extended after the last sample, for the filter: the ankle's plantarflexion
