@@ -11,7 +11,7 @@ from django.conf import settings
 from django.core import checks
 from django.core.checks import CheckMessage, Error, Tags, register
 
-from rehab.people.policy import find_undeclared
+from rehab.people.field_policy import find_undeclared
 
 # Variables of tests, of robots and of sources, which may run on the same machine.
 OF_OTHERS = ("GARRY_TEST_", "GARRY_ROBOT_", "GARRY_ROS_URL", "GARRY_SERVER", "GARRY_TOKEN")
@@ -159,7 +159,7 @@ def check_personal_fields(**_: Any) -> list[CheckMessage]:
             f"{name} leads to a patient, and its model does not say what becomes of it.",
             hint="Add it to `personal`, beside the model's fields: whether it is erased, shown in "
             "the patient's data, exported for research and recorded in the history "
-            "(rehab/people/policy.py). An entry of no field goes.",
+            "(rehab/people/field_policy.py). An entry of no field goes.",
             id="garry.E013",
         )
         for name in find_undeclared()

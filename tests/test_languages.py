@@ -102,7 +102,11 @@ def test_translations_end_and_are_written_as_their_sources():
 
 def test_patients_read_sentences_of_six_words_at_most():
     """As English is written for them: after a stroke, reading is work."""
-    read = {"static/js/walk/text.js", "rehab/training/valences.py", "rehab/training/phases.py"}
+    read = {
+        "static/js/walk/text.js",
+        "rehab/training/feedback_types.py",
+        "rehab/training/phases.py",
+    }
     for entry in entries():
         if entry.comment == "refusal":  # a therapist reads it
             continue

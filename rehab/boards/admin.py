@@ -19,14 +19,14 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.people.access import user_of
 from rehab.people.models import BoardsConsent, Patient
-from rehab.people.models.running_studies import hidden_patients
+from rehab.people.models.blinding import hidden_patients
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.people.web.row_forms import ClinicForm
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
-from rehab.training.valences import VALENCES
+from rehab.training.feedback_types import VALENCES
 
 MAX_SEEN_AS = 60  # patients that the preview offers as viewers, the latest to walk first
 MAX_GROUP = 1_000  # the preview's URL contains each key; servers refuse URLs beyond 16 kB

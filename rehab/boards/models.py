@@ -23,8 +23,8 @@ from rehab.boards.choices import (
     metric_choices,
 )
 from rehab.boards.validation import find_invalid_settings
+from rehab.people.field_policy import personal_fields, retained
 from rehab.people.models import BoardsConsent, Clinic, Patient
-from rehab.people.policy import personal_fields, retained
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 

@@ -21,8 +21,8 @@ from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
+from rehab.people.field_policy import describe
 from rehab.people.models import Patient, User
-from rehab.people.policy import describe
 from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import Enrollment
 from rehab.training.scoring import RULES_VERSION

@@ -11,8 +11,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.exports.selection import Selection
 from rehab.exports.table import Column, Table, Type
+from rehab.people.field_policy import Covariate, covariates
 from rehab.people.models import Patient
-from rehab.people.policy import Covariate, covariates
 from rehab.sessions.log import MEASURE_UNIT
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.option import AS_IS, Group, Option, OptionColumn

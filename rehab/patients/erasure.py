@@ -20,21 +20,21 @@ from rehab.people.audit.history import erase_values
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.consent.tombstones import block_reimport
-from rehab.people.models import Clinic, ErasureReason, Patient, User
-from rehab.people.policy import (
+from rehab.people.field_policy import (
     Erasure,
     erased_values,
     erasers_of,
     paths_to_patient,
     policies_of,
 )
+from rehab.people.models import Clinic, ErasureReason, Patient, User
 from rehab.sessions.formatting import clinic_time
 
 
 def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetime) -> None:
     """Erase everything that identifies a person, permanently. Raises SessionStillOpen.
 
-    What becomes of each field stands beside it (`rehab.people.policy`).
+    What becomes of each field stands beside it (`rehab.people.field_policy`).
     """
     with transaction.atomic():
         transaction.on_commit(_empty_journal)

@@ -18,9 +18,9 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.audit.audit_log import Act, build_entry, record, record_counted
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents, consent_withdrawn
+from rehab.people.field_policy import deleted, personal_fields
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.models.running_studies import hidden_patients, is_in_running_study
-from rehab.people.policy import deleted, personal_fields
+from rehab.people.models.blinding import hidden_patients, is_in_running_study
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.sign_in.tokens import TOKEN_BYTES, hash_token
 

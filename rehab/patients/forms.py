@@ -13,9 +13,9 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import clinic_of
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import offered_purposes, record_boards_consent, record_consent
+from rehab.people.field_policy import details
 from rehab.people.forms import PatientFieldsForm
 from rehab.people.models import BoardsConsent, EndReason, ErasureReason, Patient, User
-from rehab.people.policy import details
 
 
 class MonthField(forms.DateField):

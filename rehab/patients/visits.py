@@ -11,8 +11,8 @@ from django.db import models
 from django.db.models import Count
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.field_policy import deleted, personal_fields
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.policy import deleted, personal_fields
 from rehab.people.scope import ClinicModel, Scope
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession

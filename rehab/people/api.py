@@ -16,8 +16,8 @@ from ninja import Field, Path, Query, Router, Schema, Status
 from pydantic import BeforeValidator, create_model
 
 from rehab.people.access import clinic_of, for_roles
+from rehab.people.field_policy import details
 from rehab.people.models import LANGUAGES, Patient, User
-from rehab.people.policy import details
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
     Key,

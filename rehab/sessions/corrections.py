@@ -17,8 +17,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
+from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import Patient, User
-from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.roles import may_see_names
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import figures_stored

@@ -10,7 +10,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
-from rehab.people.policy import personal_fields, retained
+from rehab.people.field_policy import personal_fields, retained
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession
 from robot.wire.incident import unpack

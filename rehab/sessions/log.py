@@ -12,8 +12,8 @@ from django.dispatch import Signal
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import SIDES, Patient, User
-from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import SessionScope, TrainingSession
 from rehab.training.changes import ChangeKind

@@ -17,15 +17,15 @@ from django.utils.translation import gettext_lazy as _
 from rehab.feedback.translation import valence_choices
 from rehab.people.consent.models import PatientScope
 from rehab.people.consent.services import allows_remote_view
+from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import SIDES, Clinic, Patient, User
-from rehab.people.policy import erased, personal_fields, retained
 from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ENDED_STATES, OPEN_STATES, STATE_LABELS, State
+from rehab.training.feedback_types import VALENCES
 from rehab.training.plans import SessionPlan
-from rehab.training.valences import VALENCES
 
 WALKED = retained("what was walked and how, under a pseudonym", shown=True, research=True)
 SCORES_SHOWN_FOR = timedelta(minutes=15)

@@ -12,9 +12,9 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.field_policy import personal_fields, retained
 from rehab.people.models import Clinic
 from rehab.people.models.clinics import language_choices
-from rehab.people.policy import personal_fields, retained
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.questionnaires.instrument import Instrument, read_items

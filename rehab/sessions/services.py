@@ -13,7 +13,7 @@ from django.utils.translation import gettext
 from rehab.feedback.clinic_valences import valences_of
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
-from rehab.people.models.running_studies import hidden_patients
+from rehab.people.models.blinding import hidden_patients
 from rehab.sessions.live import runtime
 from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession
@@ -24,11 +24,11 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.closeness import CloseSteps
+from rehab.training.feedback_types import CueGestures, Valence, find_valence
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import PlanSettings, SessionPlan
 from rehab.training.steps import Side
-from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):

@@ -12,7 +12,7 @@ from django.db.models import F, Q, QuerySet
 from django.utils.translation import gettext as _
 
 from rehab.people.models import User
-from rehab.people.models.running_studies import assessors
+from rehab.people.models.blinding import assessors
 from rehab.people.networks import is_in_networks
 from rehab.people.roles import Role
 from rehab.stations.models import Device

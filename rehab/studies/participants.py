@@ -10,8 +10,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
+from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.policy import erased_by, personal_fields, retained
 from rehab.people.random_codes import random_code
 from rehab.people.scope import ClinicModel, ScopedModel
 from rehab.sessions.models import TrainingSession

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 from robot.bases.base import Abilities, BaseState
 from robot.behavior.resistance import Resistance
-from robot.motion.gesture import TETHER_M, Gesture
-from robot.motion.limits import ORDER_HOLDS_S
+from robot.motion.gesture import Gesture
+from robot.motion.limits import ORDER_HOLDS_S, TETHER_M
 from robot.motion.pose import HOME
 from robot.motion.twist import Twist
 

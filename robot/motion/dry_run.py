@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import Any
 
 from robot.marking import Marked
-from robot.motion.gesture import TETHER_M, Gesture
+from robot.motion.gesture import Gesture
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import parse_gesture
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
+from robot.motion.limits import DEFAULT_LIMITS, TETHER_M, TICK_S, Limits
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME, Pose, advance
 

@@ -11,15 +11,10 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 
 from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
-from robot.motion.limits import DEFAULT_LIMITS, Limits
+from robot.motion.limits import DEFAULT_LIMITS, REACH_M, Limits
 from robot.motion.path import Drive, Segment, is_on_path, plan_path
 from robot.motion.pose import HOME, Pose
 from robot.motion.score import NEUTRAL, Score
-
-# A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
-# (docs/reference/kobuki.md#beside-a-person).
-TETHER_M = 0.30
-REACH_M = 0.25
 
 # How near to its waypoint a base has to come [m, rad] (docs/reference/kobuki.md#beside-a-person
 # asks for 1 cm and 2°).

@@ -1,4 +1,4 @@
-"""Limits of speed and acceleration, and the times that orders to a base keep to."""
+"""Limits of place, speed and acceleration, and the times that orders to a base keep to."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from dataclasses import dataclass, replace
 from robot.motion.twist import STILL, Twist
 
 TICK_S = 0.02  # between two orders to a base: 50 Hz, the rate of a Kobuki's feedback
+
+# A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
+# (docs/reference/kobuki.md#beside-a-person).
+TETHER_M = 0.30
+REACH_M = 0.25
 
 # A limiter counts at most this between two orders [s]: a program that hung must not make a base
 # lurch

@@ -8,8 +8,8 @@ import pytest
 
 from robot.bases.twinned import TwinBase
 from robot.behavior.safety import AWAY
-from robot.motion.gesture import TETHER_M
 from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import TETHER_M
 from robot.play_gesture import play_gesture
 
 TIMES = 20

@@ -67,7 +67,10 @@ def test_the_defaults_are_safe():
             },
             "never above",
         ),
-        ({"tie_breaker": "score", "types": "chosen", "valences": ["explicit"]}, "has no points"),
+        (
+            {"tie_breaker": "score", "types": "chosen", "valences": ["explicit"]},
+            "has no points",
+        ),
         (
             {"period": "dates", "period_from": date(2026, 1, 1), "period_to": date.max},
             "ends on the last one",

@@ -12,8 +12,8 @@ from rehab.gait.__main__ import main
 from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.recordings.tables import read_any_table
 from rehab.gait.setup.check import check_setup
+from rehab.gait.setup.find_columns import propose
 from rehab.gait.setup.names import Label, read_label, read_unit
-from rehab.gait.setup.proposal import propose
 from tests.gait.walks import make_walk
 from tests.support.data import signals
 

@@ -26,8 +26,8 @@ from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.better_or_worse import Result
 from rehab.sessions.reports.patient_summary import describe_weeks
-from rehab.sessions.reports.results import Result
 from rehab.studies.enrolling import withdraw
 from tests.support.studies import enrolled, running_study
 from tests.support.world import NOW

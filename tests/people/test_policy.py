@@ -25,8 +25,7 @@ from rehab.patients.erasure import erase
 from rehab.people.audit import guards
 from rehab.people.audit.audit_log import Act, record
 from rehab.people.audit.history import HistoryEntry
-from rehab.people.models import ErasureReason, Patient
-from rehab.people.policy import (
+from rehab.people.field_policy import (
     Erasure,
     FieldPolicy,
     describe,
@@ -37,6 +36,7 @@ from rehab.people.policy import (
     paths_to_patient,
     policies_of,
 )
+from rehab.people.models import ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectedField, SessionCorrection
 from rehab.sessions.log import SessionEvent
@@ -74,7 +74,7 @@ def test_a_new_field_is_named_until_it_has_a_policy_and_is_erased_with_one(
     (error,) = check_personal_fields()
     assert error.id == "garry.E013"
     assert "Patient.height_cm" in error.msg
-    assert "rehab/people/policy.py" in str(error.hint)
+    assert "rehab/people/field_policy.py" in str(error.hint)
 
     policy = erased(shown=True, research=False, history=True, is_detail=True)
     monkeypatch.setitem(Patient.personal, "height_cm", policy)

@@ -13,8 +13,8 @@ import pytest
 
 from robot.__main__ import main
 from robot.bases.twinned import TwinBase
-from robot.motion.gesture import TETHER_M
 from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import TETHER_M
 from robot.play_gesture import play_gesture
 from tests.support.fake_kobuki import FakeKobuki
 

@@ -28,14 +28,14 @@ from rehab.stations import device_trust
 from rehab.stations.models import Station
 from rehab.stations.tablets import COOKIE, find_tablet
 from rehab.studies.allocation.scheme import Secret
-from rehab.studies.blinding import Task, give_mark
 from rehab.studies.enrolling import withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.registration.sealing import seal
+from rehab.studies.unblinding import Task, give_mark
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind
+from rehab.training.feedback_types import VALENCES
 from rehab.training.steps import Measurement, Side
-from rehab.training.valences import VALENCES
 from tests.support.archives import words_of
 from tests.support.studies import SEED, enrolled, new_patient, running_study
 from tests.support.tablets import pair_tablet

@@ -11,8 +11,7 @@ import re
 import pytest
 
 from rehab.training.bands import Band, Confetti, bands_from_json, bands_to_json
-from rehab.training.measures import InvalidSetting
-from rehab.training.valences import (
+from rehab.training.feedback_types import (
     POINTS_MAX,
     POSITIVE,
     VALENCES,
@@ -22,6 +21,7 @@ from rehab.training.valences import (
     edit_valence,
     find_valence,
 )
+from rehab.training.measures import InvalidSetting
 
 PRAISE = {"good", "great", "well", "strong", "nice", "perfect", "super", "reached", "won", "what"}
 BLAME = {

@@ -14,8 +14,8 @@ from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import find_deceleration_peak
+from rehab.gait.setup.find_columns import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.setup.names import read_label
-from rehab.gait.setup.proposal import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples

@@ -24,8 +24,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed
 from rehab.people.audit.sealing import ERASED, SealableModel, is_cut
+from rehab.people.field_policy import policies_of
 from rehab.people.models import Clinic, User
-from rehab.people.policy import policies_of
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
 from rehab.people.scope import Scope, ScopedModel
 

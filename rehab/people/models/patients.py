@@ -11,6 +11,14 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
 from rehab.people.covariates import age_band, months_since
+from rehab.people.field_policy import (
+    Covariate,
+    FieldPolicy,
+    erased,
+    erased_by,
+    personal_fields,
+    retained,
+)
 from rehab.people.models.choices import (
     SIDES,
     BoardsConsent,
@@ -21,14 +29,6 @@ from rehab.people.models.choices import (
     Severity,
 )
 from rehab.people.models.clinics import Clinic, language_choices
-from rehab.people.policy import (
-    Covariate,
-    FieldPolicy,
-    erased,
-    erased_by,
-    personal_fields,
-    retained,
-)
 from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope

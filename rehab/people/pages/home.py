@@ -12,7 +12,7 @@ from rehab.people.access import for_roles, public
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 from rehab.people.web.help_pages import using_guide
-from rehab.training.valences import VALENCES
+from rehab.training.feedback_types import VALENCES
 
 javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
 
@@ -22,7 +22,9 @@ javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
 def home(request: HttpRequest) -> HttpResponse:
     """Show the front page."""
     return render(
-        request, "people/home.html", {"hosted": settings.HOSTED, "valences": VALENCES.values()}
+        request,
+        "people/home.html",
+        {"hosted": settings.HOSTED, "valences": VALENCES.values()},
     )
 
 

@@ -26,7 +26,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.results import (
+from rehab.sessions.reports.better_or_worse import (
     Change,
     Result,
     find_comparable,

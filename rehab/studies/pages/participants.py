@@ -15,12 +15,12 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
-from rehab.studies.blinding import reveal_arms
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.forms import EnrollmentForm, PlaceForm
 from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participants import Enrollment
+from rehab.studies.unblinding import reveal_arms
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting

@@ -27,7 +27,6 @@ from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
-from rehab.studies.blinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.pages.refusals import log_refusal, refuse
@@ -36,6 +35,7 @@ from rehab.studies.registration.lifecycle import close, register, revise, start
 from rehab.studies.registration.protocol_pdf import write_pdf
 from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.results import may_look
+from rehab.studies.unblinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 

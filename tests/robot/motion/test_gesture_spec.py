@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot.motion.dry_run import dry_run, validate_gesture
-from robot.motion.gesture import REACH_M, TETHER_M
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import (
     MAX_MOVES,
@@ -21,7 +20,7 @@ from robot.motion.gesture_spec import (
     to_data,
 )
 from robot.motion.gestures import KNOWN_NAMES
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S
+from robot.motion.limits import DEFAULT_LIMITS, REACH_M, TETHER_M, TICK_S
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME
 from tests.support.json_values import ANYTHING

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.training.valences import VALENCES
+from rehab.training.feedback_types import VALENCES
 from robot.motion.dry_run import dry_run
-from robot.motion.gesture import REACH_M, VISIBLE_M, VISIBLE_RAD, Gesture, Waypoint
+from robot.motion.gesture import VISIBLE_M, VISIBLE_RAD, Gesture, Waypoint
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import GESTURES, KNOWN_NAMES
+from robot.motion.limits import REACH_M
 from robot.motion.path import Drive, Turn, plan_path
 from robot.motion.pools import POOLS, TABLE, VARIANTS
 from robot.motion.pose import HOME, Pose

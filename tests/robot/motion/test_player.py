@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.motion.gesture import TETHER_M, Gesture, Waypoint
+from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.gestures import GESTURES
-from robot.motion.limits import Limits
+from robot.motion.limits import TETHER_M, Limits
 from robot.motion.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
 from robot.motion.pools import VARIANTS
 from robot.motion.pose import HOME, Pose, advance
