@@ -104,7 +104,7 @@ def test_patients_read_sentences_of_six_words_at_most():
     """As English is written for them: after a stroke, reading is work."""
     read = {
         "static/js/walk/text.js",
-        "rehab/training/feedback_types.py",
+        "rehab/training/valences.py",
         "rehab/training/phases.py",
     }
     for entry in entries():

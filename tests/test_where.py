@@ -58,9 +58,9 @@ def test_a_row_leads_to_the_code(row):
 
 
 def test_a_dead_end_is_found():
-    assert find_dead_ends(["x", "`rehab/training/feedback_types.py`", "`VALENCES`"]) == []
+    assert find_dead_ends(["x", "`rehab/training/valences.py`", "`VALENCES`"]) == []
     assert find_dead_ends(["x", "`training/gone.py`", "docs/gone.md"]) == [
         "training/gone.py",
         "docs/gone.md",
     ]
-    assert find_dead_ends(["x", "`rehab/training/feedback_types.py`", "`VALENZEN`"]) == ["VALENZEN"]
+    assert find_dead_ends(["x", "`rehab/training/valences.py`", "`VALENZEN`"]) == ["VALENZEN"]

@@ -26,7 +26,7 @@ from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.people.web.row_forms import ClinicForm
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 MAX_SEEN_AS = 60  # patients that the preview offers as viewers, the latest to walk first
 MAX_GROUP = 1_000  # the preview's URL contains each key; servers refuse URLs beyond 16 kB

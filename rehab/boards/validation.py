@@ -17,7 +17,7 @@ from rehab.boards.choices import (
     Occasion,
     Participants,
 )
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 # Metrics whose range depends on the valence: boards that mix valences must not rank by them.
 POINT_METRICS = frozenset({"score", "points_per_100_steps"})

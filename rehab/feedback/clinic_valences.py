@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rehab.feedback.models import FeedbackType
 from rehab.feedback.translation import SOURCE_LANGUAGE, translate
-from rehab.training.feedback_types import VALENCES, Valence
+from rehab.training.valences import VALENCES, Valence
 
 
 def valences_of(clinic_id: int, language: str = SOURCE_LANGUAGE) -> dict[str, Valence]:

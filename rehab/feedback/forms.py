@@ -15,8 +15,8 @@ from rehab.people.models import LANGUAGES
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
 from rehab.training.bands import TEXT_MAX, Band
-from rehab.training.feedback_types import VALENCES
 from rehab.training.measures import InvalidSetting
+from rehab.training.valences import VALENCES
 
 
 def word_fields() -> dict[str, str]:

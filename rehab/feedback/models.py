@@ -17,8 +17,8 @@ from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.training.bands import Band, Confetti
-from rehab.training.feedback_types import POINTS_MAX, VALENCES, CueGestures, Valence, edit_valence
 from rehab.training.measures import InvalidSetting
+from rehab.training.valences import POINTS_MAX, VALENCES, CueGestures, Valence, edit_valence
 
 # Sent with ``row`` (a FeedbackType, or None where a clinic went back to the defaults),
 # ``clinic_id``, ``slug`` and ``by``. Receivers return the problems they met, as texts.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from rehab.training.bands import Band, Confetti
-from rehab.training.feedback_types import Valence
+from rehab.training.valences import Valence
 
 SCALE = 1.5  # the thermometer's end
 TOP_Y, BOTTOM_Y = 30, 210  # where the scale ends and begins in the drawing; the goal lies at 90

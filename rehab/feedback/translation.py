@@ -7,9 +7,9 @@ from typing import Any
 
 from django.utils.translation import gettext, gettext_lazy, override
 
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
-SOURCE_LANGUAGE = "en"  # of the words in `rehab.training.feedback_types`
+SOURCE_LANGUAGE = "en"  # of the words in `rehab.training.valences`
 
 
 def valence_choices() -> list[tuple[str, Any]]:

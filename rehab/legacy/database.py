@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 PARTICIPANTS = ("participant_id", "name")
 SESSIONS = (

@@ -13,12 +13,12 @@ from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.training.changes import State
-from rehab.training.feedback_types import VALENCES, find_valence
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
+from rehab.training.valences import VALENCES, find_valence
 
 SOURCE = "Original GARRY"
 

@@ -22,8 +22,8 @@ from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession
 from rehab.training.bands import bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
-from rehab.training.feedback_types import Valence
 from rehab.training.measures import InvalidSetting
+from rehab.training.valences import Valence
 
 
 def connect_signals() -> None:

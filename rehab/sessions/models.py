@@ -24,8 +24,8 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ENDED_STATES, OPEN_STATES, STATE_LABELS, State
-from rehab.training.feedback_types import VALENCES
 from rehab.training.plans import SessionPlan
+from rehab.training.valences import VALENCES
 
 WALKED = retained("what was walked and how, under a pseudonym", shown=True, research=True)
 SCORES_SHOWN_FOR = timedelta(minutes=15)

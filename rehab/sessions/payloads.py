@@ -8,12 +8,12 @@ from django.utils.translation import gettext, override
 
 from rehab.training.changes import ChangeValue, State
 from rehab.training.controls import CONTROLS
-from rehab.training.feedback_types import VALENCES, Valence
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Tally
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
+from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]
 

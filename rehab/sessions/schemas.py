@@ -26,9 +26,9 @@ from rehab.sessions.setup.option import Option
 from rehab.sessions.setup.options import OPTIONS
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
-from rehab.training.feedback_types import VALENCES, find_valence
 from rehab.training.steps import Side
 from rehab.training.summary.metrics import METRICS
+from rehab.training.valences import VALENCES, find_valence
 
 STEPS_MAX = 1000
 ValenceSlug = Annotated[

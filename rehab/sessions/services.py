@@ -24,11 +24,11 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.closeness import CloseSteps
-from rehab.training.feedback_types import CueGestures, Valence, find_valence
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import PlanSettings, SessionPlan
 from rehab.training.steps import Side
+from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):

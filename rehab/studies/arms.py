@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from rehab.training.feedback_types import find_valence
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.phases import Phase
 from rehab.training.plans import check_robot_intensity
 from rehab.training.schedules import Schedule
+from rehab.training.valences import find_valence
 
 MAX_ARMS = 8
 CODE = re.compile(r"[A-Z0-9]{1,4}")

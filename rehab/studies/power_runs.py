@@ -17,11 +17,11 @@ from rehab.studies.models import Study
 from rehab.studies.simulation.power import PairPower, SimulatedDifference, simulate_from, summarize
 from rehab.studies.simulation.trial import Trial, walkable
 from rehab.studies.simulation.walkers import Population
-from rehab.training.feedback_types import find_valence
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
+from rehab.training.valences import find_valence
 
 SIMULATIONS_MAX = 5000
 STORED_EVERY_S = 3.0  # so much work is lost at most

@@ -15,7 +15,7 @@ from rehab.sessions.formatting import (
     format_rate,
     format_source,
 )
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 from robot.wire.close_codes import FINAL_FOR_PAGES
 from robot.wire.limits import PAGE_HEARTBEAT_S
 

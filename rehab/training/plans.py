@@ -15,12 +15,12 @@ from rehab.training.cueing import (
     check_activation_threshold,
     check_cue_rule,
 )
-from rehab.training.feedback_types import CueGestures, Valence
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
+from rehab.training.valences import CueGestures, Valence
 from robot.marking import gettext_noop
 
 # How lively the robot is: the share of a gesture's size, by a name that pages translate. The robot

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 from rehab.training.closeness import CloseSteps
-from rehab.training.feedback_types import Valence
 from rehab.training.measures import Measure
 from rehab.training.steps import Measurement, ScoredStep, Side
+from rehab.training.valences import Valence
 from robot.wire.limits import PERFORMANCE_MAX
 
 # Rises with every change that could alter a stored verdict; every step keeps the one it had, and is

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.boards.ranking.sessions import CountedSession
-from rehab.training.feedback_types import NEGATIVE
 from rehab.training.summary.metrics import compute_metrics
+from rehab.training.valences import NEGATIVE
 from tests.support.clock import HERE
 from tests.training.sessions import make_plan, start, walk
 

@@ -26,8 +26,8 @@ from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ChangeKind
-from rehab.training.feedback_types import VALENCES
 from rehab.training.phases import make_phase
+from rehab.training.valences import VALENCES
 from tests.support.walks import HIT, MISS, strides, walk
 from tests.support.world import NOW, World, build_world, client_of, signed_in
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 from tests.support.browsers import SIZES, signed_in
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks

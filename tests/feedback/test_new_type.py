@@ -1,4 +1,4 @@
-"""What another feedback type needs beside its entry in `training/feedback_types.py`, by name."""
+"""What another feedback type needs beside its entry in `training/valences.py`, by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from django.utils.choices import CallableChoiceIterator
 
 from rehab.feedback.translation import valence_choices
 from rehab.training.bands import Confetti
-from rehab.training.feedback_types import POSITIVE, VALENCES, Valence
+from rehab.training.valences import POSITIVE, VALENCES, Valence
 
 ROOT = Path(__file__).parents[2]
 

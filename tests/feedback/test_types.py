@@ -10,7 +10,7 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.feedback.preview import preview_bands
 from rehab.feedback.translation import pick_words
 from rehab.people.roles import Role
-from rehab.training.feedback_types import VALENCES, CueGestures
+from rehab.training.valences import VALENCES, CueGestures
 from tests.support.forms import feedback_form
 from tests.support.marks import mark
 from tests.support.world import client_of

@@ -14,7 +14,7 @@ from rehab.patients.visits import plan_visit
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.better_or_worse import Result
 from rehab.sessions.reports.patient_summary import describe_today, is_milestone
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 from tests.support.boards import tablet_at
 from tests.support.walks import HIT, MISS, walk
 from tests.support.world import NOW, World

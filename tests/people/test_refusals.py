@@ -20,10 +20,10 @@ from rehab.people.web.refusals import format_refusal
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.training.changes import ChangeKind, NotAllowed, State
 from rehab.training.controls import CONTROLS
-from rehab.training.feedback_types import VALENCES, CueGestures, edit_valence
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
+from rehab.training.valences import VALENCES, CueGestures, edit_valence
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, build_gesture
 from tests.support.forms import feedback_form, gesture_form, session_form

@@ -16,9 +16,9 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.cueing import CueTiming
-from rehab.training.feedback_types import CueGestures
 from rehab.training.measures import InvalidSetting
 from rehab.training.schedules import Schedule, ScheduleKind
+from rehab.training.valences import CueGestures
 from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
 from robot.wire.cue_limits import CueRule

@@ -34,8 +34,8 @@ from rehab.studies.registration.sealing import seal
 from rehab.studies.unblinding import Task, give_mark
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.feedback_types import VALENCES
 from rehab.training.steps import Measurement, Side
+from rehab.training.valences import VALENCES
 from tests.support.archives import words_of
 from tests.support.studies import SEED, enrolled, new_patient, running_study
 from tests.support.tablets import pair_tablet

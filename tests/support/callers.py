@@ -22,9 +22,9 @@ from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
-from rehab.training.feedback_types import CueGestures
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
+from rehab.training.valences import CueGestures
 from tests.support.tablets import approved
 from tests.support.world import signed_in
 

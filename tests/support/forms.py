@@ -7,7 +7,7 @@ from typing import Any
 from rehab.feedback.admin import initial_bands
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 
 def feedback_form(slug: str, **changes: Any) -> dict[str, Any]:

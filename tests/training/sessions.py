@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.feedback_types import VALENCES, Valence, find_valence
 from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, Measure
 from rehab.training.phases import Phase, make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Measurement, ScoredStep, Side
+from rehab.training.valences import VALENCES, Valence, find_valence
 
 STRIDE_S = 1.0
 

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training.closeness import COVERAGE, CloseSteps
-from rehab.training.feedback_types import VALENCES
 from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import make_phase
@@ -16,6 +15,7 @@ from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.steps import Measurement, Side
 from rehab.training.summary.summary import summarize_session
+from rehab.training.valences import VALENCES
 from tests.training.sessions import make_plan, start
 
 GOAL = 4.0

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from rehab.training.bands import Band, Confetti, bands_to_json
 from rehab.training.changes import Change, ChangeKind, PauseReason
-from rehab.training.feedback_types import VALENCES, Valence
 from rehab.training.fold import SessionFold
 from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
 from rehab.training.fold.tallies import Tally
@@ -23,6 +22,7 @@ from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.steps import InvalidMeasurement, InvalidReason, Measurement, ScoredStep, Side
 from rehab.training.summary.metrics import compute_metrics
+from rehab.training.valences import VALENCES, Valence
 from robot.wire.limits import PERFORMANCE_MAX
 from tests.support.folds import fold_log
 from tests.training.sessions import make_plan, others_than, start

@@ -8,12 +8,12 @@ import math
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.feedback_types import VALENCES
 from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
 from rehab.training.measures import A2, InvalidSetting, Measure
 from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import SessionPlan
+from rehab.training.valences import VALENCES
 from tests.training.sessions import SWAY, make_plan, others_than
 
 

@@ -19,10 +19,10 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
-from rehab.training.feedback_types import BINARY, NEGATIVE
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
+from rehab.training.valences import BINARY, NEGATIVE
 from tests.support.folds import fold_log
 from tests.training.sessions import make_plan, step_at, walk
 

@@ -7,12 +7,12 @@ import json
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.feedback_types import VALENCES
 from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
 from rehab.training.phases import make_phase
 from rehab.training.steps import Side
 from rehab.training.summary.summary import summarize_session
+from rehab.training.valences import VALENCES
 from tests.training.sessions import make_plan, start, walk
 
 

@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.feedback_types import VALENCES, CueGestures
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import InvalidReason, Measurement, ScoredStep, Side
 from rehab.training.summary.metrics import compute_metrics
 from rehab.training.summary.summary import summarize_phases
+from rehab.training.valences import VALENCES, CueGestures
 from tests.training.sessions import make_plan, others_than, start, walk
 
 GOAL = 4.0

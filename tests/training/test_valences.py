@@ -11,7 +11,8 @@ import re
 import pytest
 
 from rehab.training.bands import Band, Confetti, bands_from_json, bands_to_json
-from rehab.training.feedback_types import (
+from rehab.training.measures import InvalidSetting
+from rehab.training.valences import (
     POINTS_MAX,
     POSITIVE,
     VALENCES,
@@ -21,7 +22,6 @@ from rehab.training.feedback_types import (
     edit_valence,
     find_valence,
 )
-from rehab.training.measures import InvalidSetting
 
 PRAISE = {"good", "great", "well", "strong", "nice", "perfect", "super", "reached", "won", "what"}
 BLAME = {

@@ -23,7 +23,7 @@ from rehab.boards.ranking.sessions import read_sessions
 from rehab.boards.ranking.standings import Standings
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.training.feedback_types import Valence
+from rehab.training.valences import Valence
 
 
 class Scale(StrEnum):

@@ -17,7 +17,7 @@ from rehab.boards.validation import POINT_METRICS
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 # Ratios that are shown in percent.
 PERCENT_METRICS = frozenset({"hit_rate", "mean_performance"})

@@ -27,12 +27,12 @@ from rehab.sessions.payloads import describe_cue
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.recording import Recording, RecordingError, read_recording
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
-from rehab.training.feedback_types import VALENCES
 from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
+from rehab.training.valences import VALENCES
 from robot.simulation import SIMULATED_BASES, Simulation
 
 BASELINE_STRIDES = 54

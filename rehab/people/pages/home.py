@@ -12,7 +12,7 @@ from rehab.people.access import for_roles, public
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 from rehab.people.web.help_pages import using_guide
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
 

@@ -17,12 +17,12 @@ from rehab.sessions.payloads import (
 )
 from rehab.training.bands import Band
 from rehab.training.controls import Audience
-from rehab.training.feedback_types import Emblem, Valence
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import FeedbackSummary, ScheduleKind
 from rehab.training.steps import ScoredStep
+from rehab.training.valences import Emblem, Valence
 
 StoredStep = Step | ScoredStep
 # What the therapist's page gets of a step, under the same names: all that its scoring says.

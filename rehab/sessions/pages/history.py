@@ -34,7 +34,7 @@ from rehab.sessions.reports.trend import (
     summarize_trend,
     trend_chart_data,
 )
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 PAGE_SIZE = 20
 PERIODS = {"4": _("4 weeks"), "12": _("12 weeks"), "52": _("a year")}  # by how many weeks

@@ -26,8 +26,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
 from rehab.training.bands import TEXT_MAX, bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
-from rehab.training.feedback_types import Valence
 from rehab.training.measures import InvalidSetting
+from rehab.training.valences import Valence
 
 
 class WordsForm(forms.Form):

@@ -26,7 +26,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.intervals import MeanInterval, mean_interval
 from rehab.sessions.reports.noted import ADVERSE, Noted, load_noted
 from rehab.sessions.reports.trend import metrics_by_session
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 MAX_SESSIONS = 2000  # the newest
 EQUAL_WITHIN = 1.1  # goals of one measure count as equal up to so much of the lowest

@@ -20,10 +20,10 @@ from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS, marked_kinds
-from rehab.training.feedback_types import VALENCES
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
 from rehab.training.summary.summary import summarize_session
+from rehab.training.valences import VALENCES
 
 # Only counted: in a list they would hide what people did.
 ROBOT_ACTIVITY = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)

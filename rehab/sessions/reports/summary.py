@@ -11,8 +11,8 @@ from django.utils.translation import ngettext
 from rehab.sessions.formatting import MISSING, format_duration, format_number, format_rate
 from rehab.sessions.reports.review import SessionReview
 from rehab.training.changes import ChangeKind
-from rehab.training.feedback_types import VALENCES
 from rehab.training.plans import SessionPlan
+from rehab.training.valences import VALENCES
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,8 @@ from rehab.gestures.choices import gesture_choices
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient, User
 from rehab.people.web.refusals import format_refusal
-from rehab.training.feedback_types import CueGestures
 from rehab.training.measures import InvalidSetting
+from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import KNOWN_NAMES

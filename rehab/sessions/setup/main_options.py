@@ -20,9 +20,9 @@ from rehab.sessions.setup.option import (
 )
 from rehab.sessions.setup.sources import LIVE, source_choices
 from rehab.training.changes import ChangeKind
-from rehab.training.feedback_types import POSITIVE
 from rehab.training.measures import A2
 from rehab.training.plans import ROBOT_LEVELS, name_robot_level
+from rehab.training.valences import POSITIVE
 
 GOAL_KINDS = ("value", "percent")
 # The paper's example of a goal for a whole session (docs/reference/original.md#goal-of-a-session):

@@ -20,10 +20,10 @@ from rehab.sessions.setup.options import build_parts, preset_options
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import LIVE, SIMULATED
 from rehab.sources.synthetic import PROFILES
-from rehab.training.feedback_types import find_valence
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
+from rehab.training.valences import find_valence
 
 NAME_TAKEN = gettext_noop("A preset of this name exists. Choose another name.")
 GESTURES = ("robot_above", "robot_below")

@@ -15,13 +15,13 @@ from rehab.feedback.models import FeedbackType
 from rehab.questionnaires.instrument import Instrument
 from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.models import Arm, Study
-from rehab.training.feedback_types import find_valence
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Side
+from rehab.training.valences import find_valence
 
 USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from rehab.studies.allocation.groups import Group
 from rehab.studies.simulation.trial import Trial
 from rehab.studies.simulation.walkers import Population
-from rehab.training.feedback_types import find_valence
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2
 from rehab.training.phases import Phase, make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
+from rehab.training.valences import find_valence
 
 OUTCOME = "improvement_over_baseline"
 SECONDARY = ("late_change", "washout_change", "hit_rate", "kept_between_visits")

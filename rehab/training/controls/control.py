@@ -15,11 +15,11 @@ from rehab.training.changes import (
     PauseReason,
     State,
 )
-from rehab.training.feedback_types import Valence
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import (
     SessionPlan,
 )
+from rehab.training.valences import Valence
 from robot.marking import AnyOf, Marked
 
 

@@ -22,7 +22,6 @@ from rehab.training.controls.control import (
     ValueKind,
 )
 from rehab.training.cueing import check_activation_threshold
-from rehab.training.feedback_types import VALENCES
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.plans import (
     ROBOT_LEVELS,
@@ -30,6 +29,7 @@ from rehab.training.plans import (
     check_chart_style,
     check_robot_intensity,
 )
+from rehab.training.valences import VALENCES
 from robot.marking import gettext_noop
 
 

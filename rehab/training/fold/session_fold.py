@@ -14,7 +14,6 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
-from rehab.training.feedback_types import Valence
 from rehab.training.fold.feedback_delivery import FeedbackDelivery
 from rehab.training.fold.goal_following import GoalFollowing
 from rehab.training.fold.tallies import Block, Tally
@@ -33,6 +32,7 @@ from rehab.training.steps import (
     find_invalid_reasons,
     select_value,
 )
+from rehab.training.valences import Valence
 from robot.marking import Marked, gettext_noop
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than

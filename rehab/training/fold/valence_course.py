@@ -8,9 +8,9 @@ from itertools import zip_longest
 
 from rehab.training.bands import bands_from_json
 from rehab.training.changes import NotAllowed
-from rehab.training.feedback_types import Valence
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
+from rehab.training.valences import Valence
 
 
 @dataclass(slots=True)

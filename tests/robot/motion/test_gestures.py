@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture import VISIBLE_M, VISIBLE_RAD, Gesture, Waypoint
 from robot.motion.gesture_errors import BadGesture

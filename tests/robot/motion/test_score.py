@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.behavior.expression import Expression
 from robot.motion.dry_run import dry_run

@@ -14,7 +14,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import hub
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
-from rehab.training.feedback_types import CueGestures
+from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from tests.support.callers import Message, restart
 from tests.support.robot_reports import ARM, DECISION, GESTURE, STATUS, is_stopped, log_of

@@ -11,8 +11,8 @@ from rehab.sessions.live.session import live_session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.controls import Audience
-from rehab.training.feedback_types import CueGestures
 from rehab.training.phases import make_phase
+from rehab.training.valences import CueGestures
 from tests.support.callers import events_of, restart, turns
 from tests.support.world import NOW
 

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 
 from rehab.sources.synthetic import GOOD, PROFILES, SyntheticWalker, walk
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.feedback_types import VALENCES
 from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2
 from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
+from rehab.training.valences import VALENCES
 from tests.sources.synthetic.protocols import SESSION_1, usable
 
 BASELINE = make_phase("baseline")

@@ -22,7 +22,7 @@ from rehab.sessions.formatting import (
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import to_percent, with_metrics
-from rehab.training.feedback_types import VALENCES
+from rehab.training.valences import VALENCES
 
 
 @dataclass(frozen=True, slots=True)
