@@ -20,6 +20,8 @@ STANCE_S = (0.2, 4.0)
 STRIDES_MOST = 30  # half a minute is enough
 SEEN = 0.8  # of a stride
 SHIFT = 4  # hundredths of a stride
+LIKE = 0.8  # correlation with a shape from which a column without a label may be that channel
+NAMED_LIKE = 0.6  # and from which a shape does not contradict a label
 
 _TIMES = np.arange(POINTS) / POINTS
 
