@@ -23,7 +23,7 @@ from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
 from rehab.gait.recordings.limits import limit_resources
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
-from rehab.gait.recordings.tables import read_any_table, read_signals, require_columns
+from rehab.gait.recordings.readers import read_any_table, read_signals, require_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.settings import check_mass
 from rehab.gait.setup.check import check_setup, compare_with_setup
@@ -97,7 +97,7 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
     path = paths[0]
-    time, legs, frames = read_signals(paths, options.columns)
+    time, legs, frames = read_signals(*paths, pairs=options.columns)
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     strides = measure_strides(

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, Stride, measure_strides
-from rehab.gait.recordings.tables import read_any_table
+from rehab.gait.recordings.readers import read_any_table
 from tests.gait.walks import read_moore
 from tests.support.data import signals
 

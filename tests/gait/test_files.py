@@ -7,7 +7,7 @@ import pytest
 
 from rehab.gait import GaitInputError, measure_strides
 from rehab.gait.__main__ import main
-from rehab.gait.recordings.tables import read_any_table, read_signals
+from rehab.gait.recordings.readers import read_any_table, read_signals
 from rehab.gait.setup.check import check_setup
 from rehab.gait.signals.frames import find_frame_problem
 from tests.gait.c3d import write_c3d
@@ -81,7 +81,7 @@ def test_the_same_strides_from_each_kind_of_file(walk, tmp_path, name):
     write, pairs = WRITERS[name]
     path = tmp_path / name
     write(path, walk)
-    time_s, legs, _ = read_signals(path, pairs)
+    time_s, legs, _ = read_signals(path, pairs=pairs)
 
     assert time_s == pytest.approx(walk.t_s[: len(time_s)], abs=1e-6)
     for found, given, size in zip(legs["left"][:3], walk.left, (700, 100, 0.5), strict=True):
@@ -108,7 +108,7 @@ def test_gzipped_csv(walk, tmp_path):
         np.savetxt(file, np.column_stack([walk.t_s, *walk.left]), "%.9g", ",", header="t,F,M,A",
                    comments="")  # fmt: skip
     time_s, legs, _ = read_signals(
-        path, ["time=t", "left.force=F", "left.moment=M", "left.angle=A"]
+        path, pairs=["time=t", "left.force=F", "left.moment=M", "left.angle=A"]
     )
 
     assert time_s == pytest.approx(walk.t_s, abs=1e-6)

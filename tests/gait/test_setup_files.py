@@ -9,8 +9,8 @@ import pytest
 
 from rehab.gait import GaitInputError
 from rehab.gait.__main__ import main
+from rehab.gait.recordings.readers import read_any_table
 from rehab.gait.recordings.table import Table, join_tables
-from rehab.gait.recordings.tables import read_any_table
 from rehab.gait.setup.check import check_setup
 from rehab.gait.setup.find_columns import propose
 from rehab.gait.setup.names import Label, read_label, read_unit

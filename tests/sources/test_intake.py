@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rehab.gait import measure_strides
 from rehab.gait.recordings.columns import read_column_map
-from rehab.gait.recordings.tables import read_signals
+from rehab.gait.recordings.readers import read_signals
 from rehab.training.steps import Side
 from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure, rows_of
 

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from rehab.gait.recordings.plates import assign_plates
-from rehab.gait.recordings.table import Table, resample_channel
+from rehab.gait.recordings.table import RATE_MOST_HZ, Table, resample_channel
 from rehab.gait.settings import MASS_MAX_KG, MASS_MIN_KG
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
-RATE_MOST_HZ = 100_000.0
 # By the C3D manual's type of a plate, the rows of its channels that are vertical; of the fourth
 # after its calibration.
 CALIBRATED = 4

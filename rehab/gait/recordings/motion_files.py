@@ -11,11 +11,10 @@ import numpy as np
 
 from rehab.gait.recordings import csv_files
 from rehab.gait.recordings.csv_files import open_text
-from rehab.gait.recordings.table import Table, resample_channel
+from rehab.gait.recordings.table import RATE_MOST_HZ, Table, resample_channel
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
-RATE_MOST_HZ = 100_000.0
 LINES_MAX = 5_000_000
 
 

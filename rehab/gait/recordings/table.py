@@ -9,6 +9,7 @@ import numpy as np
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
+RATE_MOST_HZ = 100_000.0  # of any sensor; a larger one is damage
 OVERLAP_S = 0.5  # a stance; files that share less are of different walks
 
 

@@ -29,7 +29,7 @@ PART_BYTES = 1024 * 1024
 WAIT_S = 90.0
 RETAINED_S = 86_400.0  # an upload that was not stored as a recording
 _one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
-# What `rehab.gait.recordings.tables` reads; it is not imported, as servers do without numpy.
+# What `rehab.gait.recordings.readers` reads; it is not imported, as servers do without numpy.
 ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".trc", ".tsv", ".txt")
 FILES_MAX = 4  # of one walk: forces, moments, angles, markers
 SIDES, CHANNELS = ("left", "right"), ("force", "moment", "angle")

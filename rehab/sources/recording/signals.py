@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rehab.gait import check_signals, measure_strides
 from rehab.gait.recordings.csv_files import read_mass
-from rehab.gait.recordings.tables import read_signals
+from rehab.gait.recordings.readers import read_signals
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.frames import find_frame_problem
 from rehab.sources.intake.measurements import to_measurement
@@ -31,7 +31,7 @@ def measure_file(
     and GaitInputError for signals that nothing can be measured from.
     """
     try:
-        t_s, legs, frames = read_signals(path, columns)
+        t_s, legs, frames = read_signals(path, pairs=columns)
     except OSError as problem:
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
     rate_hz = estimate_rate(t_s) if rate_hz is None else rate_hz

@@ -74,14 +74,14 @@ def read_any_table(*paths: Path) -> Table:
 
 
 def read_signals(
-    path: Path | Sequence[Path], pairs: Sequence[str] | None = None
+    *paths: Path, pairs: Sequence[str] | None = None
 ) -> tuple[Floats, dict[str, LegSamples], Floats | None]:
     """Return times [s], each leg's channels and the frame numbers of a recording.
 
     Parameters
     ----------
-    path
-        The file, or several of one walk. A cell that is not a number is a missing sample: NaN.
+    paths
+        The file, or those of one walk. A cell that is not a number is a missing sample: NaN.
     pairs
         Which column is which channel, as for ``read_column_map``; None to decide by the header.
 
@@ -97,7 +97,6 @@ def read_signals(
     OSError
         For a file that cannot be read.
     """
-    paths = [path] if isinstance(path, Path) else list(path)
     path, table = paths[0], read_any_table(*paths)
     columns = read_column_map(pairs) if pairs else find_layout(list(table))
     require_columns(path, table, columns)
