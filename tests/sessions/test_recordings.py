@@ -67,9 +67,13 @@ def test_files_of_one_walk_are_stored_side_by_side():
 @pytest.mark.parametrize(
     ("names", "mass", "shown"),
     [
+        (["gaitalytics_treadmill_events.c3d"], "", "RAnkleMoment.X"),
         (["btk_pig_flatfoot_full.c3d"], "", "LAnkleMoment.X"),
+        (["btk_pig_motion3_ff.c3d"], "", "LAnkleMoment.X"),
         (["g23_grf.mot", "g23_id.sto", "g23_ik.mot"], "72.6", "ankle_angle_r_moment"),
         (["g23_grf.mot"], "", "The body mass is not in this file"),
+        (["g23_id.sto"], "", "but no vertical force. Give the files that belong together"),
+        (["g23_ik.mot"], "", "but no vertical force. Give the files that belong together"),
     ],
 )
 def test_strange_files_in_the_browser(world, monkeypatch, names, mass, shown):

@@ -46,7 +46,12 @@ def measure_file(
         frame=frames,
     )
     check = check_signals(
-        t_s, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
+        t_s,
+        legs.get("left"),
+        legs.get("right"),
+        rate_hz=rate_hz,
+        mass_kg=mass_kg,
+        strides=found,
     )
     strides: list[Measurement] = []
     for stride in found:
