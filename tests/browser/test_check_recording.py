@@ -6,6 +6,7 @@ import json
 import re
 import sqlite3
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -35,8 +36,8 @@ def page(server: Server, visit: Visit) -> Page:
     return visit("/recordings/check/", ready, "laptop", has_touch=True)
 
 
-def upload(page: Page, path) -> None:
-    page.set_input_files("#file", path)
+def upload(page: Page, *paths) -> None:
+    page.set_input_files("#file", paths)
     page.fill("#mass", str(MASS_KG))
     page.click("text=Check the file")
 
@@ -109,3 +110,22 @@ def test_files_that_nothing_can_be_measured_from(page, tmp_path, name, data, sai
     expect(page.get_by_role("alert").filter(visible=True)).to_contain_text(
         re.compile(said), timeout=CHECKED_MS
     )
+
+
+def test_files_of_one_walk_are_uploaded_together(page, walk, tmp_path):
+    forces, joints = tmp_path / "forces.csv", tmp_path / "joints.csv"
+    for path, names, channels in (
+        (forces, "time,Fz1,Fz2", (walk.left[0], walk.right[0])),
+        (joints, "time,LAnkleMoment.X,LAnkleAngles.X", walk.left[1:]),
+    ):
+        np.savetxt(
+            path, np.column_stack([walk.t_s, *channels]), "%.6g", ",", header=names, comments=""
+        )
+    upload(page, forces, joints)
+    for channel, column in (
+        ("force", "Fz1"),
+        ("moment", "LAnkleMoment.X"),
+        ("angle", "LAnkleAngles.X"),
+    ):
+        chosen = page.locator(f"select[name='left.{channel}.column']")
+        expect(chosen).to_have_value(column, timeout=CHECKED_MS)

@@ -158,6 +158,16 @@ def test_wrong_columns_are_refused_with_what_was_seen(walk):
     assert compare_with_setup(found, read_column_map(right)) == []
 
 
+def test_a_doubt_about_a_labelled_column_s_sign_does_not_let_another_column_pass(walk):
+    columns = columns_of(walk, angle=57.29578)
+    columns["LAnkleAngles.X"] = columns.pop("A1")  # plantarflexion, which its label counts down
+    found = check_setup(columns)
+    assert found.proposal.guesses["left", "angle"].doubt == "its label names the other sign"
+    given = ["time=t", "left.force=Fz1", "left.moment=M1", "left.angle=M1"]
+    (wrong,) = compare_with_setup(found, read_column_map(given))
+    assert "LAnkleAngles.X looks like it, M1 does not" in wrong
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

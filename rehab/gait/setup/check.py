@@ -139,13 +139,16 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
             if guess is None:
                 continue
             what = f"{side}.{channel}={column.name}"
-            is_clear = guess.likeness > CERTAIN_LIKE and not guess.doubt
+            is_alike = guess.likeness > CERTAIN_LIKE
+            is_clear = is_alike and not guess.doubt
             if guess.column != column.name:
                 label = read_label(column.name)
                 is_named = label and label.channel == channel and label.side in {"", side}
-                if guess.is_certain or (is_clear and not is_named):
+                # A doubt about the unit or sign of a labelled column is none about the column.
+                is_this = is_clear or (is_alike and guess.is_named)
+                if guess.is_certain or (is_this and not is_named):
                     wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
-            elif guess.factor * column.factor < 0 and guess.likeness > CERTAIN_LIKE:
+            elif guess.factor * column.factor < 0 and is_alike:
                 wrong.append(f"{what}: its sign is turned. Give a factor of {guess.factor:.6g}.")
             elif abs(column.factor / guess.factor - 1) > SAME_FACTOR and is_clear:
                 wrong.append(
