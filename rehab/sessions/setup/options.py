@@ -14,14 +14,8 @@ from typing import Any
 
 from rehab.sessions.setup.answer_options import ANSWER_OPTIONS
 from rehab.sessions.setup.main_options import MAIN_OPTIONS
-from rehab.sessions.setup.option import (
-    Group,
-    Option,
-    OptionColumn,
-)
-from rehab.sessions.setup.walking import (
-    WalkingConditions,
-)
+from rehab.sessions.setup.option import Group, Option, OptionColumn
+from rehab.sessions.setup.walking import WalkingConditions
 from rehab.sessions.setup.walking_options import WALKING_OPTIONS
 from rehab.training.adaptation import GoalAdaptation
 from rehab.training.cueing import CueTiming
@@ -39,7 +33,6 @@ PARTS: dict[str, type] = {
 }
 # Groups of the options that say when page and robot answer, and whether the goal follows.
 ANSWERS = (Group.GOAL, Group.FEEDBACK, Group.ROBOT)
-
 
 OPTIONS: dict[str, Option] = {
     option.name: option for option in (*MAIN_OPTIONS, *ANSWER_OPTIONS, *WALKING_OPTIONS)

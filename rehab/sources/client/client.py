@@ -11,7 +11,7 @@ from typing import Any
 from rehab.sources.client.follower import SessionFollower
 from rehab.sources.client.journal import Journal
 from rehab.sources.client.live import LiveFeed
-from rehab.sources.client.playback import KEPT_MAX, StridePlayback
+from rehab.sources.client.playback import UNSENT_MAX, StridePlayback
 from rehab.sources.client.step_queue import StepQueue
 from rehab.training.steps import Measurement
 from robot.link import Link, LinkRefused, Message
@@ -132,7 +132,7 @@ class SourceClient:
     def _losses(self) -> str:
         """Return what of the strides is lost, or would be with this program."""
         refused = self._feed.refused if isinstance(self._feed, LiveFeed) else 0
-        words = f"; {refused} strides LOST: {KEPT_MAX} were waiting already" if refused else ""
+        words = f"; {refused} strides LOST: {UNSENT_MAX} were waiting already" if refused else ""
         if self._journal is not None and self._journal.trouble:
             words += f"; the journal {self._journal.trouble}, the latest are in memory only"
         return words

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
-from rehab.sources.client.playback import KEPT_MAX
+from rehab.sources.client.playback import UNSENT_MAX
 from rehab.sources.client.step_queue import add_own_reason
 from rehab.training.phases import make_phase
 from rehab.training.steps import InvalidReason, Measurement, Side
@@ -97,7 +97,7 @@ class LiveFeed:
         if not (self._is_open and self._has_started):
             self.excluded += 1
             return
-        if len(self._waiting) >= KEPT_MAX:
+        if len(self._waiting) >= UNSENT_MAX:
             self.refused += 1
             return
         if not self._is_running:
@@ -112,6 +112,6 @@ class LiveFeed:
 
     def poll(self, unacknowledged: int) -> Measurement | float:
         """Return the next stride to send, or infinity while there is none."""
-        if not self._waiting or unacknowledged >= KEPT_MAX:
+        if not self._waiting or unacknowledged >= UNSENT_MAX:
             return math.inf
         return self._waiting.popleft()

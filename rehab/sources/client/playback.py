@@ -27,7 +27,7 @@ NextStride = Callable[[Display], Measurement | None]
 # announce a new phase.
 STRIDE_MIN_S = 0.5
 # Without a connection a person may walk for hours (a whole day takes 80,000 strides).
-KEPT_MAX = 80_000
+UNSENT_MAX = 80_000
 
 
 class PlaybackClock:
@@ -168,7 +168,7 @@ class StridePlayback:
 
         ``unacknowledged`` strides are with the caller.
         """
-        limit = self._max_unacknowledged if self.speed is None else KEPT_MAX
+        limit = self._max_unacknowledged if self.speed is None else UNSENT_MAX
         if not self._may_walk or unacknowledged >= limit:
             return math.inf
         if self._stride is None and self._walk is not None:

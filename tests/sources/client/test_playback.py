@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rehab.sources.client import PlaybackClock, StridePlayback
-from rehab.sources.client.playback import KEPT_MAX
+from rehab.sources.client.playback import UNSENT_MAX
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
 
@@ -143,7 +143,7 @@ def test_memory_is_bounded_when_the_server_stays_away(ours):
     playback.start_session(Side.LEFT)
     playback.resume()
 
-    assert playback.poll(KEPT_MAX) == math.inf
+    assert playback.poll(UNSENT_MAX) == math.inf
 
 
 def test_another_walk_begins_from_its_beginning(ours):
