@@ -155,7 +155,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
         admin.fill("#id_hit_points", "7")
         expect(seen.locator("figure").nth(3)).to_contain_text("+7")
         admin.fill("#id_bands-2-from_percent", "101")
-        expect(seen.locator(".errors")).to_contain_text("begin at 1, the goal")
+        expect(seen.locator(".warning")).to_contain_text("begin at 1, the goal")
         admin.fill("#id_bands-2-from_percent", "100")
         expect(seen.locator("figure")).to_have_count(5)
         admin.click("[name=_save]")

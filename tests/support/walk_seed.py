@@ -122,18 +122,21 @@ def make_walks(server: Server, *wanted: dict[str, Any]) -> list[Walk]:
 
 
 def browser_session(user: User) -> str:
-    """Return the key of a new browser session in which a user is signed in."""
+    """Return the key of a new browser session in which a user has just signed in."""
     from importlib import import_module
 
     from django.conf import settings
     from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
+    from django.utils import timezone
 
     from rehab.people.sign_in.flow import BACKEND
+    from rehab.people.sign_in.step_up import CONFIRMED_AT
 
     cookies = import_module(settings.SESSION_ENGINE).SessionStore()
     cookies[SESSION_KEY] = str(user.pk)
     cookies[BACKEND_SESSION_KEY] = BACKEND
     cookies[HASH_SESSION_KEY] = user.get_session_auth_hash()
+    cookies[CONFIRMED_AT] = int(timezone.now().timestamp())  # by the password
     cookies.save()
     return str(cookies.session_key)
 
