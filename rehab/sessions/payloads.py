@@ -103,6 +103,7 @@ def describe_cue(fold: SessionFold) -> Message:
         "count": timing.count,
         "rest_s": timing.rest_s,
         "intensity": fold.robot_intensity,
+        "only_informs": not fold.valence.has_points,
         "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
     }
 

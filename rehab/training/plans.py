@@ -10,7 +10,6 @@ from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adap
 from rehab.training.bands import bands_from_json
 from rehab.training.closeness import CloseSteps
 from rehab.training.cueing import (
-    DEFAULT_ACTIVATION_THRESHOLD,
     CueTiming,
     check_activation_threshold,
     check_cue_rule,
@@ -22,6 +21,7 @@ from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence
 from robot.marking import gettext_noop
+from robot.wire.cue_limits import DEFAULT_THRESHOLD
 
 # How lively the robot is: the share of a gesture's size, by a name that pages translate. The robot
 # itself makes half of it gentle (no sounds, half the speed).
@@ -77,7 +77,7 @@ class PlanSettings:
 
     goal: GoalRule
     target: Target = field(default_factory=Target)
-    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
+    activation_threshold: float = DEFAULT_THRESHOLD
     robot_intensity: float = 1.0
     cue_timing: CueTiming = field(default_factory=CueTiming)
     schedule: Schedule = field(default_factory=Schedule)

@@ -103,7 +103,7 @@ class Performer:
             and self._is_running
             and not self._has_hung
             and self.body.safety.is_watched
-            and self.decider.cue.intensity > 0
+            and self.decider.cue.moves
             and not self.body.safety.blocking_reason(self.body.read())
         )
 
