@@ -57,6 +57,9 @@ class Player:
     def __init__(self, limits: Limits, response: Response = AT_ONCE) -> None:
         self.limits = limits
         self._least = Twist(response.stiction_m_s, 2 * response.stiction_m_s / WHEELBASE_M)
+        # One that does not creep comes nearer to its places in the same time.
+        creeps = response.stiction_m_s <= CLOSING_PER_S * NEAR_M
+        self._near_m, self._near_rad = (NEAR_M, NEAR_RAD) if creeps else (NEAR_M / 2, NEAR_RAD / 2)
         self._in_flight = OrdersInFlight(response.delay_s)
         self._meter = DelayMeter()
         self.gesture: Gesture | None = None
@@ -170,7 +173,7 @@ class Player:
                 else:
                     self._is_late, self._until_s = True, time_s + LATE_S
             elif self._segments:
-                wanted = _follow(self._segments[0], here, limits)
+                wanted = self._follow(self._segments[0], here, limits)
                 if wanted is not None:
                     return limits, wanted
                 self._segments.popleft()
@@ -182,7 +185,7 @@ class Player:
                 return limits, STILL
             elif (
                 not self._waypoints
-                and abs(self._waypoint.heading_rad - here.heading_rad) > NEAR_RAD
+                and abs(self._waypoint.heading_rad - here.heading_rad) > self._near_rad
             ):
                 self._segments.append(Turn(self._waypoint.heading_rad, 0.0))
                 self._there_s = None
@@ -199,6 +202,31 @@ class Player:
         if v_m_s:
             return Twist(v_m_s, ramped.w_rad_s)
         return Twist(0.0, _lift(ramped.w_rad_s, wanted.w_rad_s, self._least.w_rad_s))
+
+    def _follow(self, segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
+        """Return the twist that follows a segment; None at its end."""
+        match segment:
+            case Turn():
+                left_rad = segment.heading_rad - pose.heading_rad
+                if abs(left_rad) <= self._near_rad:
+                    return None
+                return Twist(
+                    w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2)
+                )
+            case Drive():
+                goal = Pose(segment.x_m, segment.y_m)
+                left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))
+                left_m, beside_m = left.x_m, -left.y_m
+                ahead = math.copysign(1.0, segment.by_m)
+                if left_m * ahead <= self._near_m:
+                    return None
+                # Towards the line; backwards that is by turning the other way.
+                steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
+                turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
+                return Twist(
+                    _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
+                    turn_rad * CLOSING_PER_S / 2,
+                )
 
     def _next_waypoint(self, start: Pose, time_s: float) -> None:
         self._there_s = None
@@ -223,30 +251,6 @@ class Player:
         self.outcome, self._verdict = outcome, ""
         self._waypoints.clear()
         self._segments.clear()
-
-
-def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
-    """Return the twist that follows a segment; None at its end."""
-    match segment:
-        case Turn():
-            left_rad = segment.heading_rad - pose.heading_rad
-            if abs(left_rad) <= NEAR_RAD:
-                return None
-            return Twist(w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2))
-        case Drive():
-            goal = Pose(segment.x_m, segment.y_m)
-            left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))
-            left_m, beside_m = left.x_m, -left.y_m
-            ahead = math.copysign(1.0, segment.by_m)
-            if left_m * ahead <= NEAR_M:
-                return None
-            # Towards the line; backwards that is by turning the other way.
-            steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
-            turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
-            return Twist(
-                _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
-                turn_rad * CLOSING_PER_S / 2,
-            )
 
 
 def _is_near_home(pose: Pose) -> bool:
