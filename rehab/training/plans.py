@@ -73,6 +73,8 @@ class PlanSettings:
         After which steps the patient gets feedback.
     adaptation
         Whether goals follow the patient.
+    variety_seed
+        What the robot's varied answers follow from; None for the session's number.
     """
 
     goal: GoalRule
@@ -82,6 +84,7 @@ class PlanSettings:
     cue_timing: CueTiming = field(default_factory=CueTiming)
     schedule: Schedule = field(default_factory=Schedule)
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
+    variety_seed: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +177,7 @@ class SessionPlan(PlanSettings):
             cue_timing=_read_cue_timing(data.get("cue_timing", {})),
             schedule=_read_schedule(data.get("schedule", {})),
             adaptation=_read_adaptation(data.get("adaptation")),
+            variety_seed=data.get("variety_seed"),
             close_steps=CloseSteps(**data.get("close_steps", {})),
             language=data.get("language", "en"),
         )

@@ -13,6 +13,7 @@ from robot.wire.cue_limits import (
     DEFAULT_THRESHOLD,
     DEFAULT_WINDOW_S,
     REST_MAX_S,
+    SEED_MAX,
     THRESHOLD_MAX,
     WINDOW_MAX_S,
     WINDOW_MIN_S,
@@ -48,6 +49,8 @@ class Cue:
     only_informs
         Whether the feedback judges nothing, as explicit feedback: then no gesture answers, whatever
         ``above`` and ``below`` name.
+    seed
+        What varied answers follow from; None for the session's number.
     gestures
         Composed gestures as JSON data, not parsed yet.
     """
@@ -61,6 +64,7 @@ class Cue:
     rest_s: float = DEFAULT_REST_S
     intensity: float = 1.0
     only_informs: bool = False
+    seed: int | None = None
     gestures: tuple[Any, ...] = ()
 
     @classmethod
@@ -77,6 +81,9 @@ class Cue:
         count = DEFAULT_COUNT
         if "count" in cue:
             count = read_whole(cue, "count", low=1, high=COUNT_MAX)
+        seed = cue.get("seed")
+        if seed is not None:
+            seed = read_whole(cue, "seed", low=0, high=SEED_MAX)
         gestures = cue.get("gestures", [])
         if not isinstance(only_informs := cue.get("only_informs", False), bool):
             raise BadFrame('"only_informs" is true or false.')
@@ -92,6 +99,7 @@ class Cue:
             rest_s=read_number(cue, "rest_s", 0.0, REST_MAX_S),
             intensity=intensity,
             only_informs=only_informs,
+            seed=seed,
             gestures=tuple(gestures),
         )
 

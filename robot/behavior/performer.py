@@ -204,7 +204,7 @@ class Performer:
                 raise BadFrame("A welcome says in which state the session is.")
             if session != self.session:
                 self.decider = WindowDecider(cue)
-                self.variety = Variety(seed=session)
+                self.variety = Variety(seed=session if cue.seed is None else cue.seed)
                 self.reports.clear()
             self._set_cue(cue)
             self.decider.drop_window()

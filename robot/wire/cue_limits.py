@@ -10,6 +10,7 @@ THRESHOLD_MAX = 2.0  # share of the goal; it lies above 0
 WINDOW_MIN_S, WINDOW_MAX_S = 2.0, 60.0  # two steps at least, and still an answer to something
 REST_MAX_S = 600.0
 COUNT_MAX = 100
+SEED_MAX = 2**31 - 1
 
 # The paper's (P 3.4.1), but for the count of steps, which is ours.
 DEFAULT_THRESHOLD = 0.9
