@@ -88,11 +88,11 @@ class Phase:
     strides, seconds
         Its limits; None without.
     goal_percent
-        The goal from its beginning on, in percent of the baseline; None for the goal that is there.
+        Goal that it begins with, in percent of the baseline; None to leave the goal as it is.
     robot
         Whether the robot gets its steps.
     rest_s
-        The rest after it, which the PT ends: how long it should be [s]; None for none.
+        Planned length of the rest after it [s], which the PT ends; None for no rest.
 
     Raises
     ------

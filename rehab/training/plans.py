@@ -97,7 +97,7 @@ class SessionPlan(PlanSettings):
     gestures
         Composed gestures that a cue names, as they are sent to the robot.
     alternatives
-        Valences that the session may be changed to, as they are then.
+        Valences that the session may be changed to, as edited by the clinic until its creation.
     close_steps
         Which steps are too uncertain to count as hit or miss.
     language

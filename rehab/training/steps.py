@@ -10,7 +10,7 @@ from enum import StrEnum
 from rehab.training.measures import Measure
 from robot.wire.limits import TIME_MAX_S
 
-# The extra value that keeps what a source sent as a step's value, where another one is trained.
+# The extra value with what a source sent as a step's value, where another one is trained.
 SENT_VALUE = "sent_value"
 
 
@@ -96,7 +96,7 @@ def select_value(measurement: Measurement, measure: Measure) -> Measurement:
     if not measure.channel:
         return measurement
     extra, named = measurement.extra, measurement.extra.get(measure.channel)
-    value = None if named is None else float(named)  # a whole number is kept whole, where it came
+    value = None if named is None else float(named)  # in ``extra`` an int stays an int
     if value == measurement.value:
         return measurement
     if measurement.value is not None and math.isfinite(measurement.value):
