@@ -33,7 +33,15 @@ IGNORED = "The frame numbers are ignored: {}. Send the device's own count of sam
 
 
 def find_frame_problem(t_s: Floats, frames: Floats | None) -> str:
-    """Return why the frame numbers of a recording are ignored, empty where there is no reason."""
+    """Return why the frame numbers of a recording are ignored; empty where they are used.
+
+    Parameters
+    ----------
+    t_s
+        Times [s], shape (n,).
+    frames
+        The samples' numbers, shape (n,), NaN where one has none; None for a recording without.
+    """
     clock = FrameClock()
     if frames is not None:
         clock.add(np.array([t_s]), 0, frames)
@@ -55,7 +63,7 @@ def _find_pace(stamps: Floats, frames: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Newest:
-    """The newest sample: its number in a count that never begins anew, and when it was taken.
+    """The newest sample: its number in a count that never restarts, and when it was taken.
 
     ``shift`` is added to numbers as they come.
     """
@@ -163,7 +171,7 @@ class FrameClock:
     def finish(self) -> Floats | None:
         """Return the samples that are still held back, with the times that they have.
 
-        They may be added again, without their numbers, which are kept.
+        They may be added again without their numbers, which the clock retains.
         """
         if self._plain is not None:
             return self._plain.finish()
