@@ -55,7 +55,7 @@ class ZeroPhaseFilter:
         return self.smooth_extended(np.concatenate((before, signals, after), axis=1), n)
 
     def smooth_extended(self, signals: Floats, padding: int) -> Floats:
-        """Return rows filtered, without the samples that extend them: shape (rows, n - 2 × padding).
+        """Return rows filtered, without the samples that extend them, shape (rows, n - 2 padding).
 
         Parameters
         ----------
