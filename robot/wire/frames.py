@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS, MAX_NESTING
 
 NAME = re.compile(rf"[A-Za-z0-9_.:-]{{1,{MAX_NAME_CHARS}}}")
-# What no text of a database may hold: NUL, and halves of pairs of surrogates (one read whole is one
-# character). Only an escape can write them.
+# What no text in a database may hold: NUL, and single halves of surrogate pairs (a whole pair is
+# one character). Only an escape can write them.
 NO_TEXT = re.compile("[\0\ud800-\udfff]")
 
 
@@ -112,7 +112,22 @@ def to_number(value: Any, low: float = -math.inf, high: float = math.inf) -> flo
 def read_number(
     message: Mapping[str, Any], name: str, low: float = -math.inf, high: float = math.inf
 ) -> float:
-    """Return a finite number of a message, within bounds. Raises BadFrame."""
+    """Return a finite number of a message.
+
+    Parameters
+    ----------
+    message
+        The message.
+    name
+        The field's name.
+    low, high
+        The least and the largest number, included.
+
+    Raises
+    ------
+    BadFrame
+        For anything else.
+    """
     number = to_number(message.get(name), low, high)
     if number is not None:
         return number

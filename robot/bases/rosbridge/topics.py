@@ -13,7 +13,7 @@ BUMP = "bump"
 # What every topic of a Create 3's hazards stands for: all of them come on one.
 ALL_HAZARDS = "hazards"
 
-# The relay that stands still for us where we are gone (deploy/ros/garry_watchdog.py): what it
+# The relay that stops the base where we are gone (deploy/ros/garry_watchdog.py): what it
 # listens to, and where it says, ten times a second, for which topic it does so.
 RELAY_INPUT = "/garry/cmd_vel"
 RELAY_ALIVE = Topic("/garry/watchdog", STRING)

@@ -22,7 +22,7 @@ HOLD: dict[str, Any] = {"joint_names": [], "points": []}
 
 @dataclass(frozen=True, slots=True)
 class Voice:
-    """Where a base is told what to say (std_msgs/String), and its words; empty: it says nothing."""
+    """Where to send what a base says (std_msgs/String), and its words; empty: it says nothing."""
 
     topic: Topic
     glad: str = ""
