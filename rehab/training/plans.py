@@ -65,7 +65,7 @@ class PlanSettings:
     Attributes
     ----------
     goal, target
-        What a step should reach, and what is wanted of the whole session.
+        What a step should reach, and the target of the whole session.
     activation_threshold, robot_intensity, cue_timing
         Mean performance at which the robot celebrates, the share of its gestures' size, and what
         they answer.
@@ -159,7 +159,7 @@ class SessionPlan(PlanSettings):
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> SessionPlan:
-        """Return the plan of ``to_json``'s data, also of versions that had fewer fields."""
+        """Return the plan that ``to_json`` wrote, also in a version that had fewer fields."""
         return cls(
             measure=Measure(**data["measure"]),
             valence=_read_valence(data["valence"]),

@@ -149,7 +149,14 @@ def find_invalid_reasons(measurement: Measurement, measure: Measure) -> tuple[st
     """Return why a measurement is invalid; nothing for a valid one.
 
     The source's own reasons come first, then at most one of ours, about the value. A stored step
-    that is measured again gets the reasons it has.
+    that is scored again keeps its reasons.
+
+    Parameters
+    ----------
+    measurement
+        The stride.
+    measure
+        What is trained, with the bounds of its values.
     """
     value, reasons = measurement.value, measurement.reasons
     if value is None:

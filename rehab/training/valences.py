@@ -16,7 +16,7 @@ from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
 from robot.wire.cue_limits import VARIED
 
-# Larger numbers say no more to a patient, and overflow where points are stored.
+# Larger numbers mean nothing more to a patient, and overflow where points are stored.
 POINTS_MAX = 1000
 
 
@@ -108,7 +108,13 @@ class Valence:
         return (self.hit_points or 0) > 0
 
     def points(self, hit: bool, close: bool = False) -> int | None:
-        """Return what a hit or a miss adds to the score; a close step adds nothing."""
+        """Return what a step adds to the score; None where points do not exist.
+
+        Parameters
+        ----------
+        hit, close
+            The step's verdict; a close step adds nothing.
+        """
         if close:
             return 0 if self.has_points else None
         return self.hit_points if hit else self.miss_points

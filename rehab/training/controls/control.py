@@ -215,7 +215,7 @@ class Control:
         return self.leads_to or state
 
     def put_into_force(self, session: ControlledSession, value: ChangeValue) -> None:
-        """Check a value and apply it. Raises InvalidSetting; the session is then as it was."""
+        """Check a value and apply it to a session. Raises InvalidSetting, changing nothing."""
         if self.value is ValueKind.NUMBER:
             value = self._check_number(value)
         checked = value if self.check is None else self.check(value)
