@@ -120,7 +120,14 @@ class LegDetector:
         self._number = 0
 
     def advance(self, start: int, stop: int) -> list[OneLegStride]:
-        """Process samples ``start:stop``, a second at most; return the strides they complete."""
+        """Process the next samples, and return the strides that they complete.
+
+        Parameters
+        ----------
+        start, stop
+            Indices of the first sample and of the one behind the last, at most ``longest_chunk``
+            apart.
+        """
         self.pending.extend(self.contacts.advance(start, stop))
         strides: list[OneLegStride] = []
         while self.pending:

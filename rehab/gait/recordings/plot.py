@@ -14,7 +14,7 @@ from rehab.gait.signals.filters import Floats, ZeroPhaseFilter
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError, Stride
 
-# Okabe and Ito's colors, which people tell apart however they see colors; marks differ as well.
+# Okabe and Ito's colors, which color-blind people can distinguish; marks differ as well.
 BLUE, ORANGE, GRAY = "#0072B2", "#D55E00", "#666666"
 CYCLE = np.linspace(0, 1, 101)
 ROWS = ("force [N/kg]", "moment [Nm/kg]", "angular velocity [rad/s]", "power [W/kg]")

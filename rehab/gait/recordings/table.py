@@ -19,9 +19,9 @@ class Table(dict[str, Floats]):
     Attributes
     ----------
     units
-        By column, as the file writes them; columns whose unit it does not say are missing.
+        By column, as the file writes them; columns without a unit are missing.
     mass_kg
-        Body mass, None where the file does not say it.
+        Body mass [kg]; None where the file has none.
     notes
         What a person should know of how the columns were made.
     """

@@ -118,9 +118,14 @@ class SampleBuffer:
         self.filled = self.keep + waiting
 
     def goes_on(self, start: int, stop: int, most_s: float = math.inf) -> bool:
-        """Return whether time goes on from sample to sample of ``start:stop``.
+        """Return whether time rises from each sample of ``start:stop`` to the next.
 
-        ``most_s`` is by how much at most [s], 0.25 or more.
+        Parameters
+        ----------
+        start, stop
+            Indices of the first sample and of the one behind the last, which are still buffered.
+        most_s
+            By how much it may rise at most [s], ``USUAL_MOST_S`` (0.25) or more.
         """
         if stop > self._judged:
             if not self._steps_are(max(self._judged - 1, self.first), stop, USUAL_MOST_S):

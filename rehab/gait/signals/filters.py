@@ -41,7 +41,7 @@ class ZeroPhaseFilter:
         self._response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
 
     def smooth(self, signals: Floats) -> Floats:
-        """Return each row filtered, extended point-symmetrically beyond its ends for the purpose.
+        """Return each row filtered, after a point-symmetric extension at its ends.
 
         Parameters
         ----------

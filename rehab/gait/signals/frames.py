@@ -77,6 +77,13 @@ class Newest:
 def read_frames(frame: ArrayLike | None, count: int) -> Floats:
     """Return frame numbers as an array of shape (count,), NaN where there are none.
 
+    Parameters
+    ----------
+    frame
+        The numbers as they were sent, None for none.
+    count
+        How many samples they belong to.
+
     Raises
     ------
     GaitInputError
