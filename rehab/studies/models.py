@@ -264,7 +264,7 @@ class StudyMark(AppendOnlyModel):
     """What an account is in a study besides its role, until ``ended_at``."""
 
     class Task(models.TextChoices):
-        """What the mark says."""
+        """What the mark allows or hides."""
 
         ASSESSOR = "assessor", _("Assesses, and must not know the arm")
         INTERIM = "interim", _("May look before the study is closed")

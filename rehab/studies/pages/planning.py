@@ -110,7 +110,7 @@ def show_study(request: HttpRequest, study_id: int) -> HttpResponse:
 
 
 def study_context(study: Study, user: User) -> dict[str, Any]:
-    """Return what a user sees of a study."""
+    """Return what the page of a study shows ``user``; from an assessor, the arms are hidden."""
     blind, is_lead = is_assessor(study, user), user.role == Role.LEAD
     by_name, events = may_see_names(user.role), StudyEvent.objects.visible_to(user)
     return {
@@ -229,7 +229,7 @@ def write_json(study: Study) -> str:
 
 
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:
-    """Do something, or say why it cannot be done."""
+    """Do something, or show why it cannot be done."""
     try:
         act()
     except InvalidSetting as problem:
