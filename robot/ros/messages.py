@@ -25,7 +25,7 @@ BOOL = "std_msgs/Bool"
 STRING = "std_msgs/String"
 HAZARDS = "irobot_create_msgs/HazardDetectionVector"
 DOCK = "irobot_create_msgs/DockStatus"
-# Type of an event: the name of its field that says which sensor it was. Its field ``state`` is 1
+# Type of an event: the name of its field that identifies the sensor. Its field ``state`` is 1
 # while it is pressed, sees an edge, or hangs free (kobuki_msgs, kobuki_ros_interfaces).
 EVENT_FIELDS = {"BumperEvent": "bumper", "CliffEvent": "sensor", "WheelDropEvent": "wheel"}
 EVENTS = {

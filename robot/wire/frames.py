@@ -64,7 +64,7 @@ def read_object(text: str | None) -> dict[str, Any]:
 
 
 def read_name(message: Mapping[str, Any], name: str) -> str:
-    """Return a short name of a message. Raises BadFrame."""
+    """Return the field ``name`` of ``message``, which holds a short name. Raises BadFrame."""
     value = message.get(name)
     if not isinstance(value, str) or not NAME.fullmatch(value):
         raise BadFrame(f'"{name}" is a text of 1 to {MAX_NAME_CHARS} letters, digits or _ . : -')
@@ -137,10 +137,20 @@ def read_number(
 
 
 def check_values(value: Any, depth: int = MAX_NESTING) -> None:
-    """Check that a value can be passed on. Raises BadFrame.
+    """Check that a value can be passed on.
 
-    Numbers have to be finite, texts without what no database stores, and objects and lists may nest
-    ``depth`` deep.
+    Parameters
+    ----------
+    value
+        Any JSON value. Numbers have to be finite, and texts without characters that no database
+        stores.
+    depth
+        How deep objects and lists may nest.
+
+    Raises
+    ------
+    BadFrame
+        For any other value.
     """
     if isinstance(value, str) and NO_TEXT.search(value):
         raise BadFrame("Texts hold no NUL and no half of a surrogate pair. Leave it out.")

@@ -19,7 +19,7 @@ FRAME_S = 0.02  # between two feedback frames (docs/reference/kobuki.md#feedback
 HEADER = b"\xaa\x55"
 # Bytes of a payload: id, length and one byte of data (docs/reference/kobuki.md#framing).
 SHORTEST = 3
-# Everything a base can say in one frame is 175 bytes (docs/reference/kobuki.md#feedback). A longer
+# All that a base can send in one frame is 175 bytes (docs/reference/kobuki.md#feedback). A longer
 # one is a false header, and waiting for its end would hold up the true frames behind it.
 LONGEST = 192
 
