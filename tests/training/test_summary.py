@@ -52,12 +52,12 @@ def test_a_session_worked_out_by_hand() -> None:
     assert metrics["best_streak"] == 2
     assert [(phase["kind"], phase["strides"], phase["hits"]) for phase in phases] == [
         ("baseline", 2, 1),
-        ("training", 5, 3),
+        ("training", 6, 3),
         ("catch", 1, 1),
     ]
     training = phases[1]
     assert training["mean"] == 4.5
-    assert [(block["phase"], block["strides"]) for block in training["blocks"]] == [(1, 3), (3, 2)]
+    assert [(block["phase"], block["strides"]) for block in training["blocks"]] == [(1, 3), (3, 3)]
 
 
 @pytest.mark.parametrize(
