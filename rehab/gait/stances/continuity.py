@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
 from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT
-from rehab.gait.stances.gaps import GAP_S, StanceClock
+from rehab.gait.stances.gaps import GAP_S, HARMFUL_FROM, StanceClock
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
 from rehab.gait.strides import RejectionReason
@@ -42,7 +42,6 @@ ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 6.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
-CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change it
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
@@ -178,7 +177,7 @@ def check_steps(stance: ResampledStance, push_off: PushOff, gap_s: float) -> lis
     apart_s = apart / stance.rate_hz
     duration_s = stance.end_s - stance.begin_s
     walking = apart_s * max(apart_s, (apart_s + gap_s) / 2) / duration_s**2
-    first = stance.index(CHECK_FROM)
+    first = stance.index(HARMFUL_FROM)
     last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
     angle = stance.signals[ANGLE - FORCE, first:]
     if last - first <= apart or len(angle) <= 4 * apart:
