@@ -28,8 +28,10 @@ MOMENT_FROZEN_S, ANGLE_FROZEN_S = 0.02, 0.04
 # second squared, in late stance [Nm, rad]; noise, and walkers, bend by a hundred times that.
 STRAIGHT_S = 0.06
 STRAIGHT_TO = np.array([[4.0], [0.02]])
-MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
-ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
+# At once [Nm/kg, rad], and by time: the five people of ``plausibility`` reach 13-23 Nm/kg/s (75
+# from one sample to the next at 1 kHz, which is 0.07 at once) and 4-9 rad/s.
+MOMENT_JUMP = (0.15, 40.0)
+ANGLE_JUMP = (0.05, 15.0)
 
 # Spikes and steps are looked for h = 10 ms apart: in the angle by its fourth difference, to which a
 # push-off adds little however fast it is, a spike six and a step three times its size; in the
