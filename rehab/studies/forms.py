@@ -182,14 +182,7 @@ class ArmForm(forms.ModelForm):
 def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:
     """Return the formset of a study's arms; that of a draft has empty rows to fill in.
 
-    Parameters
-    ----------
-    study
-        The study; a new one need not be stored yet.
-    by
-        Who fills it in; protocols and measures are those that this account may use.
-    data
-        What was sent; None for a new formset.
+    It offers the protocols and measures of the account ``by``; ``data``: what was sent, or None.
     """
     is_fixed = not study.is_draft
     stored = study.arms.count() if study.pk else 0
@@ -216,17 +209,9 @@ def save_arms(arms: Any, study: Study) -> None:
 
 
 def save_draft(form: StudyForm, arms: Any) -> Study:
-    """Store a draft with its arms, and return it.
+    """Store a draft from its valid ``form`` and the valid formset ``arms``, and return it.
 
-    Parameters
-    ----------
-    form, arms
-        The valid form and the valid formset of `build_arm_forms`.
-
-    Raises
-    ------
-    InvalidSetting
-        For a study that could not be run; nothing is stored then.
+    Raises InvalidSetting, and stores nothing, for a study that could not be run.
     """
     with transaction.atomic():
         study: Study = form.save()

@@ -37,10 +37,8 @@ def find_frame_problem(t_s: Floats, frames: Floats | None) -> str:
 
     Parameters
     ----------
-    t_s
-        Times [s], shape (n,).
-    frames
-        The samples' numbers, shape (n,), NaN where one has none; None for a recording without.
+    t_s, frames
+        Times [s], and the samples' numbers or None, shape (n,) each; NaN where one has none.
     """
     clock = FrameClock()
     if frames is not None:
