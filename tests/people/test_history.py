@@ -73,7 +73,7 @@ def test_a_program_is_named_beside_its_person(world):
 
 def test_a_change_without_a_person_is_the_servers():
     assert describe_actor(HistoryEntry()) == "the server"
-    assert describe_actor(HistoryEntry(by=User(name="Ana"), through="lab")) == "Ana · lab"
+    assert describe_actor(HistoryEntry(by=User(username="ana"), through="lab")) == "ana · lab"
 
 
 def test_a_save_that_changes_nothing_is_no_change(world):
