@@ -123,13 +123,12 @@ async def test_ten_strangers_shut_no_clinic_out():
     entered: dict[str, list[int]] = {address: [] for address in caller.lanes}
     for second in range(120):
         caller.now_s += 1
-        for number in range(10):
-            await caller.call(f"192.0.2.{number}")
+        strangers = [(await caller.call(f"192.0.2.{number}"))[0] for number in range(10)]
         if second % 2 == 0:
             for address, codes in entered.items():
                 codes.append((await caller.call(address))[0])
     assert entered == dict.fromkeys(entered, [200] * 60)
-    assert (await caller.call("198.51.100.1"))[0] == 429  # another stranger
+    assert 429 in strangers  # it is a flood
 
 
 async def test_who_floods_a_clinics_lane_shuts_out_that_clinic_alone():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from typing import Any
 
@@ -107,13 +108,15 @@ def test_a_blinded_assessor_lets_no_browser_of_hers_in(server, seeded):
 
 def test_a_tablets_open_socket_ends_with_its_approvers_account_role_or_mark(server, seeded):
     rows = {name: seeded[name] for name in ENDS}
-    open_ones = {name: tablet_of(server, row).dial(socket(row)) for name, row in rows.items()}
-    for name, row in rows.items():
-        assert tablet_of(server, row).get(walk(row)).status == 200, name
-    change_rows(
-        server, *(ENDS[name].format(**row, study=seeded["study"]) for name, row in rows.items())
-    )
-    assert {name: until_closed(one) for name, one in open_ones.items()} == dict.fromkeys(ENDS, 4001)
+    ends = [ENDS[name].format(**row, study=seeded["study"]) for name, row in rows.items()]
+    with ExitStack() as sockets:
+        open_ones = [
+            sockets.enter_context(tablet_of(server, row).dial(socket(row))) for row in rows.values()
+        ]
+        for name, row in rows.items():
+            assert tablet_of(server, row).get(walk(row)).status == 200, name
+        change_rows(server, *ends)
+        assert [until_closed(one) for one in open_ones] == [4001] * len(ENDS)
     for name, row in rows.items():
         assert tablet_of(server, row).get(walk(row)).status == 302, name
         assert tablet_of(server, row).watch(socket(row))[0] == 4001, name

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import timedelta
-from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlencode
 
@@ -13,17 +11,13 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.choices import Participants
-from rehab.patients import family
-from rehab.people.consent import models as consents
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import browser_sessions
-from rehab.stations import device_trust
 from rehab.training.valences import VALENCES
 from tests.support.archives import words_of
 from tests.support.tenancy import all_routes
-from tests.support.trials import FAMILY, VARYING, Trial, answers, become
-from tests.support.world import NOW, World, signed_in
+from tests.support.trials import LEFT_OUT, VARYING, Trial, answers, become
+from tests.support.world import World, signed_in
 
 pytestmark = pytest.mark.django_db
 # They have a new secret, code or animal each time, or tell of this very look.
@@ -124,23 +118,11 @@ def test_whatever_an_assessor_becomes_sees_the_same(ended):
     assert find_leaks(trial, trial.assessor, trial.earlier) == set()
 
 
-TABLETS = {"tablet", "earlier tablet", "its token"}
-YESTERDAY = SimpleNamespace(now=lambda: NOW - timedelta(days=1))
-AS_ACCOUNT = {"account", "program", "program of a researcher"}
-
-
-@pytest.mark.parametrize(
-    ("module", "rule", "left_out", "found"),
-    [
-        (device_trust, "assessors", User.everywhere.none, TABLETS),
-        (consents, "hidden_patients", lambda _: Patient.everywhere.none(), AS_ACCOUNT),
-        (browser_sessions, "timezone", YESTERDAY, {"stale screen of who treats"}),
-        (family, "is_in_running_study", lambda _: False, {FAMILY}),
-    ],
-)
-def test_a_rule_that_is_left_out_is_found(monkeypatch, module, rule, left_out, found):
+@pytest.mark.parametrize("rule", LEFT_OUT)
+def test_a_rule_that_is_left_out_is_found(monkeypatch, rule):
     trial = Trial()
-    monkeypatch.setattr(module, rule, left_out)
+    module, name, left_out, found = LEFT_OUT[rule]
+    monkeypatch.setattr(module, name, left_out)
     assert find_leaks(trial, trial.assessor, trial.earlier) == found
 
 

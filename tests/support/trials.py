@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 from typing import Any
 
 from django.contrib.sessions.models import Session
@@ -12,17 +14,21 @@ from django.urls import reverse
 from django.utils import timezone
 
 from rehab.boards.cache import clear_cache
+from rehab.patients import family
 from rehab.patients.family import give_link
 from rehab.people.audit import guards
+from rehab.people.consent import models as consents
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.browser_sessions import digest_of
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.stations import device_trust
 from rehab.stations.models import Station
 from rehab.stations.tablets import COOKIE, find_tablet
 from rehab.studies.allocation.scheme import Secret
@@ -41,6 +47,23 @@ from tests.support.world import NOW, build_world, fill_board, signed_in, store
 
 ARMS = ("positive", "negative")
 FAMILY = "stranger with a family link"
+addresses = itertools.count()  # of families
+STALE = "stale screen of who treats"
+AS_ACCOUNT = {"account", "program", "program of a researcher"}
+TABLETS = {"tablet", "earlier tablet", "its token"}
+YESTERDAY = SimpleNamespace(now=lambda: datetime.now(UTC) - timedelta(days=1))
+# Rules of blinding: where each stands, what leaves it out, and who then sees the arm.
+LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
+    "an assessor lets no tablet in": (device_trust, "assessors", User.everywhere.none, TABLETS),
+    "an assessor sees no sessions": (
+        consents,
+        "hidden_patients",
+        lambda _: Patient.everywhere.none(),
+        AS_ACCOUNT,
+    ),
+    "a sign-in ends": (browser_sessions, "timezone", YESTERDAY, {STALE}),
+    "a family sees nothing": (family, "refusal_reason", lambda _: "", {FAMILY}),
+}
 # What differs each time, whatever a patient walks.
 VARYING = re.compile(
     r'csrfmiddlewaretoken" value="\w+"|nonce="[^"]+"|"data-csrf": "\w+"|\d{1,2}:\d\d(:\d\d)?|'
@@ -149,8 +172,8 @@ def become(trial: Trial, who: User, tablet: Client) -> dict[str, Client]:
     account.get(reverse("start"))  # which reports that once
     return {
         # Each from an own address: twenty tries are let through from one.
-        FAMILY: Client(REMOTE_ADDR=f"198.51.100.{trial.study.pk % 250}"),
-        "stale screen of who treats": stale_screen(trial.world.people[Role.PT]),
+        FAMILY: Client(REMOTE_ADDR=f"198.51.100.{next(addresses) % 250}"),
+        STALE: stale_screen(trial.world.people[Role.PT]),
         "account": account,
         "tablet": refused_or_new,
         "earlier tablet": tablet,
