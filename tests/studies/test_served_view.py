@@ -49,7 +49,10 @@ trial.exchange()
 """
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["ended", "open"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(True, marks=pytest.mark.long, id="ended"), pytest.param(False, id="open")],
+)
 def seeded(request: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """Return a folder with a blinded trial, and what its assessor can become."""
     folder = tmp_path_factory.mktemp("data")
