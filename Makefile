@@ -157,6 +157,7 @@ sbom: $(PYTHON) ## List what a hosted server is made of, into sbom/ (CycloneDX)
 	rm -rf $(VENV)-new
 
 # The marker of the one kind of Python (tool.uv in pyproject.toml) would be on every line.
+CPYTHON := platform_python_implementation == 'CPython'
 locks: $(PYTHON) ## Write the hashes of the versions in constraints.txt into locks/
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
 	$(VENV)-new/bin/python $(PIP_INSTALL) uv
@@ -166,8 +167,7 @@ locks: $(PYTHON) ## Write the hashes of the versions in constraints.txt into loc
 	        --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
 	        -c constraints.txt -o locks/$$lock.new >/dev/null || exit; \
 	    { echo '# Made by `make locks` of constraints.txt.'; \
-	        sed "s/ ; platform_python_implementation == 'CPython'\( \|$$\)/\1/; \
-	            s/ and platform_python_implementation == 'CPython'//" locks/$$lock.new; \
+	        sed "s/$(CPYTHON) and //; s/ and $(CPYTHON)//; s/ ; $(CPYTHON)//" locks/$$lock.new; \
 	    } > locks/$$lock.txt; rm locks/$$lock.new; done
 	rm -rf $(VENV)-new
 
