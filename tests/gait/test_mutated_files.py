@@ -131,7 +131,7 @@ def check_mutated(folder, count, seed):
         status, said = run_apart(path, folder / "log")
         assert status in (0, 256, 512), f"{path.name}, mutation {number} of seed {seed}: {said}"
         assert status != 512 or re.search(r"[.!?)]\s*$", said), said
-        assert not re.search(r"codec can't|Error\b", said), said
+        assert "codec can't" not in said, said
 
 
 @pytest.mark.timeout(600)
