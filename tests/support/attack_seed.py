@@ -1,4 +1,4 @@
-"""Two clinics to attack, and everybody who does: `python -m tests.support.attack_seed` prints it."""
+"""Two clinics and all who attack them: `python -m tests.support.attack_seed` prints them."""
 
 from __future__ import annotations
 
