@@ -11,6 +11,7 @@ from django.conf import settings
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied, RequestDataTooBig, SuspiciousOperation
 from django.http import Http404, HttpRequest, HttpResponse
+from django.http.multipartparser import MultiPartParserError
 from django.urls import URLPattern, re_path
 from django.views.decorators.csrf import csrf_exempt
 from ninja import NinjaAPI
@@ -133,8 +134,9 @@ def on_permission_denied(request: HttpRequest, problem: PermissionDenied) -> Htt
     return problem_response(request, 403, str(problem) or "This is for other roles.")
 
 
+@api.exception_handler(MultiPartParserError)
 @api.exception_handler(SuspiciousOperation)
-def on_suspicious_operation(request: HttpRequest, problem: SuspiciousOperation) -> HttpResponse:
+def on_suspicious_operation(request: HttpRequest, problem: Exception) -> HttpResponse:
     """Answer a request that Django refuses as suspicious."""
     if isinstance(problem, RequestDataTooBig):
         return problem_response(request, 413, "The body is too long. Send less at once.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from datetime import datetime, timedelta
 
 from django.utils.dateformat import format as format_date
@@ -37,7 +37,7 @@ def format_last_seen(moment: datetime | None, now: datetime) -> str:
     }
 
 
-def format_device_states(devices: Sequence[Device], now: datetime) -> list[tuple[Device, str]]:
+def format_device_states(devices: Collection[Device], now: datetime) -> list[tuple[Device, str]]:
     """Return devices with what is wrong with each one's token, else when it last connected."""
     ended = find_ended(devices, now)
     return [(device, _format_state(device, device.pk in ended, now)) for device in devices]

@@ -73,7 +73,8 @@ def attacked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, di
 def attack(url: str, made: dict[str, Any], count: int) -> tuple[list[str], Counter[Any]]:
     """Send so many requests; return what failed or leaked, and how often each status came."""
     chance = random.Random(33)
-    clinics, models = (Clinic("amber"), Clinic("birch")), {m.__name__: m for m in scoped_models()}
+    clinics: Any = (Clinic("amber"), Clinic("birch"))
+    models = {model.__name__: model for model in scoped_models()}
     routes = [route for route in made["routes"] if route["name"] not in ENDS_THE_ATTACK]
     pairs = [(actor, route) for actor in made["actors"] for route in routes]
     chosen = [pair for _ in range(count // len(pairs)) for pair in pairs]
@@ -124,7 +125,7 @@ def test_nothing_fails_and_nothing_foreign_is_shown(attacked):
     url, made = attacked
     assert len(made["actors"]) == 16
     problems, statuses = attack(url, made, REQUESTS)
-    assert problems == []
+    assert not problems, "\n".join(problems)
     assert statuses.total() == REQUESTS
     for label in ("lead of amber", "pt of birch", "program of a pt of amber", "tablet of amber"):
         assert statuses[label, 200] > 10, (label, statuses)

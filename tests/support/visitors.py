@@ -55,7 +55,7 @@ class Visitor:
         return connect(
             f"ws{self.url.removeprefix('http')}{path}",
             additional_headers=own,
-            origin=self.url,  # type: ignore[arg-type]
+            origin=self.url,
             open_timeout=PATIENCE_S,
             max_size=None,
         )

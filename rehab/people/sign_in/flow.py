@@ -101,7 +101,7 @@ class SessionValidationMiddleware:
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
         """Pass the request on."""
         was_signed_in = request.user.is_authenticated
-        if was_signed_in:
+        if isinstance(request.user, User):
             data = cast(Mapping[str, Any], request.session)
             if is_session_valid(data, request.user):
                 browser_sessions.record_activity(request, timezone.now())

@@ -32,7 +32,7 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     stations = Station.objects.visible_to(user).prefetch_related(Prefetch("devices", devices))
     context = {
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
-        "stations": [(one, format_device_states(one.devices.all(), now)) for one in stations],
+        "stations": [(one, format_device_states(list(one.devices.all()), now)) for one in stations],
     }
     return render(request, "stations/stations.html", context)
 
