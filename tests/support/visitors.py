@@ -10,6 +10,7 @@ from urllib.parse import urlencode, urlsplit
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 CSRF = "c" * 32
 PATIENCE_S = 15.0
@@ -55,7 +56,7 @@ class Visitor:
         return connect(
             f"ws{self.url.removeprefix('http')}{path}",
             additional_headers=own,
-            origin=self.url,
+            origin=Origin(self.url),
             open_timeout=PATIENCE_S,
             max_size=None,
         )
