@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.translation import valence_choices
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
+from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
@@ -260,7 +261,7 @@ class Arm(ScopedModel):
         return ArmRule(self.code, self.name, self.weight, condition)
 
 
-class StudyMark(AppendOnlyModel):
+class StudyMark(SealableModel):
     """What an account is in a study besides its role, until ``ended_at``."""
 
     class Task(models.TextChoices):
@@ -270,19 +271,24 @@ class StudyMark(AppendOnlyModel):
         INTERIM = "interim", _("May look before the study is closed")
 
     scope = Scope(clinic="study__clinic")
+    # With the event, which is sealed, of who ended it.
     allowed_changes = (
-        Allowed(("ended_at",), "OLD.ended_at IS NULL AND NEW.ended_at IS NOT NULL"),
-        ACCOUNT_DELETED,
+        Allowed(
+            ("ended_at",),
+            "OLD.ended_at IS NULL AND EXISTS (SELECT 1 FROM rehab_studyevent e WHERE "
+            "e.study_id = NEW.study_id AND e.kind = 'unmarked' AND e.at = NEW.ended_at)",
+        ),
     )
+    sealed_fields = ("study", "user", "task", "by", "at")
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="marks")
     user = models.ForeignKey(User, on_delete=models.PROTECT, related_name="study_marks")
     task = models.CharField(_("task"), max_length=8, choices=Task.choices)
-    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    by = models.ForeignKey(User, on_delete=models.PROTECT, related_name="+", null=True)
     at = models.DateTimeField(default=timezone.now)
     ended_at = models.DateTimeField(null=True)
 
-    class Meta(AppendOnlyModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("mark")
         ordering: ClassVar = ["pk"]
         constraints: ClassVar = [

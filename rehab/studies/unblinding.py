@@ -80,9 +80,9 @@ def take_mark(mark: StudyMark, by: User | None, now: datetime) -> None:
         lock(mark.study)
         mark.refresh_from_db()
         if mark.ended_at is None:
+            note(mark.study, StudyEvent.Kind.UNMARKED, by, now, about=f"{mark.task}: {mark.user}")
             mark.ended_at = now
             mark.save(update_fields=["ended_at"])
-            note(mark.study, StudyEvent.Kind.UNMARKED, by, now, about=f"{mark.task}: {mark.user}")
 
 
 class UnblindingRefused(InvalidSetting):

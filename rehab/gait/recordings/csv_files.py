@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import gzip
 import warnings
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE, getincrementaldecoder
 from collections.abc import Collection, Mapping, Sequence
+from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 
@@ -26,10 +28,54 @@ MAX_HEADER = 64 * 1024
 
 
 def open_text(path: Path) -> TextIO:
-    """Open a text file, gzipped or not."""
-    if path.suffix == ".gz":
-        return gzip.open(path, "rt", newline="", encoding="utf-8-sig")
-    return path.open(newline="", encoding="utf-8-sig")
+    """Open a text file, gzipped or not, in the encoding that its bytes tell.
+
+    Raises
+    ------
+    GaitInputError
+        For a file that is not text.
+    """
+    with _open_bytes(path) as file:
+        encoding = find_encoding(file)
+    if encoding is None:
+        raise GaitInputError(f"{path.name} is no text. Save it as CSV UTF-8.")
+    return TextIOWrapper(_open_bytes(path), encoding=encoding, errors="replace", newline="")
+
+
+def _open_bytes(path: Path) -> BinaryIO:
+    opened: Any = gzip.open(path) if path.suffix == ".gz" else path.open("rb")  # noqa: SIM115  # the caller closes it
+    return cast(BinaryIO, opened)
+
+
+def find_encoding(file: BinaryIO) -> str | None:
+    """Return the encoding of a text: UTF-8, UTF-16 or, of all others, Windows-1252 (Latin-1).
+
+    None for what is not text: it has zeros, and not those of UTF-16, where every other byte of
+    numbers and names is one.
+    """
+    head = file.read(MAX_HEADER)
+    if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        found = "utf-16-le" if head.startswith(BOM_UTF16_LE) else "utf-16-be"
+        return "utf-16" if _is_utf_16(head[2:], found) else None
+    if b"\0" in head:
+        return next((one for one in ("utf-16-le", "utf-16-be") if _is_utf_16(head, one)), None)
+    decoder, part = getincrementaldecoder("utf-8")(), head
+    try:
+        while part:
+            decoder.decode(part)
+            part = file.read(MAX_HEADER)
+        decoder.decode(b"", final=True)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def _is_utf_16(head: bytes, encoding: str) -> bool:
+    """Return whether most letters of a text are of the Latin alphabet, as those of labs are."""
+    text = head[: len(head) // 2 * 2].decode(encoding, errors="replace")
+    letters = "".join(text.split())
+    latin = sum(letter.isprintable() and letter < "\u0250" for letter in letters)
+    return "\0" not in letters and latin > 0.8 * len(letters)
 
 
 def read_header(path: Path) -> tuple[list[str], str]:
@@ -42,11 +88,8 @@ def read_header(path: Path) -> tuple[list[str], str]:
     OSError
         For a file that cannot be read.
     """
-    try:
-        with open_text(path) as file:
-            first = file.readline(MAX_HEADER)
-    except UnicodeDecodeError:
-        raise GaitInputError(f"{path.name} is no text. Save it as CSV UTF-8.") from None
+    with open_text(path) as file:
+        first = file.readline(MAX_HEADER)
     delimiter = max(",;\t", key=first.count)
     return [name.strip() for name in next(csv.reader([first], delimiter=delimiter), [])], delimiter
 
@@ -77,14 +120,13 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
         raise GaitInputError(
             f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(header)}."
         )
-    with warnings.catch_warnings():
+    with open_text(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of rows that are too short, which are left out
         table = np.genfromtxt(
-            path,
+            file,
             delimiter=delimiter,
             skip_header=1,
             usecols=[header.index(name) for name in wanted],
-            encoding="utf-8-sig",
             invalid_raise=False,
             ndmin=2,
         )

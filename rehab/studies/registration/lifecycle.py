@@ -8,11 +8,12 @@ from typing import Any
 from django.db import transaction
 from django.utils.translation import gettext
 
+from rehab.people.audit import seals
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
-from rehab.studies.models import Study, StudyState, StudyVersion
-from rehab.studies.participants import StudyEvent
+from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
+from rehab.studies.participants import Allocation, StudyEvent
 from rehab.studies.registration.document import describe, digest_of
 from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
@@ -205,9 +206,23 @@ def close(study: Study, by: User | None, now: datetime) -> None:
         check_no_open_session(study)
         study.state, study.closed_at = StudyState.CLOSED, now
         study.save(update_fields=["state", "closed_at"])
-        note(study, Kind.CLOSED, by, now)
+        note(study, Kind.CLOSED, by, now, about=_look_over(study))
         for enrollment in study.enrollments.select_related("patient"):
             set_blinded(enrollment.patient)
+
+
+def _look_over(study: Study) -> str:
+    """Return whether what was recorded of the clinic's studies is as it was sealed.
+
+    A study is closed all the same: what is broken is found by `manage.py doctor`, and mended by
+    nobody.
+    """
+    logs = [model.__name__ for model in (Allocation, StudyEvent, StudyMark)]
+    broken = [one for log in logs for one in seals.find_broken_of(log, study.clinic_id)]
+    if broken:
+        return f"not as sealed, {len(broken)}: {broken[0]}"[:120]
+    head = seals.seals_of(StudyEvent.__name__, study.clinic_id).last()
+    return f"as sealed: {head.digest}" if head else "nothing sealed yet"
 
 
 def check_no_open_session(study: Study, patient: Patient | None = None) -> None:
