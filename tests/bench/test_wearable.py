@@ -147,8 +147,8 @@ def test_straight_walks_turns_and_standing(lost):
         false += int((np.abs(alone[:, None] - walk.initial_s).min(axis=1, initial=9) > 0.3).sum())
     low, high = 1000 * min(bias), 1000 * max(bias)
     middle, leaves, width = (1000 * np.median(one) for one in (bias, terminal, spread))
-    print(f"\n{lost:.0%} lost: initial {middle:.0f} ({low:.0f} … {high:.0f}), terminal {leaves:.0f} "
-          f"ms; within a walk ± {width:.1f} ms; "
+    print(f"\n{lost:.0%} lost: initial {middle:.0f} ({low:.0f} … {high:.0f}), terminal "
+          f"{leaves:.0f} ms; within a walk ± {width:.1f} ms; "
           f"{missed} of {known} missed; turns {dict(turns)}; "
           f"{false} false in {outside_s / 60:.1f} min outside")  # fmt: skip
     assert false <= 0.3 * outside_s / 60
