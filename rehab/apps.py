@@ -27,7 +27,7 @@ class RehabConfig(AppConfig):
         from rehab.people.sign_in.factors.factors import Authenticator
         from rehab.people.sign_in.tokens import revoke_with_account
         from rehab.sessions.feedback_text_updates import connect_signals
-        from rehab.sessions.setup.defaults import install_defaults
+        from rehab.sessions.setup.default_protocols import install_defaults
         from rehab.studies import signals as studies
 
         post_migrate.connect(install_defaults, sender=self)

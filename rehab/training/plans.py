@@ -9,15 +9,15 @@ from typing import Any
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
 from rehab.training.bands import bands_from_json
 from rehab.training.closeness import CloseSteps
-from rehab.training.cueing import (
+from rehab.training.goals import GoalRule, Target
+from rehab.training.measures import InvalidSetting, Measure
+from rehab.training.phases import Phase
+from rehab.training.robot_cueing import (
     DEFAULT_ACTIVATION_THRESHOLD,
     CueTiming,
     check_activation_threshold,
     check_cue_rule,
 )
-from rehab.training.goals import GoalRule, Target
-from rehab.training.measures import InvalidSetting, Measure
-from rehab.training.phases import Phase
 from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence

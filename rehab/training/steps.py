@@ -31,6 +31,7 @@ class InvalidReason(StrEnum):
     PAUSED = "paused"
     FLAGGED = "flagged"
     FORCE_LOST = "force_lost"
+    LATE = "late"  # its samples came late from the lab
 
 
 class InvalidMeasurement(ValueError):

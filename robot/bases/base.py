@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar, Self
 
+from robot.motion.base_response import Response
 from robot.motion.pose import Pose
-from robot.motion.response import Response
 from robot.motion.score import Color, Note
 from robot.motion.twist import Twist
 

@@ -19,9 +19,9 @@ from robot.bases.drive_train import (
 )
 from robot.bases.kobuki_protocol.wheels import TICK_M
 from robot.bases.odometry import Odometry
+from robot.motion.base_response import Response
 from robot.motion.limits import ORDER_HOLDS_S, TICK_S, WHEEL_LIMITS
 from robot.motion.pose import HOME, advance
-from robot.motion.response import Response
 from robot.motion.twist import STILL, Twist
 
 STEP_S = TICK_S / 2

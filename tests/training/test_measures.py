@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from rehab.training.cueing import check_activation_threshold
 from rehab.training.measures import (
     A2,
     GAIN_MAX,
@@ -20,7 +18,6 @@ from rehab.training.measures import (
     WORN,
     WORN_MEASURES,
     InvalidSetting,
-    check_gain,
     check_worn,
 )
 from rehab.training.scoring import judge
@@ -72,28 +69,6 @@ def test_a_goal_within_bounds_is_a_number(goal: float) -> None:
 def test_a_goal_out_of_bounds_is_refused_with_the_cure(goal: float) -> None:
     with pytest.raises(InvalidSetting, match=r"Give one above 0 and up to 15 W/kg\."):
         A2.check_goal(goal)
-
-
-@pytest.mark.parametrize(
-    ("check", "good", "bad", "cure"),
-    [
-        (check_gain, [0.5, 0.85, 1, 1.5], [0, 0.499, 1.501, -1, math.nan, math.inf], "0.5 to 1.5"),
-        (
-            check_activation_threshold,
-            [0.01, 0.9, 2],
-            [0, -0.9, 2.001, 90, math.nan, math.inf],
-            r"0\.9 for 90 %",
-        ),
-    ],
-)
-def test_settings_have_bounds(
-    check: Callable[[float], float], good: list[float], bad: list[float], cure: str
-) -> None:
-    for setting in good:
-        assert check(setting) == setting
-    for setting in bad:
-        with pytest.raises(InvalidSetting, match=cure):
-            check(setting)
 
 
 @pytest.mark.parametrize(

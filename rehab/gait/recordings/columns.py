@@ -11,6 +11,8 @@ from rehab.gait.strides import GaitInputError
 CHANNELS = ("force", "moment", "angle", "forward", "position")
 REQUIRED = CHANNELS[:3]
 SIDES = ("left", "right")
+# A column of a stored recording that is 1 where people walk over plates in a floor.
+OVERGROUND = "overground"
 
 
 @dataclass(frozen=True, slots=True)

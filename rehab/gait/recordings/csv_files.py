@@ -11,7 +11,13 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, ColumnMap, SignalColumn
+from rehab.gait.recordings.columns import (
+    CHANNELS,
+    OVERGROUND,
+    SIGNAL_LAYOUTS,
+    ColumnMap,
+    SignalColumn,
+)
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
@@ -132,7 +138,12 @@ def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None
 
 
 def save_signals(
-    path: Path, time_s: Floats, legs: Mapping[str, LegSamples], frames: Floats | None = None
+    path: Path,
+    time_s: Floats,
+    legs: Mapping[str, LegSamples],
+    frames: Floats | None = None,
+    *,
+    is_overground: bool = False,
 ) -> None:
     """Write signals in SI units to a new CSV file, in the layout ``garry``.
 
@@ -153,6 +164,8 @@ def save_signals(
     if layout.frame is not None and frames is not None:
         counts = {len(columns)}
         columns[layout.frame.name] = frames
+    if is_overground:
+        columns[OVERGROUND] = np.ones(len(time_s))
     rows = np.column_stack(list(columns.values()))
     try:
         with path.open("x", encoding="utf-8") as file:

@@ -7,11 +7,12 @@ import gzip
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
-from rehab.gait.recordings.columns import ColumnMap, find_layout, read_column_map
+from rehab.gait.recordings.columns import OVERGROUND, ColumnMap, find_layout, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.signals.filters import Floats
@@ -34,6 +35,25 @@ READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
     ".trc": motion_files.read_markers,
     ".tsv": motion_files.read_qualisys,
 }
+
+
+class RecordedSignals(NamedTuple):
+    """A walk's signals in SI units, with our signs.
+
+    Attributes
+    ----------
+    time_s, legs
+        Times, shape (n,), and ``LegSamples`` of shape (n,) by side.
+    frames
+        The samples' numbers, shape (n,), None where no column has them.
+    is_overground
+        Whether the recording says that it is of steps over plates in a floor.
+    """
+
+    time_s: Floats
+    legs: dict[str, LegSamples]
+    frames: Floats | None
+    is_overground: bool
 
 
 def read_any_table(*paths: Path) -> Table:
@@ -73,10 +93,8 @@ def read_any_table(*paths: Path) -> Table:
     return table
 
 
-def read_signals(
-    *paths: Path, pairs: Sequence[str] | None = None
-) -> tuple[Floats, dict[str, LegSamples], Floats | None]:
-    """Return times [s], each leg's channels and the frame numbers of a recording.
+def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSignals:
+    """Return the signals of a recording.
 
     Parameters
     ----------
@@ -84,11 +102,6 @@ def read_signals(
         The file, or those of one walk. A cell that is not a number is a missing sample: NaN.
     pairs
         Which column is which channel, as for ``read_column_map``; None to decide by the header.
-
-    Returns
-    -------
-    Times, shape (n,), ``LegSamples`` of shape (n,) by side, in SI units with our signs, and numbers
-    of shape (n,), None where no column has them.
 
     Raises
     ------
@@ -106,7 +119,12 @@ def read_signals(
     if empty:
         raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
     frames = None if frame is None else table[frame]
-    return (*apply_columns(table, columns), frames)
+    return RecordedSignals(*apply_columns(table, columns), frames, says_overground(table))
+
+
+def says_overground(table: Mapping[str, Floats]) -> bool:
+    """Return whether a stored recording is one of steps over plates in a floor."""
+    return OVERGROUND in table and bool((table[OVERGROUND] > 0).any())
 
 
 def require_columns(path: Path, table: Mapping[str, Floats], columns: ColumnMap) -> None:

@@ -18,7 +18,7 @@ from rehab.training.schedules import FeedbackSummary
 from rehab.training.steps import Side
 
 # Rises with every change of the fold that an older checkpoint would not fit; such a one is ignored.
-CHECKPOINT_VERSION = 4
+CHECKPOINT_VERSION = 5
 # What is plain data already.
 PLAIN = (
     *("last_number", "last_time_s", "active_s", "goal", "was_walking"),
