@@ -26,10 +26,10 @@ from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.behavior.body import Body
 from robot.behavior.performer import Performer, control_loop
 from robot.calibration import BadCalibration, store_calibration
+from robot.motion.base_response import MOST_STICTION_M_S, Response
 from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.limits import TICK_S
 from robot.motion.player import DONE
-from robot.motion.response import MOST_STICTION_M_S, Response
 from robot.motion.twist import Twist
 
 REST_S = 4.0

@@ -96,7 +96,7 @@ class OriginalTopicClient:
         self._told_s = -math.inf  # whether it may act, the last time
 
     def allow(self, is_allowed: bool, now_s: float) -> None:
-        """Allow ``True`` and data where our own robot may act; else take back what was said.
+        """Allow ``True`` and data where our own robot may act; else withdraw what was published.
 
         Parameters
         ----------
@@ -116,7 +116,16 @@ class OriginalTopicClient:
         self.is_allowed = is_allowed
 
     def handle_message(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Handle a message of the server; a step without finite numbers is not published."""
+        """Handle a message of the server.
+
+        Parameters
+        ----------
+        message
+            Of a step, the shown value and the goal are published; one without finite numbers is
+            not. Of a welcome or a cue, the feedback type is stored.
+        now_s
+            When it came [s].
+        """
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
@@ -129,7 +138,7 @@ class OriginalTopicClient:
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
     def publish_decision(self, above: bool, window_s: float, now_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above.
+        """Publish a decision about a window.
 
         Parameters
         ----------
@@ -184,7 +193,15 @@ class OriginalTopicClient:
                 yield self._publish(topic, message, now_s)
 
     def handle(self, incoming: Incoming, now_s: float) -> None:
-        """Confirm a message by its echo. Raises BadRosFrame."""
+        """Handle a frame of the bridge. Raises BadRosFrame.
+
+        Parameters
+        ----------
+        incoming
+            A publication is the echo that confirms its topic, or odometry; a response is ignored.
+        now_s
+            The time [s].
+        """
         if self._holder is not None:
             self._holder.handle(incoming, now_s)
         if isinstance(incoming, Publication):
@@ -274,12 +291,20 @@ class OriginalTopics:
             self._client.handle_message(message, self._monotonic())
 
     def publish_decision(self, above: bool, window_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above."""
+        """Publish a decision about a window.
+
+        Parameters
+        ----------
+        above
+            Whether the window's mean reached the threshold.
+        window_s
+            Length of a window [s].
+        """
         with self._bridge.sending():
             self._client.publish_decision(above, window_s, self._monotonic())
 
     def allow(self, is_allowed: bool) -> None:
-        """Allow what moves a robot, or take back what was said; to be called at each tick."""
+        """Allow what moves a robot, or withdraw what was published; to be called at each tick."""
         now_s = self._monotonic()
         self._client.allowed_until_s = now_s + LAPSED_S
         if self._client.is_allowed != is_allowed:

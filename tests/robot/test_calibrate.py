@@ -11,7 +11,7 @@ from robot.bases import SensorState
 from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.calibrate import NotMeasured, measure, measure_stiction
 from robot.calibration import BadCalibration, apply_calibration, store_calibration
-from robot.motion.response import Response
+from robot.motion.base_response import Response
 from tests.support.robot_stage import FeelingBase, Stage
 
 pytestmark = pytest.mark.matrix

@@ -3,8 +3,8 @@
 import pytest
 
 from robot.bases.kinematic import Imperfections
+from robot.motion.base_response import AT_ONCE
 from robot.motion.gestures import BUILT_IN
-from robot.motion.response import AT_ONCE
 from tests.support.gesture_runs import OrdinaryBase, play_in_a_row
 from tests.support.robot_stage import CUE, WELCOME, Stage
 from tests.support.variants import cases

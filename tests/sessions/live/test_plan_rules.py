@@ -7,9 +7,9 @@ import pytest
 from rehab.sessions.log import Step
 from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
-from rehab.training.cueing import CueTiming
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
+from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
 from robot.wire.cue_limits import CueRule
