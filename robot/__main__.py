@@ -25,6 +25,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 
 from robot import calibrate, doctor, play_gesture, replay
@@ -164,7 +165,8 @@ def run(options: Namespace) -> int:
     # By what stays the same: the token of a file is replaced now and then.
     own = token if options.token_file is None else str(options.token_file.resolve())
     folder = find_black_box(options.black_box, own)
-    box = None if folder is None else BlackBox(folder)
+    keeps_motion = find_spec("mcap") is not None
+    box = None if folder is None else BlackBox(folder, keeps_motion=keeps_motion)
     with base, originals or contextlib.nullcontext(), box or contextlib.nullcontext():
         if apply_calibration(base):
             print_notice(f"{base.identity} answers as it was measured to.")
