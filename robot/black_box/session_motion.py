@@ -78,7 +78,7 @@ class SessionMotion:
         self._writer = self._file = self._session = None
         if writer is not None and file is not None:
             with file:
-                writer.finish()
+                writer.finish()  # type: ignore[no-untyped-call]
 
     def _begin(self, session: int | None, at_s: float) -> None:
         self.close()

@@ -60,6 +60,8 @@ class Player:
         # One that does not creep comes nearer to its places in the same time.
         creeps = response.stiction_m_s <= CLOSING_PER_S * NEAR_M
         self._near_m, self._near_rad = (NEAR_M, NEAR_RAD) if creeps else (NEAR_M / 2, NEAR_RAD / 2)
+        # It stops short, too: a base that turned round at once would seem to be held.
+        self._pause_s = 0.0 if creeps else SETTLE_S
         self._in_flight = OrdersInFlight(response.delay_s)
         self._meter = DelayMeter()
         self.gesture: Gesture | None = None
@@ -77,6 +79,7 @@ class Player:
         self._turns_rad = 0.0  # full turns that were made before the gesture
         self._pace = 1.0
         self._is_late = False  # its time is over, and it was nearly at home
+        self._is_corrected = False  # it has driven the rest of the way home
 
     @property
     def is_busy(self) -> bool:
@@ -108,7 +111,8 @@ class Player:
         """
         if self.gesture is not None:
             raise RuntimeError(f"{self.gesture.name} is being played.")
-        self.gesture, self._verdict, self._pace, self._is_late = gesture, "", pace, False
+        self.gesture, self._verdict, self._pace = gesture, "", pace
+        self._is_late = self._is_corrected = False
         self._turns_rad = pose.heading_rad - wrap(pose.heading_rad)
         self._waypoints = deque(gesture.waypoints)
         self._begins_s = time_s + after_s
@@ -180,14 +184,13 @@ class Player:
             elif self._there_s is None:
                 self._there_s = time_s
             elif time_s - self._there_s < max(
-                self._waypoint.hold_s, 0 if self._waypoints else self._settle_s
+                self._waypoint.hold_s, self._pause_s if self._waypoints else self._settle_s
             ):
                 return limits, STILL
-            elif (
-                not self._waypoints
-                and abs(self._waypoint.heading_rad - here.heading_rad) > self._near_rad
+            elif not self._waypoints and (
+                rest := self._rest_of_the_way(here, self._waypoint.heading_rad)
             ):
-                self._segments.append(Turn(self._waypoint.heading_rad, 0.0))
+                self._segments.extend(rest)
                 self._there_s = None
             else:
                 self._next_waypoint(self._waypoint.pose, time_s)
@@ -202,6 +205,20 @@ class Player:
         if v_m_s:
             return Twist(v_m_s, ramped.w_rad_s)
         return Twist(0.0, _lift(ramped.w_rad_s, wanted.w_rad_s, self._least.w_rad_s))
+
+    def _rest_of_the_way(self, here: Pose, heading_rad: float) -> list[Segment]:
+        """Return what is left at home, once the base has come to rest: ahead or back, and a turn.
+
+        One that answers sooner than was assumed has stopped too early; it drives the rest once.
+        """
+        rest: list[Segment] = []
+        left_m = HOME.seen_from(Pose(here.x_m, here.y_m)).x_m
+        if abs(left_m) > 2 * self._near_m and not self._is_corrected:
+            self._is_corrected = True
+            rest.append(Drive(HOME.x_m, HOME.y_m, heading_rad, left_m))
+        if rest or abs(heading_rad - here.heading_rad) > self._near_rad:
+            rest.append(Turn(heading_rad, 0.0))
+        return rest
 
     def _follow(self, segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
         """Return the twist that follows a segment; None at its end."""

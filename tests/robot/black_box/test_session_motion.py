@@ -2,6 +2,7 @@
 
 import json
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,7 @@ class Walked(Stage):
 
 def read(path):
     """Return each topic's messages of a file."""
-    topics = {}
+    topics: dict[str, list[tuple[int, Any]]] = {}
     with path.open("rb") as file:
         for _, channel, message in mcap_reader.make_reader(file).iter_messages():
             topics.setdefault(channel.topic, []).append(

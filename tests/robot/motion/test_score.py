@@ -53,7 +53,8 @@ def test_explicit_feedback_stays_still():
 def test_a_score_is_over_before_its_motion_and_tells_that_it_begins(name):
     gesture = BUILT_IN[name]
     ends_s = ANNOUNCED_S + dry_run(gesture).took_s
-    for entry in (*gesture.score.lights, *gesture.score.notes):
+    entries: tuple[Light | Note, ...] = (*gesture.score.lights, *gesture.score.notes)
+    for entry in entries:
         assert 0 <= entry.at_s <= ends_s
     assert gesture.score.lights[0].at_s == gesture.score.notes[0].at_s == 0
     assert gesture.score.quiet == Score(gesture.score.lights)

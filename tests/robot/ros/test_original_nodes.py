@@ -13,6 +13,7 @@ import sys
 import time
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -28,6 +29,14 @@ LIMIT_S = 0.75
 KOBUKI_S = 0.6  # kobuki_node's own timeout
 
 
+class Ros(NamedTuple):
+    """A master, a base that is a node of it, and where a rosbridge is."""
+
+    master: RosMaster
+    robot: FakeBase
+    url: str
+
+
 @pytest.fixture
 def ros():
     if reason := why_missing():
@@ -38,8 +47,7 @@ def ros():
         stack.enter_context(Ticking(robot))
         served = ServedRos(FakeRosbridge(master.node("rosbridge"), has_rosapi=False))
         stack.enter_context(served)
-        served.master, served.robot = master, robot
-        yield served
+        yield Ros(master, robot, served.url)
 
 
 @asynccontextmanager
