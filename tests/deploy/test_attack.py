@@ -95,8 +95,13 @@ def attack(url: str, made: dict[str, Any], count: int) -> tuple[list[str], Count
         what = f"{method} {place['url']} {body[:200]!r}"
         model = models.get(place["model"] or "")
         route = Route(place["name"], f"{method} {place['url']}", place["owner"], model)
-        if method != "HEAD":
-            problems += what_leaks(actor, route, Said(answer), clinics, row["hidden"])
+        if method != "HEAD":  # a tablet shows the name of its own station
+            others = (
+                clinics
+                if actor.role != "device"
+                else [c for c in clinics if c.name != actor.clinic]
+            )
+            problems += what_leaks(actor, route, Said(answer), others, row["hidden"])
         if any(word in answer.body for word in TELLTALES):
             problems.append(f"{actor.label}: {what} tells how it failed")
         if answer.status >= 500 and place["name"] != "readyz":
