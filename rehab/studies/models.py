@@ -108,7 +108,7 @@ class Study(ClinicModel):
     created_at = models.DateTimeField(default=timezone.now, editable=False)
     registered_at = models.DateTimeField(null=True, editable=False)
     started_at = models.DateTimeField(null=True, editable=False)
-    # From then on nothing is hidden from anybody.
+    # From then on nothing is hidden.
     closed_at = models.DateTimeField(null=True, editable=False)
 
     class Meta(ClinicModel.Meta):
@@ -151,7 +151,7 @@ class Study(ClinicModel):
 
     @property
     def risks_early_punishment(self) -> bool:
-        """Whether people may meet negative feedback early after their stroke.
+        """Whether participants may get negative feedback early after their stroke.
 
         It then worked worse than reward (docs/reference/gait.md#feedback-and-time-since-stroke).
         """
@@ -220,7 +220,7 @@ class Arm(ScopedModel):
     measure = models.ForeignKey(
         MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
     )
-    # None once it was deleted; what was walked stands in the study's versions.
+    # None once it was deleted; the study's versions still have what was walked.
     protocol = models.ForeignKey(
         Protocol, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("protocol")
     )
@@ -265,7 +265,7 @@ class StudyMark(SealableModel):
     """What an account is in a study besides its role, until ``ended_at``."""
 
     class Task(models.TextChoices):
-        """What the mark says."""
+        """What the mark allows or hides."""
 
         ASSESSOR = "assessor", _("Assesses, and must not know the arm")
         INTERIM = "interim", _("May look before the study is closed")
@@ -304,5 +304,5 @@ class StudyMark(SealableModel):
 
 
 def has_mark(study: Study, user: Any, task: StudyMark.Task) -> bool:
-    """Return whether an account has a mark of a study now."""
+    """Return whether the account ``user`` has the mark ``task`` in a study now."""
     return study.marks.filter(user=user, task=task, ended_at=None).exists()

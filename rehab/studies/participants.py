@@ -18,19 +18,25 @@ from rehab.people.scope import ClinicModel, ScopedModel
 from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Arm, Study, StudyVersion
 
-ERASED_CODE = "E-"  # begins the code of an erased participant
+ERASED_CODE = "E-"  # prefix of an erased participant's code
 OF_STUDY = retained("the study's result, under a code", shown=True, research=True)
 
 
 def replace_codes(patient: Patient, _pseudonym: str) -> None:
-    """Replace an erased participant's codes; the numbers of the studies stay right."""
+    """Replace an erased participant's codes by random ones; the numbers of the studies stay right.
+
+    An eraser of the field policy: ``patient`` is who is erased, ``_pseudonym`` is not used.
+    """
     for enrollment in patient.enrollments.exclude(code__startswith=ERASED_CODE):
         enrollment.code = f"{ERASED_CODE}{random_code(8)}"
         enrollment.save(update_fields=["code"])
 
 
 def empty_reasons(patient: Patient, _pseudonym: str) -> None:
-    """Empty the words that were typed about an erased participant."""
+    """Delete what was typed about an erased participant.
+
+    An eraser of the field policy: ``patient`` is who is erased, ``_pseudonym`` is not used.
+    """
     emptied = {"reason": "", "about": "", "salt": "", "erased": True}
     StudyEvent.everywhere.filter(enrollment__patient=patient).update(**emptied)
 
@@ -112,7 +118,7 @@ class Allocation(SealableModel):
 
 
 class StudyVisit(ScopedModel):
-    """A visit that the study plans. A session that was broken off leaves room for another try."""
+    """A visit that the study plans. An aborted session can be walked again."""
 
     scope = PatientScope(
         clinic="enrollment__clinic", patient="enrollment__patient", tells_condition=False

@@ -17,7 +17,7 @@ OVERGROUND = "overground"
 
 @dataclass(frozen=True, slots=True)
 class SignalColumn:
-    """A column by name, and what takes its numbers to SI units, our signs and the force's time.
+    """A column by name, with what converts its numbers to SI units and our signs, and its delay.
 
     Attributes
     ----------

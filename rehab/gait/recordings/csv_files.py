@@ -138,7 +138,7 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
 def apply_columns(
     table: Mapping[str, Floats], columns: ColumnMap
 ) -> tuple[Floats, dict[str, LegSamples]]:
-    """Return times [s] and each leg's channels, in SI units, with our signs and in time.
+    """Return times [s] and each leg's channels, in SI units, with our signs, delays removed.
 
     Parameters
     ----------
@@ -171,9 +171,18 @@ def apply_columns(
 
 
 def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None:
-    """Write samples, shape (n, columns), the first of which is their time.
+    """Write samples as lines of a CSV file.
 
-    Times and ``counts`` have all digits: stamps may be of seconds since 1970, counts of 32 bits.
+    Times and counts have all their digits: stamps may be seconds since 1970, counts 32 bits wide.
+
+    Parameters
+    ----------
+    file
+        A text file, open for writing, behind its header.
+    rows
+        The samples, shape (n, columns); their times come first.
+    counts
+        Which columns, from 0, are counts.
     """
     digits = (15 if place == 0 or place in counts else 9 for place in range(rows.shape[1]))
     np.savetxt(file, rows, [f"%.{most}g" for most in digits], ",")
@@ -188,6 +197,17 @@ def save_signals(
     is_overground: bool = False,
 ) -> None:
     """Write signals in SI units to a new CSV file, in the layout ``garry``.
+
+    Parameters
+    ----------
+    path
+        The file, which does not exist yet.
+    time_s
+        Times [s], shape (n,).
+    legs
+        The channels of each leg by its side ("left", "right"), shape (n,) each.
+    frames
+        The samples' numbers, shape (n,), if there are any.
 
     Raises
     ------
@@ -220,7 +240,7 @@ def save_signals(
 
 
 def read_mass(path: Path) -> float:
-    """Return the body mass [kg] that moore2013 keeps in ``SubjectInfo.csv`` beside a recording.
+    """Return the body mass [kg] that moore2013 stores in ``SubjectInfo.csv`` beside a recording.
 
     Raises
     ------
