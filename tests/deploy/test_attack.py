@@ -96,11 +96,8 @@ def attack(url: str, made: dict[str, Any], count: int) -> tuple[list[str], Count
         model = models.get(place["model"] or "")
         route = Route(place["name"], f"{method} {place['url']}", place["owner"], model)
         if method != "HEAD":  # a tablet shows the name of its own station
-            others = (
-                clinics
-                if actor.role != "device"
-                else [c for c in clinics if c.name != actor.clinic]
-            )
+            own = actor.clinic if actor.role == "device" else ""
+            others: Any = [clinic for clinic in clinics if clinic.name != own]
             problems += what_leaks(actor, route, Said(answer), others, row["hidden"])
         if any(word in answer.body for word in TELLTALES):
             problems.append(f"{actor.label}: {what} tells how it failed")
