@@ -130,7 +130,7 @@ def test_nothing_fails_and_nothing_foreign_is_shown(attacked):
     assert not problems, "\n".join(problems)
     assert statuses.total() == REQUESTS
     for label in ("lead of amber", "pt of birch", "program of a pt of amber", "tablet of amber"):
-        assert statuses[label, 200] > 10, (label, statuses)
+        assert statuses[label, 200] > 5, (label, statuses)
 
 
 def test_the_attack_finds_what_another_clinic_shows(attacked):
