@@ -25,7 +25,7 @@ from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
 from rehab.studies.analysis import outcomes
-from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms
+from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms, check_channels
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import ROBOT_LEVELS
@@ -140,6 +140,7 @@ class Study(ClinicModel):
         """Return what participants are allocated to. Raises InvalidSetting."""
         arms = self.arm_rules()
         check_arms(arms, crossover=self.crossover)
+        check_channels([arm.measure.channel for arm in self.arms.select_related("measure")])
         if self.crossover:
             return crossover_groups([arm.code for arm in arms])
         return tuple(Group((arm.code,), arm.weight) for arm in arms)
