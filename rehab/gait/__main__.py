@@ -97,7 +97,8 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
     path = paths[0]
-    time, legs, frames, is_overground = read_signals(*paths, pairs=options.columns)
+    time, legs, frames, says_so = read_signals(*paths, pairs=options.columns)
+    is_overground = options.overground or says_so
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     strides = measure_strides(
@@ -106,7 +107,7 @@ def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         look_ahead_s=options.look_ahead,
-        is_overground=options.overground or is_overground,
+        is_overground=is_overground,
         frame=frames,
     )
     check = check_signals(
@@ -116,6 +117,7 @@ def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         strides=strides,
+        is_overground=is_overground,
     )
     if options.json:
         found = {

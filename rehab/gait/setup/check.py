@@ -111,6 +111,7 @@ def check_setup(
         rate_hz=proposal.rate_hz,
         mass_kg=proposal.mass_kg,
         strides=strides,
+        is_overground=proposal.is_overground,
     )
     findings = list(proposal.notes) + [
         f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt

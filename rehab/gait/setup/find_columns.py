@@ -16,6 +16,7 @@ import numpy as np
 from rehab.gait.recordings.columns import REQUIRED
 from rehab.gait.recordings.readers import says_overground
 from rehab.gait.recordings.table import Table
+from rehab.gait.selfcheck.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
 from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ
 from rehab.gait.setup.find_forces import (
     find_force_unit,
@@ -25,7 +26,6 @@ from rehab.gait.setup.find_forces import (
 )
 from rehab.gait.setup.guess import Guess
 from rehab.gait.setup.names import Label, names_another, read_label, read_unit
-from rehab.gait.setup.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
 from rehab.gait.setup.units import (
     ANGLE_RAD,
     ANGLE_SPREAD,

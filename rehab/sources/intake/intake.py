@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -87,6 +88,8 @@ class Intake:
         self._number = 0
         self._warned_s: dict[str, float] = {}
         self._reported_reasons: set[str] = set()
+        self._doubts: tuple[str, ...] = ()  # why valid strides do not count
+        self._doubted_at = 0  # how many times the session had been resumed then
 
     @property
     def side(self) -> Side:
@@ -180,7 +183,15 @@ class Intake:
         for stride in strides:
             named = to_measurement(stride, self._number + 1, self.side)
             if named is not None:
-                self._put(named, is_timed=False)
+                reasons = named.reasons or self._standing_doubts
+                self._put(replace(named, reasons=reasons), is_timed=False)
+
+    @property
+    def _standing_doubts(self) -> tuple[str, ...]:
+        """What a person has not answered yet: by going on after a pause the signals are right."""
+        if self._feed.resumed > self._doubted_at:
+            self._doubts = ()
+        return self._doubts
 
     def _put_steps(self, strides: Iterable[tuple[Side, GyroscopeStride]]) -> None:
         for side, stride in strides:
@@ -288,7 +299,10 @@ class Intake:
                 is_overground=self._settings.is_overground,
             )
         self._put_strides(self._pipeline.add(t_s, values))
-        for finding in self._pipeline.check():
+        findings = self._pipeline.check()
+        if doubts := tuple(sorted({one.doubt for one in findings if one.doubt})):
+            self._doubts, self._doubted_at = doubts, self._feed.resumed
+        for finding in findings:
             where = f" ({finding.side} leg)" if finding.side else ""
             self._notify(f"Check of the first half minute{where}: {finding.message}")
 
