@@ -80,7 +80,7 @@ const DOUBTS = {
     "The plates do not carry the body mass that was given. Check it, and handrail and harness. If it is right, pause and go on: strides then count.",
   ),
   doubt_angle: _(
-    "The angle moves as a knee’s or hip’s does. Check the columns at the source. If they are right, pause and go on: strides then count.",
+    "The angle moves as a knee’s does. Check the columns at the source. If they are right, pause and go on: strides then count.",
   ),
 };
 
