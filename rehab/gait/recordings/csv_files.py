@@ -11,12 +11,15 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from rehab.gait.recordings.ankle import compute_ankle
 from rehab.gait.recordings.columns import (
     CHANNELS,
+    MARKED,
     OVERGROUND,
     SIGNAL_LAYOUTS,
     ColumnMap,
     SignalColumn,
+    find_required,
 )
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
@@ -116,16 +119,13 @@ def apply_columns(
         shifted: Floats = np.interp(time + column.delay_s, time, values)
         return shifted
 
-    return time, {
-        side: LegSamples(
-            np.asarray(read(leg["force"])),
-            np.asarray(read(leg["moment"])),
-            np.asarray(read(leg["angle"])),
-            read(leg.get("forward")),
-            read(leg.get("position")),
-        )
-        for side, leg in columns.legs.items()
-    }
+    legs = {}
+    for side, leg in columns.legs.items():
+        values = {channel: np.asarray(read(column)) for channel, column in leg.items()}
+        if find_required(leg) == MARKED:
+            values["moment"], values["angle"] = compute_ankle(values)
+        legs[side] = LegSamples(*(values.get(channel) for channel in CHANNELS))
+    return time, legs
 
 
 def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None:

@@ -10,6 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from rehab.gait import GyroscopeStride, Stride
+from rehab.gait.recordings.ankle import compute_ankle
+from rehab.gait.recordings.columns import MARKED, SIDES, find_required
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
@@ -280,6 +282,9 @@ class Intake:
         return VALUE in there or bool(known & there)
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
+        for side in SIDES:
+            if (side, "cop") in values:
+                _add_ankle(values, side)
         if self._recorder is not None:
             self._recorder.write(t_s, values)
         if self._pipeline is None:
@@ -313,3 +318,10 @@ class Intake:
                 self._warned_s.clear()
             self._warned_s[kind] = now_s
             self._notify(text)
+
+
+def _add_ankle(values: dict[Channel, Floats], side: str) -> None:
+    """Add a leg's moment and angle to its channels, of plates and markers that are whole."""
+    leg = {name: channel for (own, name), channel in values.items() if own == side}
+    if find_required(leg) == MARKED and leg.keys() >= set(MARKED):
+        values[side, "moment"], values[side, "angle"] = compute_ankle(leg)
