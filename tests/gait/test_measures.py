@@ -29,11 +29,13 @@ def open_walk():
     columns = read_moore_columns()
     legs = {
         side: LegSamples(
-            *getattr(walk, side),
+            walk_leg[0],
+            walk_leg[1],
+            walk_leg[2],
             columns[f"{side.title()}GRF_x"],
             columns[f"{side.title()}Foot_x"],
         )
-        for side in SIDES
+        for side, walk_leg in (("left", walk.left), ("right", walk.right))
     }
     strides = measure_strides(walk.t_s, legs, rate_hz=100, mass_kg=walk.mass_kg)
     return CorpusWalk("moore2013", walk.t_s, legs, walk.mass_kg, False), strides
@@ -68,20 +70,20 @@ def measure_by_numpy():
                 "braking_impulse_n_s_kg": np.trapezoid(np.maximum(-forward, 0), t_s),
                 "propulsion_n_kg": filtfilt(b, a, forward)[len(forward) // 2 :].max(),
             }
-    for (side, begin_s), own in found.items():
+    for (side, begin_s), figures in found.items():
         earlier = [at_s for leg, at_s in found if leg != side and at_s < begin_s]
         if not earlier or begin_s - max(earlier) > 2.5:
             continue
-        other = found[OTHER[side], max(earlier)]
+        earlier_figures = found[OTHER[side], max(earlier)]
         for name, what in (
             ("stance_ratio", "stance_s"),
             ("swing_ratio", "swing_s"),
             ("step_time_ratio", "step_s"),
             ("step_length_ratio", "step_length_m"),
         ):
-            own[name] = own[what] / other[what]
-        impulses = [one["propulsion_impulse_n_s_kg"] for one in (own, other)]
-        own["propulsion_share"] = impulses[0] / sum(impulses)
+            figures[name] = figures[what] / earlier_figures[what]
+        impulses = [one["propulsion_impulse_n_s_kg"] for one in (figures, earlier_figures)]
+        figures["propulsion_share"] = impulses[0] / sum(impulses)
     return found
 
 

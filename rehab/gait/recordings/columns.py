@@ -120,8 +120,10 @@ def _moore_leg(side: str) -> dict[str, SignalColumn]:
 
 
 def _own_leg(side: str) -> dict[str, SignalColumn]:
-    names = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
-    names += tuple(f"{channel}_m" for channel in MARKED[2:])
+    names = (
+        *("force_n", "moment_nm", "angle_rad", "forward_n", "position_m"),
+        *(f"{channel}_m" for channel in MARKED[2:]),
+    )
     return {
         channel: SignalColumn(f"{side}_{name}")
         for channel, name in zip(ALL_CHANNELS, names, strict=True)

@@ -16,6 +16,7 @@ from rehab.gait.recordings.columns import (
     CHANNELS,
     MARKED,
     OVERGROUND,
+    REQUIRED,
     SIGNAL_LAYOUTS,
     ColumnMap,
     SignalColumn,
@@ -124,7 +125,9 @@ def apply_columns(
         values = {channel: np.asarray(read(column)) for channel, column in leg.items()}
         if find_required(leg) == MARKED:
             values["moment"], values["angle"] = compute_ankle(values)
-        legs[side] = LegSamples(*(values.get(channel) for channel in CHANNELS))
+        force, moment, angle = (values[channel] for channel in REQUIRED)
+        further = (values.get(channel) for channel in CHANNELS[3:])
+        legs[side] = LegSamples(force, moment, angle, *further)
     return time, legs
 
 
