@@ -10,7 +10,16 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from rehab.training.measures import A2, GAIN_MAX, GAIN_MIN, MEASURES, InvalidSetting
+from rehab.training.measures import (
+    A2,
+    GAIN_MAX,
+    GAIN_MIN,
+    MEASURES,
+    WORN,
+    WORN_MEASURES,
+    InvalidSetting,
+    check_worn,
+)
 from rehab.training.scoring import judge
 from robot.wire.limits import PERFORMANCE_MAX
 from tests.training.sessions import SWAY
@@ -121,3 +130,15 @@ def test_a_performance_fits_every_reader(measure, value, gain, goal) -> None:
 @pytest.mark.parametrize(("value", "performance"), [(10, 2.0), (20, 1.0), (40, 0.5), (0, 1000.0)])
 def test_where_lower_is_better_performance_is_the_inverse(value: float, performance: float) -> None:
     assert judge(SWAY, value, 1.0, 20.0).performance == performance
+
+
+@pytest.mark.parametrize("place", WORN)
+def test_a_worn_sensor_measures_its_own_measures_and_never_a2(place: str) -> None:
+    stride = {WORN[place]: 1.0, "stride_s": 1.1}
+    for measure in WORN_MEASURES:
+        assert not measure.sd_channel
+        check_worn(stride, measure)
+    check_worn({"a2_sd_w_kg": 0.1}, A2)
+    for other in (A2, dataclasses.replace(A2, channel="stride_s"), SWAY):
+        with pytest.raises(InvalidSetting, match="does not measure .* one of its own measures"):
+            check_worn(stride, other)

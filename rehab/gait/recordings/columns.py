@@ -32,7 +32,7 @@ def find_required(names: Collection[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class SignalColumn:
-    """A column by name, and what takes its numbers to SI units, our signs and the force's time.
+    """A column by name, with what converts its numbers to SI units and our signs, and its delay.
 
     Attributes
     ----------

@@ -25,12 +25,12 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
 
-# What parsers raise for files that are not what they say.
+# What parsers raise for files whose content does not match their ending.
 DAMAGED = (
     ArithmeticError, AttributeError, EOFError, gzip.BadGzipFile, LookupError, MemoryError,
     RuntimeError, TypeError, ValueError, csv.Error, zlib.error,
 )  # fmt: skip
-LARGEST = 1e30  # of what a sensor sends; beyond, it is damaged
+LARGEST = 1e30  # of a sensor's values; a larger one is damage
 BYTES_MAX = 512 * 1024 * 1024
 
 READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
@@ -65,9 +65,9 @@ class RecordedSignals(NamedTuple):
 def read_any_table(*paths: Path) -> Table:
     """Return the columns of a walk's files by name, shape (n,) each, at the fastest one's rate.
 
-    Kinds are told by their endings: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
-    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Times are in a column that is called time, in
-    seconds, by which several files are joined.
+    The kind follows from the ending: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
+    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Several files are joined by their times, in a
+    column ``time`` [s].
 
     Raises
     ------
@@ -140,7 +140,17 @@ def says_overground(table: Mapping[str, Floats]) -> bool:
 
 
 def require_columns(path: Path, table: Mapping[str, Floats], columns: ColumnMap) -> None:
-    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map."""
+    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map.
+
+    Parameters
+    ----------
+    path
+        The file, which the message names.
+    table
+        Its columns by name.
+    columns
+        The map.
+    """
     missing = [column.name for column in columns.columns if column.name not in table]
     if missing:
         raise GaitInputError(
