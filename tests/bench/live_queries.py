@@ -14,6 +14,7 @@ from tests.bench.own_database import copy_rows, set_up
 WALKED = 1800  # steps a session: half an hour
 EVENTS = 60  # a session
 OPEN = 100  # sessions that run
+CLINICS = 1_000  # beside theirs
 GROWING = ("rehab_step", "rehab_sessionevent", "rehab_trainingsession", "rehab_sessionmetric")
 BASE = 1_000_000  # keys of what is made begin there
 
@@ -23,9 +24,11 @@ def fill(rows: int) -> list[int]:
     from django.db import connection, transaction
     from django.utils import timezone
 
+    from rehab.people.models import Clinic
     from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.log import Remark, SessionEvent, Step
     from rehab.sessions.models import TrainingSession
+    from rehab.sessions.ownership import ClinicOwner
     from rehab.training.steps import Measurement, Side
     from tests.support.live_seed import seed
     from tests.support.world import store
@@ -40,6 +43,8 @@ def fill(rows: int) -> list[int]:
             if number % (WALKED // EVENTS) == 0:
                 store(aggregate, [aggregate.log_event(Remark.HANDRAIL, None, at, {})])
     TrainingSession.everywhere.filter(pk=key).update(last_number=WALKED, **aggregate.summary())
+    others = Clinic.everywhere.bulk_create(Clinic(name=f"other {n}") for n in range(CLINICS))
+    ClinicOwner.everywhere.bulk_create(ClinicOwner(clinic=clinic) for clinic in others)
     count = max(OPEN, rows // WALKED)
     new = {"session_id": f"{BASE} + i"}
     state = f"CASE WHEN i <= {OPEN} THEN 'running' ELSE 'finished' END"

@@ -83,16 +83,3 @@ def test_missing_files_are_named(settings, tmp_path):
     assert status == 1
     assert "missing: uplot" in said
     assert "make setup" in said
-
-
-def test_a_redis_that_does_not_answer_is_named(settings):
-    settings.REDIS_URL = "redis://127.0.0.1:1/0"
-    settings.CHANNEL_LAYERS = {
-        "default": {
-            "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
-            "CONFIG": {"hosts": [settings.REDIS_URL]},
-        }
-    }
-    status, said = ask()
-    assert status == 1
-    assert "Check GARRY_REDIS_URL" in said

@@ -74,7 +74,8 @@ class Recovery:
         except OwnedElsewhere:
             self._orphaned.discard(session_id)  # another server was faster
         except Exception:  # one broken session must not prevent the server from starting
-            log.exception("Session %s could not be recovered", session_id)
+            if not self._host.draining:
+                log.exception("Session %s could not be recovered", session_id)
 
     async def pause_orphaned(self, live: LiveSession) -> None:
         """Pause a session whose process died while it ran.

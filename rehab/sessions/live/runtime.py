@@ -126,8 +126,11 @@ class Runtime:
     def drop(self, live: LiveSession, problem: Exception) -> None:
         """Drop a session that could not be written: its fold is ahead of its log.
 
-        A stop of the robot stays in force.
+        A stop of the robot stays in force. Where another process has the clinic, all of it is lost.
         """
+        if isinstance(problem, Fenced) and self.clinics.epochs.get(live.clinic_id) == live.epoch:
+            self.lose(live.clinic_id)
+            return
         self.robots.pass_stop_on(live)
         if self.sessions.get(live.id) is live:
             log.error("Session %s is rebuilt from its log: %s", live.id, problem)
@@ -138,8 +141,6 @@ class Runtime:
         for socket in list(self.sockets):
             if getattr(socket, "live", None) is live:
                 socket.close_soon(CloseCode.RESTARTING)
-        if isinstance(problem, Fenced) and self.clinics.epochs.get(live.clinic_id) == live.epoch:
-            self.lose(live.clinic_id)
 
     def lose(self, clinic_id: int) -> None:
         """Drop a clinic that another process has taken: its clients connect again, and find it."""

@@ -83,7 +83,9 @@ def test_clinics_are_spread_and_few_move_where_a_server_comes():
     assert lease.find_place(1, [one._replace(ready=False) for one in before]) is None
 
 
-def test_a_clinic_that_nobody_has_is_claimed_by_the_server_that_it_belongs_to(two_servers):
+def test_a_clinic_that_nobody_has_is_claimed_by_the_server_that_it_belongs_to(
+    two_servers, monkeypatch
+):
     other, _ = two_servers
     clinics = [Clinic.everywhere.create(name=f"clinic {number}").pk for number in range(40)]
     sql("UPDATE rehab_server SET ready = true, expires_at = clock_timestamp() + interval '9 s'")
@@ -100,6 +102,10 @@ def test_a_clinic_that_nobody_has_is_claimed_by_the_server_that_it_belongs_to(tw
     with pytest.raises(owners.OwnedElsewhere) as problem:
         owners.claim(mine[0])
     assert problem.value.server == other.address
+    with monkeypatch.context() as in_a_command:
+        in_a_command.setattr(lease, "_held", None)
+        with pytest.raises(owners.OwnedElsewhere):
+            owners.claim(mine[0])
     sql("DELETE FROM rehab_server WHERE id = %s", other.id)
     assert owners.claim(mine[0]) == (mine[0], 2, [], True)
     assert owners.claim(theirs[0]) == (theirs[0], 1, [], False)

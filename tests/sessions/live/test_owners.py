@@ -21,6 +21,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session import loading
+from rehab.sessions.live.supervisor import source_name
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
@@ -167,11 +168,17 @@ async def test_a_device_that_waits_has_its_clinic_here(place):
 
 
 async def test_a_clinic_that_another_process_took_is_dropped_with_all_its_sockets(
-    place, begun, bystander
+    place, begun, bystander, monkeypatch
 ):
     session = await begun(place)
     source, tablet = await place.source().open(), await place.tablet(session).open()
     runtime, parent = runtimes.current(), os.getppid()
+    stopped: list[str] = []
+
+    async def stop(name: str) -> None:
+        stopped.append(name)
+
+    monkeypatch.setattr(runtime.supervisor, "stop", stop)
     taken = ClinicOwner.everywhere.filter(pk=place.clinic.pk)
     other = f"{HOST}|{parent}|{owners._start_time(parent)}"
     await taken.aupdate(owner=other, epoch=7)
@@ -180,6 +187,7 @@ async def test_a_clinic_that_another_process_took_is_dropped_with_all_its_socket
     assert (await tablet.sent_away())[0] == 4012
     assert place.clinic.pk not in runtime.clinics
     assert session.pk not in runtime.sessions
+    assert stopped == [source_name(session.pk)]
     assert not await Step.everywhere.filter(session=session).aexists()
     again = await place.tablet(session).dial()
     assert (await again.sent_away())[0] == 4421

@@ -124,6 +124,10 @@ def is_alive(owner: str, servers: Collection[Server] | None = None) -> bool:
     return _start_time(int(pid)) == started
 
 
+def _has_leases() -> bool:
+    return settings.HOSTED and connection.vendor == "postgresql"
+
+
 def find_elsewhere(clinic_id: int, owner: str | None = None) -> OwnedElsewhere | None:
     """Return who has a clinic, or is to have it, where that is not this process.
 
@@ -132,11 +136,11 @@ def find_elsewhere(clinic_id: int, owner: str | None = None) -> OwnedElsewhere |
     if owner is None:
         rows = ClinicOwner.everywhere.filter(pk=clinic_id)
         owner = rows.values_list("owner", flat=True).first() or ""
-    servers = lease.valid_servers() if lease.held() is not None else []
-    if not owner:
+    servers = lease.valid_servers() if _has_leases() else []
+    if not owner and lease.held() is not None:
         place = lease.find_place(clinic_id, servers)
         owner = own_name() if place is None else place.id
-    if owner == own_name() or not is_alive(owner, servers):
+    if owner in ("", own_name()) or not is_alive(owner, servers):
         return None
     addresses = {server.id: server.address for server in servers}
     return OwnedElsewhere(owner, addresses.get(owner, ""))
@@ -181,7 +185,7 @@ def find_ownerless() -> tuple[list[int], list[int]]:
 
     One statement, however many servers there are and whatever they run.
     """
-    has_leases = settings.HOSTED and connection.vendor == "postgresql"
+    has_leases = _has_leases()
     with connection.cursor() as cursor:
         cursor.execute(LEFT_BY_SERVERS if has_leases else LEFT, {"own": own_name()})
         left = sorted(cursor.fetchall())
