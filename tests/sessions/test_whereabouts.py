@@ -57,7 +57,8 @@ def test_a_call_that_changes_something_is_sent_there_and_reading_works_anywhere(
 
 
 def test_nobody_is_sent_away_from_the_clinics_own_server(world, asked):
-    runtime.peek().clinics.add(world.clinic.pk)
+    live: Any = runtime.peek()
+    live.clinics.add(world.clinic.pk)
     lead = signed_in(world.people[Role.LEAD])
     assert lead.post(reverse("admin:rehab_feedbacktype_add"), {}).status_code != 421
     assert asked == []

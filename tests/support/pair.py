@@ -126,12 +126,20 @@ class Pair:
 
     async def __aenter__(self) -> Self:
         """Make the tables and start both servers."""
+        await asyncio.to_thread(self.begin_all)
+        return self
+
+    def begin_all(self) -> None:
+        """Make the tables, start both servers, and wait until both are ready."""
         self.run_python("manage.py", "migrate", "--verbosity", "0")
         self.run_python("manage.py", "collectstatic", "--no-input", "--verbosity", "0")
         for place in range(len(self.ports)):
             self.begin(place)
-        await asyncio.gather(*(self.until_ready(place) for place in range(len(self.ports))))
-        return self
+        until_s = time.monotonic() + 60
+        for place in range(len(self.ports)):
+            while self._request(place, "/readyz")[0] != 200:
+                assert time.monotonic() < until_s, self.log.read_text()
+                time.sleep(0.1)
 
     async def hang_up_all(self) -> None:
         """Close all connections that were dialed."""
@@ -141,6 +149,10 @@ class Pair:
     async def __aexit__(self, *_: object) -> None:
         """Stop both."""
         await self.hang_up_all()
+        self.kill_all()
+
+    def kill_all(self) -> None:
+        """Kill both, also one that hangs."""
         for process in self.processes:
             if process is not None and process.poll() is None:
                 process.send_signal(signal.SIGCONT)

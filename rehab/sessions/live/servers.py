@@ -92,7 +92,7 @@ class Servers:
             await self._move_idle()
 
     async def _move_idle(self) -> None:
-        """Give up clinics that belong to another server, while no session there is open."""
+        """Release clinics that belong to another server, while no session there is open."""
         open_ones = {one.clinic_id for one in self._host.sessions.values() if one.is_open}
         for clinic_id in self._host.clinics:
             place = lease.find_place(clinic_id, self._own.servers)

@@ -13,6 +13,7 @@ import pytest
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import servers as servers_module
 from rehab.sessions.live.consumers.isolation_gate import IsolationGate
+from rehab.sessions.live.database import owners
 from rehab.sessions.live.database.lease import Server
 from rehab.sessions.live.servers import Servers, applies, ask_if_ready
 from tests.support.callers import turns
@@ -34,15 +35,17 @@ def test_clients_go_where_the_database_is_or_may_be(answers, leaves):
     assert applies(answers) == leaves
 
 
+def make_lease() -> Any:
+    state = {"is_current": False, "may_judge": False, "is_ready": False}
+    return SimpleNamespace(id="me", entered=1, servers=[ME, OTHER], **state)
+
+
 class World:
     """A server, its lease, and what another one answers."""
 
     def __init__(self) -> None:
         self.answer: bool | None = True
-        self.lease: Any = SimpleNamespace(
-            id="me", entered=1, servers=[ME, OTHER], is_current=False, may_judge=False,
-            is_ready=False,
-        )  # fmt: skip
+        self.lease = make_lease()
         self.closed: list[int] = []
         socket = SimpleNamespace(close_soon=self.closed.append)
         clinics = SimpleNamespace(epochs={7: 1})
@@ -88,7 +91,7 @@ async def test_nobody_is_admitted_before_what_others_took_is_dropped(world, monk
         return set(epochs)
 
     monkeypatch.setattr(servers_module, "sync_to_async", lambda function: function)
-    monkeypatch.setattr(servers_module.owners, "find_taken", find_taken)
+    monkeypatch.setattr(owners, "find_taken", find_taken)
     assert await world.look(2)
     world.lease.is_current, world.lease.entered = True, 2
     assert not world.servers.may_move_robots
