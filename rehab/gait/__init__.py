@@ -1,8 +1,7 @@
 """Strides with A2 from raw signals, while a person walks. Pure: no Django, no clock.
 
 ``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` a whole
-recording with the same code. The comments of thresholds name their
-sources.
+recording with the same code. Comments name the source of each threshold.
 """
 
 from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector

@@ -97,7 +97,7 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
     path = paths[0]
-    time, legs, frames = read_signals(*paths, pairs=options.columns)
+    time, legs, frames, is_overground = read_signals(*paths, pairs=options.columns)
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     strides = measure_strides(
@@ -106,7 +106,7 @@ def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         look_ahead_s=options.look_ahead,
-        is_overground=options.overground,
+        is_overground=options.overground or is_overground,
         frame=frames,
     )
     check = check_signals(
@@ -173,6 +173,8 @@ def check_files(arguments: Sequence[str]) -> int:
         metavar="CHANNEL=COLUMN",
         help="what you take them for: wrong ones are refused with what was seen",
     )
+    parser.add_argument("--overground", action=argparse.BooleanOptionalAction,
+                        help="over plates in a floor, or not; else by the steps")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="as one JSON object")
     parser.add_argument("--save", type=Path, metavar="NEW.csv",
                         help="write the signals in SI units, if nothing is wrong")  # fmt: skip
@@ -196,7 +198,7 @@ def _check_walk(options: argparse.Namespace) -> int:
     if not options.json:
         print(f"Comparing {len(table)} columns …", file=sys.stderr)
     given = read_column_map(options.columns) if options.columns else None
-    check = check_setup(table, options.mass)
+    check = check_setup(table, options.mass, is_overground=options.overground)
     if options.json:
         print(json.dumps(setup_to_json(check, list(table)), allow_nan=False))
     else:
@@ -209,7 +211,9 @@ def _check_walk(options: argparse.Namespace) -> int:
         require_columns(options.files[0], table, columns)
         frame = columns.frame or check.columns.frame
         frames = None if frame is None else table[frame.name]
-        save_signals(options.save, *apply_columns(table, columns), frames)
+        is_overground = check.proposal.is_overground
+        signals = apply_columns(table, columns)
+        save_signals(options.save, *signals, frames, is_overground=is_overground)
     return 2 if wrong else 0 if check.is_certain else 1
 
 

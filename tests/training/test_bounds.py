@@ -9,10 +9,10 @@ from functools import partial
 import pytest
 
 from rehab.training.adaptation import GoalAdaptation
-from rehab.training.cueing import CueTiming, check_activation_threshold
 from rehab.training.goals import Target
 from rehab.training.measures import InvalidSetting, check_baseline_percent, check_gain
 from rehab.training.phases import make_phase
+from rehab.training.robot_cueing import CueTiming, check_activation_threshold
 from rehab.training.schedules import Schedule, ScheduleKind
 
 PHASE = partial(make_phase, "training")

@@ -66,7 +66,10 @@ class Intake:
         self._monotonic = monotonic
         self._alignment = Alignment()
         self._pipeline: SignalPipeline | None = None
-        self._recorder = SignalRecorder(settings.keep, notify) if settings.keep else None
+        over = settings.is_overground
+        self._recorder = (
+            SignalRecorder(settings.keep, notify, is_overground=over) if settings.keep else None
+        )
         self._columns = {
             column.name: ((side, channel), column)
             for side, leg in settings.columns.legs.items()

@@ -11,7 +11,7 @@ from django.db import OperationalError
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session import commits
-from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session import group_commit as writers
 from tests.support.callers import change, restart, turns
 from tests.support.robot_reports import ARM, STOP, is_stopped, log_of
 from tests.support.world import NOW

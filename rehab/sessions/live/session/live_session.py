@@ -22,10 +22,10 @@ from rehab.sessions.live.database.trouble import WORDS, NotStored, classify_fail
 from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.robot_orders import RobotOrders
-from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.log import Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State

@@ -18,7 +18,7 @@ def rename(old: str, new: str) -> Any:
 
 
 class Migration(migrations.Migration):
-    dependencies = [("rehab", "0001_tables")]
+    dependencies = [("rehab", "0002_trust33")]
 
     operations = [
         migrations.CreateModel(
