@@ -39,6 +39,7 @@ class Migration(migrations.Migration):
             ],
             options={
                 "ordering": ["clinic"],
+                "indexes": [models.Index(fields=["owner"], name="clinic_by_owner")],
                 "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",

@@ -22,11 +22,12 @@ class ClinicOwner(ScopedModel):
     clinic = models.OneToOneField(
         Clinic, on_delete=models.CASCADE, primary_key=True, related_name="+"
     )
-    owner = models.CharField(max_length=200, blank=True)  # empty: released, its sessions go on
+    owner = models.CharField(max_length=200, blank=True)  # empty: released
     epoch = models.PositiveIntegerField(default=0)
 
     class Meta(ScopedModel.Meta):
         ordering: ClassVar = ["clinic"]
+        indexes: ClassVar = [models.Index(fields=["owner"], name="clinic_by_owner")]
 
     def __str__(self) -> str:
         return f"{self.clinic}: {self.owner}"

@@ -39,19 +39,20 @@ class Recovery:
         await asyncio.gather(*self._loading)
         return paused
 
-    async def take_over_left(self) -> None:
+    async def take_over_left(self, *, thorough: bool) -> None:
         """Take over clinics whose server is gone, or that nobody has had for a beat.
 
-        One that was just released is left to the server that is asked for it.
+        One that was just released is left to the server that is asked for it. ``thorough``: as of
+        ``owners.find_ownerless``.
         """
-        orphaned, released = await sync_to_async(owners.find_ownerless)()
+        orphaned, released = await sync_to_async(owners.find_ownerless)(thorough=thorough)
         left = {*orphaned, *released}
         again, self._left_before = left & self._left_before, left
         if not self._host.draining:
             await self._take(sorted(again))
 
     async def _take(self, clinic_ids: list[int]) -> None:
-        for clinic_id in clinic_ids:
+        for clinic_id in filter(owners.belongs_here, clinic_ids):
             try:
                 await self._host.clinics.own(clinic_id)
             except OwnedElsewhere:

@@ -25,6 +25,7 @@ from robot.wire.close_codes import CloseCode
 log = logging.getLogger(__name__)
 
 BEAT_S = 1.0
+THOROUGH = 60  # beats between two looks also for owners without a lease; each looks twice
 ASK_S = 1.0  # within which another server answers
 
 
@@ -63,6 +64,7 @@ class Servers:
         self._own = own
         self._ask = ask
         self._entered = own.entered
+        self._beats = 0
         self._is_cut_off = False
         self.is_isolated = False  # cut off from the database, which another server has
         loop = asyncio.get_running_loop()
@@ -87,7 +89,8 @@ class Servers:
                 self._host.lose(clinic_id)
             self._entered = entered
         if self._own.may_judge:
-            await self._recovery.take_over_left()
+            self._beats += 1
+            await self._recovery.take_over_left(thorough=self._beats % THOROUGH < 2)
         if self._own.is_ready:
             await self._move_idle()
 

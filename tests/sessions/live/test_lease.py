@@ -14,8 +14,6 @@ from django.test.utils import CaptureQueriesContext
 from rehab.people.models import Clinic
 from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.database.lease import Lease, Server
-from rehab.sessions.models import TrainingSession
-from tests.support.callers import build_place, open_session
 from tests.support.world import set_owner
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
@@ -138,21 +136,22 @@ def test_an_owner_lives_as_long_as_its_lease_whatever_its_host_is_called():
 
 
 def test_what_a_beat_costs_does_not_depend_on_how_many_servers_there_are(two_servers):
-    live, _ = two_servers
+    live, own = two_servers
     dead = [f"{number:032}" for number in range(20)]
+    gone = "a server that has no lease any more"
     owned_by = {}
-    for owner in (live.id, "", *dead):
-        place = build_place(f"of {owner[-4:]}")
-        session = open_session(place)
-        TrainingSession.everywhere.filter(pk=session.pk).update(state="running")
-        set_owner(place.clinic.pk, owner)
-        owned_by[owner] = place.clinic.pk
-    set_owner(build_place("at rest").clinic.pk, dead[0])
+    for owner in (live.id, own.id, "", owners.HANDED_ON, gone, *dead):
+        owned_by[owner] = Clinic.everywhere.create(name=f"of {owner}").pk
+        set_owner(owned_by[owner], owner)
     sql("UPDATE rehab_server SET expires_at = clock_timestamp() + interval '9 s'")
+    for owner in dead:
+        sql("INSERT INTO rehab_server VALUES (%s, '', true, now() - interval '1 s')", owner)
     with CaptureQueriesContext(connection) as asked:
-        found = owners.find_ownerless()
-    assert found == (sorted(owned_by[owner] for owner in dead), [owned_by[""]])
+        found = owners.find_ownerless(thorough=False)
+    left = [owned_by[owner] for owner in dead]
+    assert found == (left, [owned_by[owners.HANDED_ON]])
     assert len(asked) == 1
+    assert owners.find_ownerless() == ([owned_by[gone], *left], [owned_by[owners.HANDED_ON]])
 
 
 def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkeypatch):

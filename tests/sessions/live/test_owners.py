@@ -296,7 +296,7 @@ async def test_a_session_that_another_server_recovered_meanwhile_is_not_paused_a
         assert await runtimes.current().recover() == 1
     runtimes.current().lose(place.clinic.pk)
     # There it was resumed, and released.
-    await ClinicOwner.everywhere.filter(pk=place.clinic.pk).aupdate(owner="", epoch=9)
+    await ClinicOwner.everywhere.filter(pk=place.clinic.pk).aupdate(owner=owners.HANDED_ON, epoch=9)
     runtimes.current().recovery.forget(session.pk)
     live = await runtimes.current().session(session.pk)
     assert live.is_running
@@ -323,7 +323,7 @@ async def test_a_client_that_does_not_listen_keeps_no_session_from_being_handed_
     monkeypatch.setattr(Socket, "close_now", lambda *_: listening.wait())
     await place.tablet(session).watch()
     await runtime.drain()
-    assert await owner_of(session) == ""
+    assert await owner_of(session) == owners.HANDED_ON
     listening.set()
 
 
@@ -392,4 +392,5 @@ async def test_a_session_that_opens_during_the_drain_is_released(place, begun, m
         await runtimes.current().session(session.pk + 1)
     may_read.set()
     await draining
-    assert (await owner_of(session), (await reread(session)).state) == ("", "running")
+    assert await owner_of(session) == owners.HANDED_ON
+    assert (await reread(session)).state == "running"

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from django.conf import settings
 from django.db import connection
+from django.db.models import Exists, OuterRef
 
 from rehab.sessions.live.database import lease
 from rehab.sessions.live.database.lease import Server
@@ -25,19 +26,25 @@ from rehab.sessions.ownership import ClinicOwner
 from rehab.training.changes import State
 
 PROC_DIR = Path("/proc")
-LEFT = f"""
-SELECT clinic_id, owner, false FROM rehab_clinicowner
-WHERE owner <> %(own)s AND EXISTS (
-    SELECT 1 FROM rehab_trainingsession AS one
-    WHERE one.clinic_id = rehab_clinicowner.clinic_id AND one.state = '{State.RUNNING.value}'
-)
-"""  # noqa: S608
-# Without those of servers whose lease is valid; and whether this one's is.
+HANDED_ON = "handed on"  # the owner of a clinic that was released while sessions ran
+FREE = ("", HANDED_ON)
+# Of servers: by the index of owners. It costs what dead servers had, whatever others have.
 LEFT_BY_SERVERS = f"""
 SELECT clinic_id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {lease.VALID})
-FROM ({LEFT}) AS those_of_others
-WHERE NOT EXISTS (SELECT 1 FROM rehab_server WHERE id = owner AND {lease.VALID})
+FROM rehab_clinicowner
+WHERE owner = ANY (ARRAY(
+    SELECT id FROM rehab_server WHERE NOT ({lease.VALID}) UNION ALL SELECT %(handed_on)s
+))
 """  # noqa: S608
+# Also of those that have no lease at all: a database may be a copy, or older than they are.
+LEFT_BY_ANY = f"""
+SELECT clinic_id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {lease.VALID})
+FROM rehab_clinicowner WHERE owner NOT IN ('', %(own)s)
+AND NOT EXISTS (SELECT 1 FROM rehab_server WHERE id = owner AND {lease.VALID})
+"""  # noqa: S608
+LEFT_BY_PROCESSES = """
+SELECT clinic_id, owner, false FROM rehab_clinicowner WHERE owner NOT IN ('', %(own)s)
+"""
 
 
 class OwnedElsewhere(RuntimeError):
@@ -137,10 +144,10 @@ def find_elsewhere(clinic_id: int, owner: str | None = None) -> OwnedElsewhere |
         rows = ClinicOwner.everywhere.filter(pk=clinic_id)
         owner = rows.values_list("owner", flat=True).first() or ""
     servers = lease.valid_servers() if _has_leases() else []
-    if not owner and lease.held() is not None:
+    if owner in FREE and lease.held() is not None:
         place = lease.find_place(clinic_id, servers)
         owner = own_name() if place is None else place.id
-    if owner in ("", own_name()) or not is_alive(owner, servers):
+    if owner in (*FREE, own_name()) or not is_alive(owner, servers):
         return None
     addresses = {server.id: server.address for server in servers}
     return OwnedElsewhere(owner, addresses.get(owner, ""))
@@ -161,7 +168,7 @@ def claim(clinic_id: int) -> Claim:
         if still.update(epoch=row.epoch + 1, owner=own_name()):  # else another was faster
             there = TrainingSession.everywhere.filter(clinic=clinic_id, state=State.RUNNING.value)
             running = list(there.order_by("pk").values_list("pk", flat=True))
-            return Claim(clinic_id, row.epoch + 1, running, row.owner not in ("", own_name()))
+            return Claim(clinic_id, row.epoch + 1, running, row.owner not in (*FREE, own_name()))
 
 
 def note_ends(session_ids: Collection[int]) -> None:
@@ -171,7 +178,10 @@ def note_ends(session_ids: Collection[int]) -> None:
 
 def release(clinic_ids: Collection[int]) -> None:
     """Release clinics that this process has, so that any other can claim them."""
-    ClinicOwner.everywhere.filter(pk__in=clinic_ids, owner=own_name()).update(owner="")
+    held = ClinicOwner.everywhere.filter(pk__in=clinic_ids, owner=own_name())
+    running = TrainingSession.everywhere.filter(clinic=OuterRef("pk"), state=State.RUNNING.value)
+    held.filter(Exists(running)).update(owner=HANDED_ON)
+    held.update(owner="")
 
 
 def find_taken(epochs: dict[int, int]) -> set[int]:
@@ -180,14 +190,17 @@ def find_taken(epochs: dict[int, int]) -> set[int]:
     return {key for key, epoch in epochs.items() if stored.get(key) != epoch}
 
 
-def find_ownerless() -> tuple[list[int], list[int]]:
-    """Return the clinics whose process died while sessions ran, and those that one released so.
+def find_ownerless(*, thorough: bool = True) -> tuple[list[int], list[int]]:
+    """Return the clinics whose process died, and those that one released while sessions ran.
 
-    One statement, however many servers there are and whatever they run.
+    One statement, however many servers there are and whatever they have. ``thorough``: also where
+    the dead one has left no lease.
     """
-    has_leases = _has_leases()
+    statement = LEFT_BY_PROCESSES
+    if has_leases := _has_leases():
+        statement = LEFT_BY_ANY if thorough else LEFT_BY_SERVERS
     with connection.cursor() as cursor:
-        cursor.execute(LEFT_BY_SERVERS if has_leases else LEFT, {"own": own_name()})
+        cursor.execute(statement, {"own": own_name(), "handed_on": HANDED_ON})
         left = sorted(cursor.fetchall())
     own = lease.held()
     may_judge = own is None or (own.may_judge and any(is_valid for _, _, is_valid in left))
@@ -195,5 +208,13 @@ def find_ownerless() -> tuple[list[int], list[int]]:
     def is_dead(owner: str) -> bool:
         return may_judge if has_leases and "|" not in owner else not is_alive(owner)
 
-    dead = {owner for _, owner, _ in left if owner and is_dead(owner)}
-    return [key for key, owner, _ in left if owner in dead], [key for key, o, _ in left if not o]
+    dead = {owner for _, owner, _ in left if owner != HANDED_ON and is_dead(owner)}
+    orphaned = [key for key, owner, _ in left if owner in dead]
+    return orphaned, [key for key, owner, _ in left if owner == HANDED_ON]
+
+
+def belongs_here(clinic_id: int) -> bool:
+    """Return whether it is this process's to take a clinic that was left."""
+    own = lease.held()
+    place = lease.find_place(clinic_id, own.servers) if own is not None else None
+    return place is None or place.id == own_name()
