@@ -30,9 +30,9 @@ class Measured:
     server_us
         Processor time of a hosted process that has so many, each with tablet, monitor and robot
         [µs a step].
-    beat_ms
-        How long the database takes each second to find what dead servers left, with 1,000 clinics,
-        of one server.
+    beat_ms, thorough_ms
+        Processor time of the database for each look of one server after what dead ones left: every
+        second, and twice a minute for owners without a lease, with 10,000 clinics.
     row_us
         From a batch to the commit, by COPY [µs a row], in one connection.
     row_bytes, index_bytes, parquet_bytes
@@ -44,6 +44,7 @@ class Measured:
     planned_sessions: float
     server_us: float
     beat_ms: float
+    thorough_ms: float
     row_us: float
     row_bytes: float
     index_bytes: float
@@ -75,7 +76,8 @@ class Measured:
         return cls(
             planned_sessions=planned,
             server_us=server,
-            beat_ms=find(r"^\| a beat of a server, 1,000 clinics \| ([\d.]+) ms \|$")[0],
+            beat_ms=find(r"^\| a look after what dead servers left \| ([\d.]+) ms \|$")[0],
+            thorough_ms=find(r"^\| the thorough look, 10,000 clinics \| ([\d.]+) ms \|$")[0],
             row_us=row,
             row_bytes=find(r"^\| a row of `rehab_step`, PostgreSQL \| (\d+) \|$")[0],
             index_bytes=find(r"^\| its two indexes \| (\d+) \|$")[0],
@@ -178,8 +180,9 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
 
 
 def beat_cores(processes: float, clinics: float, measured: Measured) -> float:
-    """Return the cores of the database that all servers' beats take: each looks once a second."""
-    return processes * measured.beat_ms / 1000 * clinics / 1000
+    """Return the cores of the database that all servers take to look after each other."""
+    thorough_ms = measured.thorough_ms * clinics / 10_000 * 2 / 60
+    return processes * (measured.beat_ms + thorough_ms) / 1000
 
 
 # What breaks, and by how much of it so many clinics use: 1 is its end.

@@ -38,9 +38,9 @@ WHERE owner = ANY (ARRAY(
 """  # noqa: S608
 # Also of those that have no lease at all: a database may be a copy, or older than they are.
 LEFT_BY_ANY = f"""
-SELECT clinic_id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {lease.VALID})
-FROM rehab_clinicowner WHERE owner NOT IN ('', %(own)s)
-AND NOT EXISTS (SELECT 1 FROM rehab_server WHERE id = owner AND {lease.VALID})
+WITH valid AS MATERIALIZED (SELECT id FROM rehab_server WHERE {lease.VALID})
+SELECT clinic_id, owner, EXISTS (SELECT 1 FROM valid WHERE id = %(own)s) FROM rehab_clinicowner
+WHERE owner NOT IN ('', %(own)s) AND NOT EXISTS (SELECT 1 FROM valid WHERE id = owner)
 """  # noqa: S608
 LEFT_BY_PROCESSES = """
 SELECT clinic_id, owner, false FROM rehab_clinicowner WHERE owner NOT IN ('', %(own)s)
