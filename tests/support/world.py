@@ -37,6 +37,7 @@ from rehab.sessions.live.session.aggregate import Row, SessionAggregate
 from rehab.sessions.live.session.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
@@ -149,18 +150,14 @@ def agreeing(patient: Patient) -> Patient:
 
 def store(aggregate: SessionAggregate, rows: list[Row]) -> None:
     """Commit rows of a session here and now, without the live path's threads."""
-    commit(
-        [
-            Job(
-                aggregate,
-                aggregate.session.pk,
-                aggregate.session.epoch,
-                rows,
-                aggregate.summary(),
-                lambda _: None,
-            )
-        ]
-    )
+    session = aggregate.session
+    epoch = ClinicOwner.everywhere.get_or_create(pk=session.clinic_id)[0].epoch
+    commit([Job(aggregate, session.pk, epoch, rows, aggregate.summary(), lambda _: None)])
+
+
+def set_owner(clinic_id: int, owner: str) -> None:
+    """Let a process have a clinic: one that died, or one that runs elsewhere."""
+    ClinicOwner.everywhere.update_or_create(pk=clinic_id, defaults={"owner": owner})
 
 
 def seal_nothing(clinic: Clinic) -> LogSeal:
@@ -291,6 +288,7 @@ def build_world(name: str) -> World:
             by=people[Role.PT],
             at=NOW,
         ),
+        ClinicOwner.everywhere.get_or_create(pk=clinic.pk)[0],
         RobotIncident.everywhere.create(
             session=session, at=NOW, reason=mark(name, RobotIncident), recording=pack(RECORDED)
         ),
