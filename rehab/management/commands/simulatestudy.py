@@ -117,8 +117,8 @@ def write_files(results: Results, folder: Path) -> str:
 
 def describe(results: Results, effects: Any) -> str:
     """Return the primary outcome's differences beside what was put in, as text."""
-    lines = [f"{results.study.code}: {results.study.primary_outcome}, differences in %"]
-    for one in results.find(results.study.primary_outcome).differences:
+    lines = [f"{results.study.code}: {results.primary}, differences in %"]
+    for one in results.find(results.primary).differences:
         true = effects[one.group] - effects[one.reference]
         found = one.difference
         interval = "" if found.low is None else f" [{found.low:6.2f}, {found.high:6.2f}]"

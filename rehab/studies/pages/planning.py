@@ -28,10 +28,11 @@ from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
-from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState, has_mark
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.registration.lifecycle import close, register, revise, start
+from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
 from rehab.studies.registration.protocol_pdf import write_pdf
 from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.results import may_look
@@ -123,6 +124,8 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),
+        "primary": dict(OUTCOMES)[first_primary(study)],
+        "changes": outcome_changes(study),
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
@@ -204,6 +207,7 @@ def write_json(study: Study) -> str:
     protocol: dict[str, Any] = {
         "registered_at": study.registered_at,
         "closed_at": study.closed_at,
+        "outcome_changes": [asdict(change) for change in outcome_changes(study)],
         "versions": [
             {
                 "number": version.number,

@@ -51,6 +51,7 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
     context = {
         "study": study,
         "interim": study.state != StudyState.CLOSED,
+        "changes": results.changes,
         "figures": {name: _inline(draw(results)) for name, draw in FIGURES.items()},
         "registered": [_describe(results, slug) for slug in results.registered],
         "exploratory": [_describe(results, slug) for slug in results.exploratory],
@@ -66,10 +67,11 @@ def _inline(svg: str) -> str:
 def _describe(results: Results, slug: str) -> dict[str, Any]:
     """Return an outcome as the page's table has it."""
     found, unit = results.find(slug), outcome_unit(slug)
+    registered = results.registered.get(slug)
     return {
         "label": outcome_label(slug),
         "unit": unit,
-        "primary": slug == results.study.primary_outcome,
+        "status": registered.status_text if registered else "",
         "arms": [
             {
                 "label": results.arms[one.arm],

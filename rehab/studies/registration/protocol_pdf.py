@@ -16,6 +16,7 @@ from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, T
 from rehab.sessions.formatting import format_schedule
 from rehab.studies.allocation.scheme import Method
 from rehab.studies.models import METHODS, OUTCOMES, Study, StudyVersion
+from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.training.schedules import Schedule, ScheduleKind
 
 MARGIN = 20 * mm
@@ -43,6 +44,9 @@ def write_pdf(study: Study) -> bytes:
         pageCompression=0,
     )
     parts: list[Flowable] = []
+    if changes := outcome_changes(study):
+        parts.append(_text(gettext("Outcomes were changed after the registration"), "Heading1"))
+        parts += [_text(change) for change in changes]
     for version in study.versions.order_by("-number"):
         parts += _version_parts(version)
     document.build(parts)

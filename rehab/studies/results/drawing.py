@@ -17,6 +17,7 @@ from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
 from rehab.studies.results.results import (
     Results,
+    change_rows,
     curve_rows,
     difference_rows,
     flow_rows,
@@ -64,7 +65,7 @@ def _phases(results: Results) -> list[PhaseLabel]:
 
 def draw_primary(results: Results) -> str:
     """Return every participant's primary outcome, by arm."""
-    slug = results.study.primary_outcome
+    slug = results.primary
     label, unit = outcome_label(slug), outcome_unit(slug)
     values = by_arm(results.participants, list(results.arms), slug)
     axis = f"{label} ({unit})" if unit else label
@@ -85,12 +86,12 @@ def draw_exploratory(results: Results) -> str:
 def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
     rows = []
     for slug in slugs:
-        primary = slug == results.study.primary_outcome
-        label = outcome_label(slug)
-        heading = gettext("%(outcome)s (primary)") % {"outcome": label} if primary else label
-        rows.append(ForestRow(heading))
+        label, registered = outcome_label(slug), results.registered.get(slug)
+        status = registered.status_text if registered else ""
+        rows.append(ForestRow(f"{label} ({status})" if status else label))
+        is_first = slug == results.primary
         rows += [
-            ForestRow(name_pair(results, one.group, one.reference), one, strong=primary)
+            ForestRow(name_pair(results, one.group, one.reference), one, strong=is_first)
             for one in results.find(slug).differences
         ]
     return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its interval (95 %)"))
@@ -148,6 +149,7 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "differences": difference_rows,
     "curves": curve_rows,
     "flow": flow_rows,
+    "changes": change_rows,
 }
 
 

@@ -27,6 +27,12 @@ from rehab.studies.analysis.participants import (
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.lifecycle import note
+from rehab.studies.registration.outcome_changes import (
+    OutcomeChange,
+    RegisteredOutcome,
+    outcome_changes,
+    registered_outcomes,
+)
 from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.reading import Analysis, analyze
 
@@ -62,11 +68,15 @@ class Results:
         The study, and what was computed of everybody who was ever taken in.
     arms
         The arms' codes with the labels that are shown, in the order in which they are shown.
+    outcomes, changes
+        The registered outcomes, the first primary one first; every change of them.
     """
 
     study: Study
     analysis: Analysis
     arms: dict[str, str]
+    outcomes: tuple[RegisteredOutcome, ...]
+    changes: tuple[OutcomeChange, ...]
 
     @property
     def participants(self) -> tuple[Participant, ...]:
@@ -74,10 +84,14 @@ class Results:
         return self.analysis.participants
 
     @property
-    def registered(self) -> tuple[str, ...]:
-        """Slugs of the registered outcomes, the primary one first."""
-        others = (slug for slug in self.study.secondary_outcomes if slug in OUTCOMES)
-        return tuple(dict.fromkeys((self.study.primary_outcome, *others)))
+    def primary(self) -> str:
+        """Slug of the primary outcome that was registered first."""
+        return self.outcomes[0].slug
+
+    @cached_property
+    def registered(self) -> dict[str, RegisteredOutcome]:
+        """The registered outcomes by their slugs, the primary one first."""
+        return {one.slug: one for one in self.outcomes if one.slug in OUTCOMES}
 
     @cached_property
     def exploratory(self) -> tuple[str, ...]:
@@ -98,7 +112,7 @@ class Results:
     @cached_property
     def flow(self) -> tuple[ArmFlow, ...]:
         """How many were allocated to each arm, and what became of them."""
-        return flow(self.participants, list(self.arms), self.study.primary_outcome)
+        return flow(self.participants, list(self.arms), self.primary)
 
 
 def label_arms(study: Study) -> dict[str, str]:
@@ -123,7 +137,8 @@ def read_results(study: Study, now: datetime) -> Results:
     is_closed = study.state == StudyState.CLOSED  # then whatever was planned was due
     until = date.max if is_closed else clinic_time(now, study.clinic).date()
     arms = label_arms(study)
-    return Results(study, analyze(study, tuple(arms), until), arms)
+    analysis = analyze(study, tuple(arms), until)
+    return Results(study, analysis, arms, registered_outcomes(study), outcome_changes(study))
 
 
 def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
@@ -138,14 +153,18 @@ def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
     """Yield one row for each participant, visit and outcome: missing ones are empty."""
     for visit, whose in _visits(results):
         for slug in (*results.registered, *results.exploratory):
-            status, value = _status(results, slug), visit.outcomes.get(slug)
-            yield whose | {"outcome": slug, "status": status, "value": value}
+            about = {"outcome": slug, **_status(results, slug)}
+            yield whose | about | {"value": visit.outcomes.get(slug)}
 
 
-def _status(results: Results, slug: str) -> str:
-    if slug == results.study.primary_outcome:
-        return "primary"
-    return "secondary" if slug in results.registered else "exploratory"
+def _status(results: Results, slug: str) -> dict[str, Any]:
+    """Return the columns that say as what an outcome was registered, and in which versions."""
+    one = results.registered.get(slug)
+    return {
+        "status": "exploratory" if one is None else one.status,
+        "since_version": one and one.since,
+        "dropped_in_version": one and one.dropped_in,
+    }
 
 
 def phase_rows(results: Results) -> Iterator[dict[str, Any]]:
@@ -160,7 +179,7 @@ def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
         for found in results.find(slug).differences:
             yield {
                 "outcome": slug,
-                "status": _status(results, slug),
+                **_status(results, slug),
                 "group": results.arms[found.group],
                 "reference": results.arms[found.reference],
                 "participants": found.participants[0],
@@ -193,5 +212,12 @@ def curve_rows(results: Results) -> Iterator[dict[str, Any]]:
 
 def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
     """Return one row for each group of the flow of participants."""
-    rows = [asdict(one) for one in results.flow]
+    rows = [asdict(one) | {"primary_outcome": results.primary} for one in results.flow]
     return [{"group": results.arms[row.pop("arm")]} | row for row in rows]
+
+
+def change_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each version that changed outcomes."""
+    for one in results.changes:
+        row = asdict(one)
+        yield row | {name: " ".join(row[name]) for name in ("added", "removed")}
