@@ -44,7 +44,7 @@ def plan(*valences: str, **changes: Any) -> dict[str, Any]:
         "days_between": 1,
         "washout_days": 7,
         "goal_percent": 100,
-        "primary_outcome": "retention_in_washout",
+        "primary_outcome": "washout_change",
         "secondary_outcomes": ["hit_rate"],
         "method": "blocks",
         "block_sizes": "2, 4",
@@ -193,7 +193,7 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     assert version.digest in told
     assert study.commitment in told
     assert SEED not in told
-    for words in ("negative", "severity: mild, severe", "Retention in washout", "Baseline"):
+    for words in ("negative", "severity: mild, severe", "Change in washout", "Baseline"):
         assert words in told
     lines = " ".join(re.findall(r"\((.*?)\) Tj", told))
     for words in ("goal at 110 %", "without the robot", "then a rest of 90 s", "Push, please."):

@@ -21,7 +21,7 @@ from tests.support.world import NOW, World, client_of
 pytestmark = pytest.mark.django_db
 SETTINGS = {
     "effects": {"A": 0.0, "B": 30.0},
-    "participants": 8,
+    "participants": 12,
     "sd_percent": 5.0,
     "kept_percent": 25.0,
     "dropout_percent": 0.0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from datetime import timedelta
 
 import pytest
@@ -12,8 +13,10 @@ from django.urls import reverse
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
+from rehab.sessions.live.headless import Pace, run_session, simulate_strides
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
+from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Arm, Study
 from rehab.studies.registration.lifecycle import close, register, start
@@ -30,6 +33,7 @@ from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Schedule, ScheduleKind
+from rehab.training.steps import Side
 from tests.support.simulated_studies import figures_of, walk_study
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, client_of
@@ -95,6 +99,34 @@ def test_only_who_changed_is_read_again():
     assert visit.outcomes["hit_rate"] == 0.5
 
 
+@pytest.mark.django_db(transaction=True)
+def test_a_session_that_ended_early_counts_as_far_as_it_was_walked(world):
+    study = running_study(world)
+    session = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
+    walker = SyntheticWalker(GOOD, 1, Side.LEFT)
+
+    def some_strides(fold):
+        yield from simulate_strides(walker, fold, 150)
+        raise ConnectionAbortedError
+
+    with pytest.raises(ConnectionAbortedError):
+        asyncio.run(run_session(session.pk, some_strides, Pace()))
+    session.refresh_from_db()
+    assert session.state == "aborted"
+    [one] = read_results(study, NOW).participants
+    first = one.visits[0]
+    assert first.attendance == "unfinished"
+    assert first.outcomes["training_change"] == pytest.approx(
+        first.outcomes["improvement_over_baseline"]
+    )
+    assert "washout_change" not in first.outcomes
+    results = read_results(study, NOW)
+    assert sum(row.visits_unfinished for row in results.flow) == 1
+    assert sum(row.completed for row in results.flow) == 0
+    assert "1 session ended early" in FIGURES["flow"](results)
+    assert {row["attendance"] for row in TABLES["phases"](results)} == {"unfinished"}
+
+
 def test_a_name_of_an_arm_is_no_formula_in_a_table():
     told = write_table([{"arm": "A: =1+1", "why": "x;=1+1"}, {"arm": "\r＝1", "why": None}])
     assert told == "arm,why\r\nA: =1+1,x;'=1+1\r\n\"'\r'＝1\",\r\n"
@@ -141,7 +173,7 @@ def test_of_a_closed_study_everybody_sees_names_registered_outcomes_first(world)
     for role in (Role.LEAD, Role.PT, Role.RESEARCHER):
         page = text_of(client_of(world, role).get(reverse("study-results", args=[study.pk])))
         assert "feedback positive" in page
-        assert page.index("Retention in washout") < page.index("Late change")
+        assert page.index("Change in washout") < page.index("Late change")
     assert study.events.filter(kind="looked").count() == 0
     client = client_of(world, Role.LEAD)
     for name in ("outcomes.csv", "learning.svg"):

@@ -29,7 +29,7 @@ def draft_study(world: World, *valences: str, **settings: Any) -> Study:
         "participants": 20,
         "months_since_stroke": 6,
         "visits": 2,
-        "primary_outcome": "retention_in_washout",
+        "primary_outcome": "washout_change",
         "sealed": seal(Secret(SEED, (2, 4))),
     }
     study = Study.everywhere.create(clinic=world.clinic, **defaults | settings)

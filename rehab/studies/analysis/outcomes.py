@@ -1,5 +1,9 @@
 """Outcomes of one session, of two that follow each other, and of each phase.
 
+Changes are against the participant's *first* baseline, so that what one visit carries to the next
+is measured, and not taken for a new baseline. What was kept is a difference, never a share of what
+was gained: a share exists only for those who gained, and would condition on the response.
+
 The list is that of the literature on feedback of push-off (docs/reference/gait.md#outcomes), as far
 as strides show it; what further channels are sent (forces, moments, step lengths) is compared with
 the baseline under the channel's name.
@@ -14,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rehab.studies.analysis.walks import Flags, Floats, Walk
-from rehab.training.summary.metrics import METRICS, MIN_TRAINED_GAIN
+from rehab.training.summary.metrics import METRICS
 from robot.marking import gettext_noop
 
 # A mean of so many strides has a standard error of 1-2 % (docs/reference/gait.md#phases).
@@ -25,6 +29,23 @@ WINDOW, SUCCESS = 20, 0.8
 
 
 @dataclass(frozen=True, slots=True)
+class History:
+    """What came before a session.
+
+    Attributes
+    ----------
+    before
+        The participant's session before it; None of the first one.
+    baseline
+        Of the participant's first session, in the measure's unit; None where it had too few valid
+        strides. The first session's own.
+    """
+
+    before: Walk | None
+    baseline: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """A figure that a study may register.
 
@@ -32,70 +53,95 @@ class Outcome:
     ----------
     slug, label, unit
         For programs, for people (translated by pages), and of the figure; "" for ratios.
+    meaning
+        How it is computed, as the registered document and the codebook define it.
     compute
-        Returns it of a session, and of the participant's session before it if there was one; None
-        where there is none.
+        Returns it of a session with what came before; None where there is none.
     """
 
     slug: str
     label: str
     unit: str
-    compute: Callable[[Walk, Walk | None], float | None]
+    meaning: str
+    compute: Callable[[Walk, History], float | None]
 
 
-def change(walk: Walk, values: Floats) -> float | None:
-    """Return how much better a mean is than the baseline, in percent of the latter.
+def change(walk: Walk, values: Floats, baseline: float | None) -> float | None:
+    """Return how much better a mean is than a baseline, in percent of the latter.
 
     Parameters
     ----------
     walk
-        Whose baseline and direction count.
-    values
-        Shape (n,), in the measure's unit. None is returned without values or without a baseline.
+        Whose direction counts.
+    values, baseline
+        Shape (n,), in the measure's unit, as the baseline. None is returned without either.
     """
-    if walk.baseline is None or not len(values):
+    if baseline is None or not len(values):
         return None
-    percent = 100 * (float(values.mean()) / walk.baseline - 1)
+    percent = 100 * (float(values.mean()) / baseline - 1)
     return percent if walk.higher_is_better else -percent
 
 
-def _early(walk: Walk, _before: Walk | None = None) -> float | None:
-    return change(walk, walk.values(walk.with_feedback)[:ENDS])
+def _early(walk: Walk, history: History) -> float | None:
+    return change(walk, walk.values(walk.with_feedback)[:ENDS], history.baseline)
 
 
-def _late(walk: Walk, _before: Walk | None = None) -> float | None:
-    return change(walk, walk.values(walk.with_feedback)[-ENDS:])
+def _training(walk: Walk, history: History) -> float | None:
+    return change(walk, walk.values(walk.with_feedback), history.baseline)
 
 
-def _catch(walk: Walk, _before: Walk | None) -> float | None:
-    return change(walk, walk.values(walk.in_kind("catch")))
+def _late(walk: Walk, history: History) -> float | None:
+    return change(walk, walk.values(walk.with_feedback)[-ENDS:], history.baseline)
 
 
-def _washout(walk: Walk, _before: Walk | None) -> float | None:
-    return change(walk, walk.values(walk.in_kind("washout")))
+def _catch(walk: Walk, history: History) -> float | None:
+    return change(walk, walk.values(walk.in_kind("catch")), history.baseline)
 
 
-def _after_effect(walk: Walk, _before: Walk | None) -> float | None:
-    return change(walk, walk.values(walk.in_kind("washout"))[:FIRST_AFTER])
+def _washout(walk: Walk, history: History) -> float | None:
+    return change(walk, walk.values(walk.in_kind("washout")), history.baseline)
 
 
-def _to_success(walk: Walk, _before: Walk | None = None) -> float | None:
-    """Return after how many judged strides the first window with enough hits was complete."""
+def _after_effect(walk: Walk, history: History) -> float | None:
+    return change(walk, walk.values(walk.in_kind("washout"))[:FIRST_AFTER], history.baseline)
+
+
+def _washout_loss(walk: Walk, history: History) -> float | None:
+    """Return the washout's change less that of the last strides with feedback."""
+    return _less(_washout(walk, history), _late(walk, history))
+
+
+def _carried(walk: Walk, history: History) -> float | None:
+    """Return the change of this session's baseline; none in the first session."""
+    if history.before is None or walk.baseline is None:
+        return None
+    return change(walk, np.array([walk.baseline]), history.baseline)
+
+
+def _less(one: float | None, other: float | None) -> float | None:
+    return None if one is None or other is None else one - other
+
+
+def _to_success(walk: Walk, _history: History | None = None) -> float | None:
+    """Return after how many judged strides the first window with enough hits was complete.
+
+    All that were walked where none was: leaving those out would compare the successful alone.
+    """
     hits = walk.hit[walk.with_feedback & np.isfinite(walk.performance)]
     if len(hits) < WINDOW:
         return None
     shares = np.convolve(hits, np.ones(WINDOW), "valid")
     found = np.flatnonzero(shares >= SUCCESS * WINDOW)
-    return float(found[0] + WINDOW) if len(found) else None
+    return float(found[0] + WINDOW if len(found) else len(hits))
 
 
-def _of_goal(walk: Walk, _before: Walk | None = None) -> float | None:
+def _of_goal(walk: Walk, _history: History) -> float | None:
     """Return the mean of the real values in percent of the goal, whatever the display's gain."""
     where = walk.with_feedback & np.isfinite(walk.performance)
     return float((100 * walk.value[where] / walk.goal[where]).mean()) if where.any() else None
 
 
-def _cv(walk: Walk, _before: Walk | None = None) -> float | None:
+def _cv(walk: Walk, _history: History) -> float | None:
     return variation(walk.values(walk.with_feedback))
 
 
@@ -106,7 +152,7 @@ def variation(values: Floats) -> float | None:
     return float(100 * values.std(ddof=1) / values.mean())
 
 
-def _steadiness(walk: Walk, _before: Walk | None) -> float | None:
+def _steadiness(walk: Walk, _history: History) -> float | None:
     values = walk.values(walk.with_feedback)
     return None if walk.baseline is None else detrended(values / walk.baseline)
 
@@ -128,85 +174,185 @@ def memory(values: Floats) -> float | None:
     return float((centered[1:] * centered[:-1]).sum() / power) if power > 0 else None
 
 
-def _lag_1(walk: Walk, _before: Walk | None) -> float | None:
+def _lag_1(walk: Walk, _history: History) -> float | None:
     return memory(walk.values(walk.with_feedback))
 
 
-def _error(walk: Walk, _before: Walk | None) -> float | None:
+def _error(walk: Walk, _history: History) -> float | None:
     performance = walk.performance[walk.with_feedback & np.isfinite(walk.performance)]
     return float(100 * np.abs(performance - 1).mean()) if len(performance) else None
 
 
-def _invalid(walk: Walk, _before: Walk | None) -> float | None:
+def _invalid(walk: Walk, _history: History) -> float | None:
     return float(100 * (~walk.valid).mean()) if len(walk.valid) else None
 
 
-def _retained(walk: Walk, before: Walk | None) -> float | None:
-    """Return how much of what the last session ended with this one begins with, in percent."""
-    last = None if before is None else _late(before)
-    first = _early(walk)
-    if last is None or first is None or last < 100 * MIN_TRAINED_GAIN:
-        return None
-    return 100 * first / last
+def _visit_loss(walk: Walk, history: History) -> float | None:
+    """Return the change that this session begins with less that which the last one ended with."""
+    last = None if history.before is None else _late(history.before, history)
+    return _less(_early(walk, history), last)
 
 
-def _savings(walk: Walk, before: Walk | None) -> float | None:
+def _savings(walk: Walk, history: History) -> float | None:
     """Return how many strides earlier success came than in the session before."""
-    last, now = None if before is None else _to_success(before), _to_success(walk)
-    return None if last is None or now is None else last - now
+    last = None if history.before is None else _to_success(history.before)
+    return _less(last, _to_success(walk))
 
 
+FIRST = "in percent of the participant's first baseline"
 # What the strides themselves show; with what every session stores of itself, all of `OUTCOMES`.
 OF_STRIDES: dict[str, Outcome] = {
     outcome.slug: outcome
     for outcome in (
-        Outcome("early_change", gettext_noop("Early change (first 50 strides)"), "%", _early),
-        Outcome("late_change", gettext_noop("Late change (last 50 strides)"), "%", _late),
-        Outcome("catch_change", gettext_noop("Change in catch blocks"), "%", _catch),
-        Outcome("washout_change", gettext_noop("Change in washout"), "%", _washout),
         Outcome(
-            "after_effect", gettext_noop("After-effect (first 20 strides)"), "%", _after_effect
+            "training_change",
+            gettext_noop("Change in training"),
+            "%",
+            f"Mean of all valid strides with feedback less the baseline, {FIRST}.",
+            _training,
         ),
         Outcome(
-            "strides_to_success", gettext_noop("Strides until 80 % are hits"), "steps", _to_success
+            "early_change",
+            gettext_noop("Early change (first 50 strides)"),
+            "%",
+            f"Mean of the first {ENDS} valid strides with feedback less the baseline, {FIRST}.",
+            _early,
         ),
-        Outcome("percent_of_goal", gettext_noop("Real value of the goal"), "%", _of_goal),
-        Outcome("absolute_error", gettext_noop("Distance from the goal"), "%", _error),
-        Outcome("variation", gettext_noop("Variation (CV)"), "%", _cv),
-        Outcome("steadiness", gettext_noop("Variation about the trend"), "%", _steadiness),
-        Outcome("lag_1", gettext_noop("Memory from stride to stride (lag 1)"), "", _lag_1),
-        Outcome("kept_between_visits", gettext_noop("Kept since the last visit"), "%", _retained),
-        Outcome("savings", gettext_noop("Strides saved since the last visit"), "steps", _savings),
-        Outcome("invalid_strides", gettext_noop("Invalid strides"), "%", _invalid),
+        Outcome(
+            "late_change",
+            gettext_noop("Late change (last 50 strides)"),
+            "%",
+            f"Mean of the last {ENDS} valid strides with feedback less the baseline, {FIRST}.",
+            _late,
+        ),
+        Outcome(
+            "catch_change",
+            gettext_noop("Change in catch blocks"),
+            "%",
+            f"Mean of the valid strides of catch phases less the baseline, {FIRST}.",
+            _catch,
+        ),
+        Outcome(
+            "washout_change",
+            gettext_noop("Change in washout"),
+            "%",
+            f"Mean of the valid strides of washout phases less the baseline, {FIRST}.",
+            _washout,
+        ),
+        Outcome(
+            "washout_loss",
+            gettext_noop("From late training to washout"),
+            "%",
+            f"Change in washout less late change, {FIRST}; negative where some was lost.",
+            _washout_loss,
+        ),
+        Outcome(
+            "after_effect",
+            gettext_noop("After-effect (first 20 strides)"),
+            "%",
+            f"Mean of the first {FIRST_AFTER} valid strides of washout less the baseline, {FIRST}.",
+            _after_effect,
+        ),
+        Outcome(
+            "baseline_change",
+            gettext_noop("Change of the baseline since the first visit"),
+            "%",
+            f"Mean of this visit's baseline less the first one, {FIRST}; none at the first visit.",
+            _carried,
+        ),
+        Outcome(
+            "between_visits",
+            gettext_noop("From the last visit’s end to this one’s beginning"),
+            "%",
+            f"Early change less the late change of the visit before, {FIRST}.",
+            _visit_loss,
+        ),
+        Outcome(
+            "strides_to_success",
+            gettext_noop("Strides until 80 % are hits"),
+            "steps",
+            f"Judged strides until {WINDOW} in a row had {SUCCESS:.0%} hits; all where none had.",
+            _to_success,
+        ),
+        Outcome(
+            "savings",
+            gettext_noop("Strides saved since the last visit"),
+            "steps",
+            "Strides until 80 % are hits at the visit before, less those at this one.",
+            _savings,
+        ),
+        Outcome(
+            "percent_of_goal",
+            gettext_noop("Real value of the goal"),
+            "%",
+            "Mean of value / goal of the judged strides, whatever the display's gain.",
+            _of_goal,
+        ),
+        Outcome(
+            "absolute_error",
+            gettext_noop("Distance from the goal"),
+            "%",
+            "Mean of |shown / goal - 1| of the judged strides.",
+            _error,
+        ),
+        Outcome(
+            "variation",
+            gettext_noop("Variation (CV)"),
+            "%",
+            "Sample standard deviation of the strides with feedback, in percent of their mean.",
+            _cv,
+        ),
+        Outcome(
+            "steadiness",
+            gettext_noop("Variation about the trend"),
+            "%",
+            "Standard deviation of the strides with feedback about their straight line, in percent "
+            "of the visit's baseline.",
+            _steadiness,
+        ),
+        Outcome(
+            "lag_1",
+            gettext_noop("Memory from stride to stride (lag 1)"),
+            "",
+            "Lag-1 autocorrelation of the strides with feedback.",
+            _lag_1,
+        ),
+        Outcome(
+            "invalid_strides",
+            gettext_noop("Invalid strides"),
+            "%",
+            "Share of the trained leg's strides that are not valid.",
+            _invalid,
+        ),
     )
 }
-# Slug to label and unit of all that may be registered. What counts days or sessions compares
-# nothing.
+# Of the session's metrics: what counts days or sessions compares nothing, and a share of what was
+# gained exists only for those who gained.
+NOT_COMPARED = {"retention_in_washout"}
+OF_SESSIONS = {
+    metric.slug: metric
+    for metric in METRICS.values()
+    if metric.unit not in {"days", "sessions"} and metric.slug not in NOT_COMPARED
+}
+# Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
-    **{
-        metric.slug: (metric.label, metric.unit)
-        for metric in METRICS.values()
-        if metric.unit not in {"days", "sessions"}
-    },
-    **{outcome.slug: (outcome.label, outcome.unit) for outcome in OF_STRIDES.values()},
+    slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()
 }
 
 
-def compute_outcomes(
-    walk: Walk, before: Walk | None, metrics: dict[str, float]
-) -> dict[str, float]:
+def compute_outcomes(walk: Walk, history: History, metrics: dict[str, float]) -> dict[str, float]:
     """Return every outcome that a session has, by slug.
 
     Parameters
     ----------
-    walk, before
-        The session, and the participant's session before it.
+    walk, history
+        The session, and what came before it.
     metrics
         The figures that the session stores, by slug, in the units of `METRICS`.
     """
     figures = {slug: value for slug, value in metrics.items() if slug in OUTCOMES}
     for slug, outcome in OF_STRIDES.items():
-        value = outcome.compute(walk, before)
+        value = outcome.compute(walk, history)
         if value is not None:
             figures[slug] = value
     return figures
@@ -257,7 +403,7 @@ def _describe(walk: Walk, where: Flags) -> dict[str, Any]:
         "valid": len(values),
         "judged": int(judged.sum()),
         "hit_rate": float(walk.hit[judged].mean()) if len(shown) else None,
-        "change_percent": change(walk, values),
+        "change_percent": change(walk, values, walk.baseline),
         "shown_percent_of_goal": float(shown.mean()) if len(shown) else None,
         "shown_quartile_1": low,
         "shown_median": middle,

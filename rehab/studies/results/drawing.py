@@ -110,6 +110,16 @@ def draw_consort(results: Results) -> str:
     columns = []
     for one in results.flow:
         left = [gettext("%(count)d left the study") % {"count": one.left}] if one.left else []
+        if one.visits_unfinished:
+            early = one.visits_unfinished
+            words = ngettext(
+                "%(count)d session ended early", "%(count)d sessions ended early", early
+            )
+            left.append(words % {"count": early})
+        if one.visits_excluded:
+            excluded = one.visits_excluded
+            words = ngettext("%(count)d session excluded", "%(count)d sessions excluded", excluded)
+            left.append(words % {"count": excluded})
         if one.removed:
             left.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
         visits = {"walked": one.visits_walked, "planned": one.visits_planned}

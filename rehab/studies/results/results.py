@@ -146,7 +146,8 @@ def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]
     for one in results.participants:
         for visit in one.visits if one.is_analyzed else ():
             group = results.arms[visit.arm]
-            yield visit, {"participant": one.code, "group": group, "visit": visit.number}
+            place = {"participant": one.code, "group": group, "visit": visit.number}
+            yield visit, place | {"attendance": visit.attendance.value}
 
 
 def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
