@@ -100,7 +100,7 @@ def start_session(
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
                 created_by=by,
-                may_change_type=False,  # it is what the arm was allocated for
+                locked=True,
                 **{part.name: getattr(place, part.name) for part in fields(place)},
             )
         )

@@ -73,6 +73,8 @@ class PlanSettings:
         After which steps the patient gets feedback.
     adaptation
         Whether goals follow the patient.
+    locked
+        Whether what defines the condition stays as it was planned: in a study's session.
     """
 
     goal: GoalRule
@@ -82,6 +84,7 @@ class PlanSettings:
     cue_timing: CueTiming = field(default_factory=CueTiming)
     schedule: Schedule = field(default_factory=Schedule)
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
+    locked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +178,7 @@ class SessionPlan(PlanSettings):
             schedule=_read_schedule(data.get("schedule", {})),
             adaptation=_read_adaptation(data.get("adaptation")),
             close_steps=CloseSteps(**data.get("close_steps", {})),
+            locked=data.get("locked", False),
             language=data.get("language", "en"),
         )
 

@@ -138,7 +138,7 @@ def test_a_sessions_type_stays_that_of_its_arm(world, kind):
     study = running_study(world, "positive", "negative")
     session = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
     other = "negative" if session.valence == "positive" else "positive"
-    with pytest.raises(InvalidSetting, match="can be changed to one of"):
+    with pytest.raises(InvalidSetting, match="belongs to a study"):
         SessionFold(session.to_plan()).change(Change(kind, other))
 
 

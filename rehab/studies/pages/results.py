@@ -52,6 +52,8 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
         "study": study,
         "interim": study.state != StudyState.CLOSED,
         "changes": results.changes,
+        "arms": results.arms.values(),
+        "conduct": results.conduct,
         "figures": {name: _inline(draw(results)) for name, draw in FIGURES.items()},
         "registered": [_describe(results, slug) for slug in results.registered],
         "exploratory": [_describe(results, slug) for slug in results.exploratory],

@@ -18,9 +18,11 @@ from rehab.studies.figures.people import draw_people
 from rehab.studies.results.results import (
     Results,
     change_rows,
+    conduct_rows,
     curve_rows,
     difference_rows,
     flow_rows,
+    occurrence_rows,
     outcome_rows,
     phase_rows,
 )
@@ -160,6 +162,8 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "curves": curve_rows,
     "flow": flow_rows,
     "changes": change_rows,
+    "conduct": conduct_rows,
+    "occurrences": occurrence_rows,
 }
 
 

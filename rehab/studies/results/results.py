@@ -34,6 +34,7 @@ from rehab.studies.registration.outcome_changes import (
     registered_outcomes,
 )
 from rehab.studies.registration.sealing import unseal
+from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences
 from rehab.studies.results.reading import Analysis, analyze
 
 
@@ -70,6 +71,8 @@ class Results:
         The arms' codes with the labels that are shown, in the order in which they are shown.
     outcomes, changes
         The registered outcomes, the first primary one first; every change of them.
+    occurrences
+        Harms and deviations.
     """
 
     study: Study
@@ -77,6 +80,7 @@ class Results:
     arms: dict[str, str]
     outcomes: tuple[RegisteredOutcome, ...]
     changes: tuple[OutcomeChange, ...]
+    occurrences: tuple[Occurrence, ...]
 
     @property
     def participants(self) -> tuple[Participant, ...]:
@@ -110,6 +114,11 @@ class Results:
         return self.analysis.curves
 
     @cached_property
+    def conduct(self) -> tuple[ConductRow, ...]:
+        """How often each harm and deviation happened, by arm."""
+        return count(self.occurrences, self.arms)
+
+    @cached_property
     def flow(self) -> tuple[ArmFlow, ...]:
         """How many were allocated to each arm, and what became of them."""
         return flow(self.participants, list(self.arms), self.primary)
@@ -138,7 +147,14 @@ def read_results(study: Study, now: datetime) -> Results:
     until = date.max if is_closed else clinic_time(now, study.clinic).date()
     arms = label_arms(study)
     analysis = analyze(study, tuple(arms), until)
-    return Results(study, analysis, arms, registered_outcomes(study), outcome_changes(study))
+    return Results(
+        study,
+        analysis,
+        arms,
+        registered_outcomes(study),
+        outcome_changes(study),
+        read_occurrences(study),
+    )
 
 
 def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
@@ -222,3 +238,23 @@ def change_rows(results: Results) -> Iterator[dict[str, Any]]:
     for one in results.changes:
         row = asdict(one)
         yield row | {name: " ".join(row[name]) for name in ("added", "removed")}
+
+
+def conduct_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each group and kind of harm or deviation."""
+    for row in results.conduct:
+        for arm, (events, people) in row.counts.items():
+            about = {"group": results.arms[arm], "kind": row.kind, "what": row.what}
+            yield about | {"events": events, "participants": people}
+
+
+def occurrence_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each harm and deviation."""
+    for one in results.occurrences:
+        place = {"participant": one.participant, "group": results.arms[one.arm]}
+        yield place | {
+            "visit": one.visit,
+            "kind": one.kind,
+            "what": one.what,
+            "value": one.value,
+        }
