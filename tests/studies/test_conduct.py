@@ -13,7 +13,7 @@ from rehab.people.roles import Role
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.services import change_session
 from rehab.studies.registration.lifecycle import close
-from rehab.studies.results.conduct import read_occurrences
+from rehab.studies.results.results import read_results
 from rehab.studies.unblinding import reveal_arms
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind, NotAllowed
@@ -125,4 +125,4 @@ def test_a_session_that_was_finished_before_its_last_phase_is_a_deviation(world)
     session = study_session(world, study)
     change_session(session, ChangeKind.START)
     change_session(session, ChangeKind.FINISH)
-    assert [one.what for one in read_occurrences(study)] == ["phases_not_walked"]
+    assert [one.what for one in read_results(study, NOW).occurrences] == ["phases_not_walked"]

@@ -44,8 +44,9 @@ class ParticipantVisit:
         What became of it.
     outcomes
         By slug; empty where it was not walked or does not count.
-    phases
-        Figures of each phase, as `describe_phases` returns them.
+    phases, planned
+        Figures of each phase that was walked, as `describe_phases` returns them; how many phases
+        the session had.
     """
 
     number: int
@@ -55,6 +56,7 @@ class ParticipantVisit:
     attendance: Attendance = Attendance.MISSED
     outcomes: dict[str, float] = field(default_factory=dict)
     phases: tuple[dict[str, Any], ...] = ()
+    planned: int = 0
 
     @property
     def is_walked(self) -> bool:
@@ -154,6 +156,7 @@ def make_participant(
                 attendance=Attendance.FINISHED if walked.is_finished else Attendance.UNFINISHED,
                 outcomes=outcomes,
                 phases=tuple(describe_phases(walked.walk)),
+                planned=len(walked.walk.phases),
             )
         )
         before = walked.walk

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from django.db.models import Max
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
+from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.studies.analysis.participants import Attendance, Participant
 from rehab.studies.models import Study
 from rehab.studies.participants import StudyEvent, StudyVisit
 from rehab.training.changes import ChangeKind, State
@@ -130,12 +130,16 @@ def _of_session(session: TrainingSession, make: Callable[..., Occurrence]) -> It
     yield from (make(Remark.FALL.value, severity) for severity in falls)
     if session.state == State.ABORTED:
         yield make(ENDED_EARLY)
-    if session.state == State.FINISHED:
-        last = Step.everywhere.filter(session=session).aggregate(Max("phase"))["phase__max"]
-        if last is None or last + 1 < len(session.plan["phases"]):
-            yield make(UNWALKED)
     if session.excluded:
         yield make(EXCLUDED)
+
+
+def unwalked(participants: Iterable[Participant]) -> Iterator[Occurrence]:
+    """Yield the sessions that were finished before their last phase."""
+    for one in participants:
+        for visit in one.visits if one.is_analyzed else ():
+            if visit.attendance is Attendance.FINISHED and len(visit.phases) < visit.planned:
+                yield Occurrence(UNWALKED, one.code, visit.arm, visit.number)
 
 
 def count(occurrences: Iterable[Occurrence], arms: Iterable[str]) -> tuple[ConductRow, ...]:

@@ -34,7 +34,7 @@ from rehab.studies.registration.outcome_changes import (
     registered_outcomes,
 )
 from rehab.studies.registration.sealing import unseal
-from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences
+from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences, unwalked
 from rehab.studies.results.reading import Analysis, analyze
 
 
@@ -153,7 +153,7 @@ def read_results(study: Study, now: datetime) -> Results:
         arms,
         registered_outcomes(study),
         outcome_changes(study),
-        read_occurrences(study),
+        (*read_occurrences(study), *unwalked(analysis.participants)),
     )
 
 
