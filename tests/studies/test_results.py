@@ -10,6 +10,7 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
+from rehab.exports.research.package import sessions_for
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
@@ -154,6 +155,49 @@ def test_before_the_end_only_the_marked_look_and_each_look_is_recorded(world):
     assert study.events.filter(kind="looked").count() == 1  # a day
     for role in (Role.LEAD, Role.PT):
         assert client_of(world, role).get(url).status_code == 403
+
+
+@pytest.mark.django_db(transaction=True)
+def test_before_the_end_a_look_shows_aggregates_alone_that_lead_to_no_arm(world):
+    trial = example_trial(8)
+    clinic = world.clinic
+    study = find_or_plan(clinic, trial, 5, NOW)
+    for _done in study_walks(study, trial, 5, NOW):
+        pass
+    reader = world.people[Role.RESEARCHER]
+    give_mark(study, reader, Task.INTERIM, None, NOW)
+    client = client_of(world, Role.RESEARCHER)
+    # Whoever could read a session's type and figures could tell which group is which arm.
+    of_study = {"study_visit__enrollment__study": study}
+    assert not TrainingSession.objects.visible_to(reader).filter(**of_study).exists()
+    assert not sessions_for(reader, study).exists()
+    file = reverse("study-results-file", args=[study.pk])
+    for name in ("outcomes.csv", "phases.csv", "curves.csv", "occurrences.csv"):
+        assert client.get(file, {"file": name}).status_code == 403
+    for name in ("primary.svg", "learning.svg", "exploratory.svg"):
+        assert client.get(file, {"file": name}).status_code == 403
+    codes = set(study.enrollments.values_list("code", flat=True))
+    page = text_of(client.get(reverse("study-results", args=[study.pk])))
+    for name in ("differences.csv", "flow.csv", "conduct.csv", "changes.csv"):
+        page += text_of(client.get(file, {"file": name}))
+    assert not [code for code in codes if code in page]
+    # Two people in a group are no aggregate, and points tell the feedback type.
+    assert all(mean is None for mean in means_of(read_results(study, NOW)))
+    close(study, None, NOW)
+    for name in ("outcomes.csv", "primary.svg"):
+        assert client.get(file, {"file": name}).status_code == 200
+    assert all(means_of(read_results(study, NOW)))
+
+
+def means_of(results):
+    return [one.mean for slug in results.registered for one in results.find(slug).arms]
+
+
+def test_before_the_end_no_figure_is_shown_that_tells_the_feedback_type(world):
+    study = running_study(world, primary_outcome="score", secondary_outcomes=["hit_rate"])
+    assert list(read_results(study, NOW).registered) == ["hit_rate"]
+    close(study, None, NOW)
+    assert list(read_results(study, NOW).registered) == ["score", "hit_rate"]
 
 
 def test_groups_are_numbered_by_the_sealed_seed_until_the_study_is_closed(world):

@@ -334,10 +334,31 @@ OF_SESSIONS = {
     for metric in METRICS.values()
     if metric.unit not in {"days", "sessions"} and metric.slug not in NOT_COMPARED
 }
+# How each of them is computed, with the visit's own baseline.
+MEANINGS = {
+    "score": "Points of the session; none where the feedback type has no points.",
+    "hit_rate": "Hits / judged strides with feedback.",
+    "mean_performance": "Mean of shown / goal of the judged strides with feedback.",
+    "best_streak": "Most hits in a row.",
+    "points_per_100_steps": "100 x score / judged strides.",
+    "improvement_over_baseline": "Mean of the valid strides with feedback less the mean of the "
+    "visit's own baseline, in percent of the latter.",
+    "steps": "Judged strides with feedback.",
+    "active_minutes": "Time that was walked.",
+}
 # Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
     slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()
 }
+
+
+def define_outcomes() -> list[dict[str, str]]:
+    """Return name, unit and meaning of every outcome that may be registered."""
+    meanings = MEANINGS | {one.slug: one.meaning for one in OF_STRIDES.values()}
+    return [
+        {"outcome": slug, "label": label, "unit": unit, "meaning": meanings[slug]}
+        for slug, (label, unit) in OUTCOMES.items()
+    ]
 
 
 def compute_outcomes(walk: Walk, history: History, metrics: dict[str, float]) -> dict[str, float]:

@@ -8,7 +8,13 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
-from rehab.studies.analysis.comparison import Difference, Interval, Observation, compare
+from rehab.studies.analysis.comparison import (
+    MIN_PARTICIPANTS,
+    Difference,
+    Interval,
+    Observation,
+    compare,
+)
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
 from rehab.studies.analysis.outcomes import (
     History,
@@ -194,6 +200,15 @@ class OutcomeResult:
     slug: str
     arms: tuple[ArmFigure, ...]
     differences: tuple[Difference, ...]
+
+    def without_few(self) -> OutcomeResult:
+        """Return the same without figures of fewer people than an interval needs."""
+        arms = tuple(
+            one if one.participants >= MIN_PARTICIPANTS else replace(one, mean=None)
+            for one in self.arms
+        )
+        kept = (one for one in self.differences if min(one.participants) >= MIN_PARTICIPANTS)
+        return OutcomeResult(self.slug, arms, tuple(kept))
 
 
 def find(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -33,8 +31,8 @@ from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.registration.lifecycle import close, register, revise, start
 from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
+from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import write_pdf
-from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.results import may_look
 from rehab.studies.unblinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.visits import next_visit
@@ -200,28 +198,6 @@ def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpRes
     response = HttpResponse(content, content_type=f"application/{kind}")
     response["Content-Disposition"] = f'attachment; filename="{study.code}-protocol.{kind}"'
     return response
-
-
-def write_json(study: Study) -> str:
-    """Return a registered study with all its versions; of a closed one also the seed."""
-    protocol: dict[str, Any] = {
-        "registered_at": study.registered_at,
-        "closed_at": study.closed_at,
-        "outcome_changes": [asdict(change) for change in outcome_changes(study)],
-        "versions": [
-            {
-                "number": version.number,
-                "at": version.at,
-                "reason": version.reason,
-                "sha256": version.digest,
-                "study": version.document,
-            }
-            for version in study.versions.all()
-        ],
-    }
-    if study.state == StudyState.CLOSED and study.sealed:
-        protocol["allocation_secret"] = asdict(unseal(study.sealed))
-    return json.dumps(protocol, indent=2, ensure_ascii=False, default=datetime.isoformat) + "\n"
 
 
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:

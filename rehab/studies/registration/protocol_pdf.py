@@ -14,6 +14,7 @@ from reportlab.lib.units import mm
 from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, Table, TableStyle
 
 from rehab.sessions.formatting import format_schedule
+from rehab.studies.allocation.draws import RULE
 from rehab.studies.allocation.scheme import Method
 from rehab.studies.models import METHODS, OUTCOMES, Study, StudyVersion
 from rehab.studies.registration.outcome_changes import outcome_changes
@@ -49,6 +50,8 @@ def write_pdf(study: Study) -> bytes:
         parts += [_text(change) for change in changes]
     for version in study.versions.order_by("-number"):
         parts += _version_parts(version)
+    parts.append(_text(gettext("How to allocate again from the seed"), "Heading2"))
+    parts += [_text(line) for line in RULE.splitlines()]
     document.build(parts)
     return target.getvalue()
 

@@ -167,6 +167,15 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
 }
 
 
+# What is shown before the end: the rest shows single people, or what tells an arm.
+INTERIM = frozenset({"registered", "differences", "flow", "changes", "conduct"})
+
+
+def is_shown(results: Results, name: str) -> bool:
+    """Return whether a figure or table is shown now."""
+    return not results.is_interim or name in INTERIM
+
+
 def write_table(rows: Iterable[dict[str, Any]]) -> str:
     """Return rows as CSV with a heading; numbers with a point, what is missing empty."""
     text = io.StringIO()

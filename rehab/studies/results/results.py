@@ -37,6 +37,9 @@ from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences, unwalked
 from rehab.studies.results.reading import Analysis, analyze
 
+# Of these the feedback type decides: who sees them of a group knows its arm.
+TELL_THE_TYPE = frozenset({"score", "points_per_100_steps"})
+
 
 def may_look(study: Study, user: User) -> bool:
     """Return whether an account may see a study's results now.
@@ -63,6 +66,9 @@ def note_look(study: Study, user: User, now: datetime) -> None:
 class Results:
     """What a study found, as far as it was walked.
 
+    Before the study is closed, aggregates alone, and none that tells which group is which arm: no
+    outcome that the feedback type decides, no exploratory one, nothing of fewer than three people.
+
     Attributes
     ----------
     study, analysis
@@ -88,6 +94,11 @@ class Results:
         return self.analysis.participants
 
     @property
+    def is_interim(self) -> bool:
+        """Whether the study is not closed."""
+        return self.study.state != StudyState.CLOSED
+
+    @property
     def primary(self) -> str:
         """Slug of the primary outcome that was registered first."""
         return self.outcomes[0].slug
@@ -95,18 +106,23 @@ class Results:
     @cached_property
     def registered(self) -> dict[str, RegisteredOutcome]:
         """The registered outcomes by their slugs, the primary one first."""
-        return {one.slug: one for one in self.outcomes if one.slug in OUTCOMES}
+        hidden = TELL_THE_TYPE if self.is_interim else frozenset()
+        known = (one for one in self.outcomes if one.slug in OUTCOMES)
+        return {one.slug: one for one in known if one.slug not in hidden}
 
     @cached_property
     def exploratory(self) -> tuple[str, ...]:
         """Slugs of all other outcomes that anybody has."""
+        if self.is_interim:
+            return ()
         found = {slug for one in self.participants for v in one.visits for slug in v.outcomes}
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
         return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
 
     def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
-        return self.analysis.find(slug)
+        found = self.analysis.find(slug)
+        return found.without_few() if self.is_interim else found
 
     @property
     def curves(self) -> dict[str, list[Point]]:
@@ -115,8 +131,9 @@ class Results:
 
     @cached_property
     def conduct(self) -> tuple[ConductRow, ...]:
-        """How often each harm and deviation happened, by arm."""
-        return count(self.occurrences, self.arms)
+        """How often each harm and deviation happened, by arm; before the end harms alone."""
+        rows = count(self.occurrences, self.arms)
+        return tuple(row for row in rows if row.kind == "harm" or not self.is_interim)
 
     @cached_property
     def flow(self) -> tuple[ArmFlow, ...]:

@@ -1,0 +1,36 @@
+"""The registered study as data: all versions, every change of outcomes, how it allocates."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from datetime import datetime
+from typing import Any
+
+from rehab.studies.allocation.draws import RULE
+from rehab.studies.models import Study, StudyState
+from rehab.studies.registration.outcome_changes import outcome_changes
+from rehab.studies.registration.sealing import unseal
+
+
+def write_json(study: Study) -> str:
+    """Return a registered study with all its versions; of a closed one also the seed."""
+    protocol: dict[str, Any] = {
+        "registered_at": study.registered_at,
+        "closed_at": study.closed_at,
+        "draw_rule": RULE,
+        "outcome_changes": [asdict(change) for change in outcome_changes(study)],
+        "versions": [
+            {
+                "number": version.number,
+                "at": version.at,
+                "reason": version.reason,
+                "sha256": version.digest,
+                "study": version.document,
+            }
+            for version in study.versions.all()
+        ],
+    }
+    if study.state == StudyState.CLOSED and study.sealed:
+        protocol["allocation_secret"] = asdict(unseal(study.sealed))
+    return json.dumps(protocol, indent=2, ensure_ascii=False, default=datetime.isoformat) + "\n"
