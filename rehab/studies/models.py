@@ -95,6 +95,18 @@ class Study(ClinicModel):
         blank=True,
         help_text=_("Who may enroll. Empty: every patient, however recent the stroke."),
     )
+    inclusion = models.TextField(
+        _("criteria of inclusion"),
+        max_length=4000,
+        blank=True,
+        help_text=_("One a line. Each is asked when a patient is enrolled, and has to be met."),
+    )
+    exclusion = models.TextField(
+        _("criteria of exclusion"),
+        max_length=4000,
+        blank=True,
+        help_text=_("One a line. Who meets one of them is not enrolled."),
+    )
     visits = models.PositiveSmallIntegerField(_("visits in each period"), default=1)
     days_between = models.PositiveSmallIntegerField(_("days between visits"), default=1)
     washout_days = models.PositiveSmallIntegerField(_("days between periods"), default=7)
@@ -125,6 +137,21 @@ class Study(ClinicModel):
     def is_draft(self) -> bool:
         """Whether everything may still be changed."""
         return self.state == StudyState.DRAFT
+
+    @property
+    def inclusion_criteria(self) -> list[str]:
+        """What each participant has to meet."""
+        return list(filter(None, map(str.strip, self.inclusion.splitlines())))
+
+    @property
+    def exclusion_criteria(self) -> list[str]:
+        """What no participant may meet."""
+        return list(filter(None, map(str.strip, self.exclusion.splitlines())))
+
+    @property
+    def criteria(self) -> list[str]:
+        """All that has to hold of a participant, in words: those of exclusion with “not” before."""
+        return [*self.inclusion_criteria, *(f"not: {one}" for one in self.exclusion_criteria)]
 
     @property
     def visit_plan(self) -> VisitPlan:

@@ -108,6 +108,39 @@ class Allocation(AppendOnlyModel):
         return self.enrollment.study.arms.get(code=self.group.split("-")[period])
 
 
+class Screening(AppendOnlyModel):
+    """A patient who was assessed for a study: enrolled, not eligible, or not willing.
+
+    ``unmet``: the criteria that were not met, in the words of the study.
+    """
+
+    scope = PatientScope(clinic="study__clinic", patient="patient", tells_condition=False)
+    allowed_changes = (ACCOUNT_DELETED,)
+
+    study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="screenings")
+    patient = models.ForeignKey(Patient, on_delete=models.PROTECT, related_name="screenings")
+    unmet = models.JSONField(default=list)
+    declined = models.BooleanField(default=False)
+    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    at = models.DateTimeField(default=timezone.now)
+
+    personal = personal_fields(
+        {
+            "study patient unmet declined at": retained(
+                "the flow of a study's participants", shown=True, research=False
+            ),
+            "by": retained("staff", shown=False, research=False),
+        }
+    )
+
+    class Meta(AppendOnlyModel.Meta):
+        verbose_name = _("screening")
+        ordering: ClassVar = ["pk"]
+
+    def __str__(self) -> str:
+        return f"{self.study.code}: {self.at:%Y-%m-%d}"
+
+
 class StudyVisit(ScopedModel):
     """A visit that the study plans. A session that was broken off leaves room for another try."""
 

@@ -31,6 +31,9 @@ from rehab.training.valences import find_valence
 SEEDS = range(500)
 CROSSED = 1000
 PEOPLE, ARMS = 24, ("A", "B")
+# Of an estimate's own scatter: so much bias takes less than 1 % of the coverage. Where missing
+# follows the response, the correlation between visits is estimated from few people.
+LEFT = 0.25
 EFFECT = 8.0  # of arm B, in percent of the baseline; washout keeps a quarter
 OUTCOME, WASHOUT, SHARE = "training_change", "washout_change", "retention_in_washout"
 
@@ -102,9 +105,9 @@ def studied(seed: int) -> list[Found]:
             scenario = f"effect {effect:g}, {leave}"
             for slug, true in ((OUTCOME, effect), (WASHOUT, effect / 4)):
                 found += list(both_methods(people, slug, true, f"{scenario}: {slug}"))
-        shares = shares_of_gain(whole, seed)
+        shares = shares_of_gain(whole)
         if shares is not None:
-            found.append(Found(f"effect {effect:g}: {SHARE}", "before", shares, True))
+            found.append(Found(f"effect {effect:g}: {SHARE}, B - A", "before", shares, True))
     return found
 
 
@@ -121,8 +124,11 @@ def both_methods(
     yield Found(scenario, "now", interval.estimate - true, covers)
 
 
-def shares_of_gain(people: list[Participant], _seed: int) -> float | None:
-    """Return by how much shares of the gain that washout kept differ: truly by nothing."""
+def shares_of_gain(people: list[Participant]) -> float | None:
+    """Return by how much shares of the gain that washout kept differ, of those who gained 3 %.
+
+    Arm B keeps the effect's quarter more of the baseline; the share says the opposite.
+    """
     means: dict[str, list[float]] = {arm: [] for arm in ARMS}
     for one in people:
         for visit in one.visits:
@@ -171,10 +177,10 @@ def test_effects_are_unbiased_and_covered_where_visits_are_missing_at_random():
         off = np.array([one.off for one in of_row])
         covered = np.mean([one.covers for one in of_row])
         error = off.std(ddof=1) / len(off) ** 0.5
-        told = "" if scenario.endswith(SHARE) else f"{covered:.1%}"
+        told = "" if SHARE in scenario else f"{covered:.1%}"
         print(f"| {scenario} | {method} | {len(off)} | {off.mean():+.2f} ({error:.2f}) | {told} |")
         if method == "now":
-            assert abs(off.mean()) < 4 * error, scenario
+            assert abs(off.mean()) < LEFT * off.std(ddof=1), scenario
             exact = stats.binomtest(int(sum(one.covers for one in of_row)), len(of_row), 0.95)
             assert exact.pvalue > 1e-3, scenario
     worst = [

@@ -42,7 +42,7 @@ def exported(user: User, folder: Path, study: Study) -> dict[str, str]:
     return {
         name: b"".join(
             piece.encode() if isinstance(piece, str) else piece for piece in pieces
-        ).decode()
+        ).decode(errors="replace")  # Parquet is no text
         for name, pieces in package.files()
     }
 

@@ -226,7 +226,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     pt = client_of(world)
     url = reverse("enroll", args=[study.pk])
     assert "required" in text_of(pt.post(url, {"patient": patient.pk}))
-    sent = pt.post(url, {"patient": patient.pk, "keep_data": "yes"})
+    sent = pt.post(url, {"patient": patient.pk, "keep_data": "yes", "takes_part": "yes"})
     enrollment = Enrollment.everywhere.get(patient=patient)
     assert sent["Location"] == reverse("participant", args=[enrollment.pk])
     page = text_of(pt.get(sent["Location"]))
@@ -236,7 +236,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     session = TrainingSession.everywhere.exclude(pk=world.session.pk)
     assert start_visit(pt, enrollment).url == reverse("monitor", args=[session.get().pk])
     assert "One study a patient" in text_of(
-        pt.post(url, {"patient": patient.pk, "keep_data": "no"})
+        pt.post(url, {"patient": patient.pk, "keep_data": "no", "takes_part": "yes"})
     )
     assert refusals(caplog) == [f"Refused to account {world.people[Role.PT].pk}: {url}"]
 

@@ -48,7 +48,7 @@ def study_files(
 ) -> Iterator[tuple[str, Any]]:
     """Yield a study's files: name and content in pieces."""
     folder = f"studies/{study.code}"
-    yield f"{folder}/protocol.json", [write_json(study)]
+    yield f"{folder}/protocol.json", [write_json(study, has_dates=not shift_dates)]
     rows = participant_rows(user, study, shift_dates=shift_dates)
     yield f"{folder}/participants.csv", write_csv(PARTICIPANTS, rows)
     definitions = define_outcomes()
@@ -57,7 +57,10 @@ def study_files(
         yield f"{folder}/verify_allocation.py", [VERIFIER.read_text("utf-8")]
         results = read_results(study, now)
         for name, table in TABLES.items():
-            yield f"{folder}/{name}.csv", [write_table(table(results))]
+            cells = table(results)
+            if shift_dates:
+                cells = ({key: row[key] for key in row if key != "at"} for row in cells)
+            yield f"{folder}/{name}.csv", [write_table(cells)]
 
 
 def participant_rows(user: User, study: Study, *, shift_dates: bool) -> Iterator[tuple[Any, ...]]:

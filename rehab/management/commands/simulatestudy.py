@@ -12,6 +12,7 @@ from typing import Any
 
 from django.contrib.auth.hashers import make_password
 from django.core.management import BaseCommand, CommandError
+from django.db import connection
 from django.utils import timezone, translation
 
 from rehab.exports.archive import save_zip
@@ -21,6 +22,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
+from rehab.sessions.live.headless import GIVE_WAY_S, Pace
 from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES, name_pair, write_table
 from rehab.studies.results.results import Results
@@ -68,7 +70,8 @@ class Command(BaseCommand):
             trial = example_trial(options["participants"], options["visits"], population)
             clinic, _is_new = Clinic.everywhere.get_or_create(name=options["clinic"])
             study = find_or_plan(clinic, trial, seed, now)
-            for done in walk_study(study, trial, seed, now):
+            give_way = Pace(rest_s=GIVE_WAY_S if connection.vendor == "sqlite" else 0.0)
+            for done in walk_study(study, trial, seed, now, give_way):
                 self._tell(f"{done} of {trial.participants} participants")
             results = finish_study(study, now)
         except InvalidSetting as problem:

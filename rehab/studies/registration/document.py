@@ -50,6 +50,8 @@ def describe(study: Study) -> dict[str, Any]:
         "secondary_outcomes": study.secondary_outcomes,
         "scoring_rules_version": RULES_VERSION,
     }
+    criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}
+    document |= {name: asked for name, asked in criteria.items() if asked}
     stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
     return stored
 

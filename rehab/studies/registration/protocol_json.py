@@ -12,9 +12,14 @@ from rehab.studies.models import Study, StudyState
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.registration.sealing import unseal
 
+DATES = frozenset({"registered_at", "closed_at", "at"})
 
-def write_json(study: Study) -> str:
-    """Return a registered study with all its versions; of a closed one also the seed."""
+
+def write_json(study: Study, *, has_dates: bool = True) -> str:
+    """Return a registered study with all its versions; of a closed one also the seed.
+
+    ``has_dates``: whether it says when; without, dates of participants cannot be told from it.
+    """
     protocol: dict[str, Any] = {
         "registered_at": study.registered_at,
         "closed_at": study.closed_at,
@@ -33,4 +38,8 @@ def write_json(study: Study) -> str:
     }
     if study.state == StudyState.CLOSED and study.sealed:
         protocol["allocation_secret"] = asdict(unseal(study.sealed))
+    if not has_dates:
+        for part in (protocol, *protocol["versions"], *protocol["outcome_changes"]):
+            for name in DATES & part.keys():
+                part[name] = None
     return json.dumps(protocol, indent=2, ensure_ascii=False, default=datetime.isoformat) + "\n"

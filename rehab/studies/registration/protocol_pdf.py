@@ -165,6 +165,8 @@ def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("What"), gettext("Planned")),
         (gettext("Participants"), document["participants"]),
         (gettext("Months since the stroke, at least"), months),
+        (gettext("Criteria of inclusion"), "\n".join(document.get("inclusion", ()))),
+        (gettext("Criteria of exclusion"), "\n".join(document.get("exclusion", ()))),
         (gettext("Design"), document["design"]),
         (gettext("Allocation"), METHODS[Method(allocation["method"])]),
         (gettext("Groups"), ", ".join("-".join(row["arms"]) for row in allocation["groups"])),

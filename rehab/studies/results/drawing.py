@@ -25,6 +25,7 @@ from rehab.studies.results.results import (
     occurrence_rows,
     outcome_rows,
     phase_rows,
+    screening_rows,
 )
 
 LONG = 18  # letters of a name of which two fit on a line
@@ -139,9 +140,17 @@ def draw_consort(results: Results) -> str:
                 Box(_n(gettext("analyzed"), one.analyzed)),
             ]
         )
-    total = len(results.participants)
-    taken = ngettext("%(count)d participant allocated", "%(count)d participants allocated", total)
-    return draw_flow(Box(taken % {"count": total}), columns, gettext("Flow of participants"))
+    assessed = results.assessed
+    away = [
+        _n(gettext("not eligible"), assessed.not_eligible),
+        _n(gettext("declined"), assessed.declined),
+    ]
+    lines = (
+        *(away if assessed.turned_away else ()),
+        _n(gettext("allocated"), len(results.participants)),
+    )
+    first = Box(_n(gettext("assessed for eligibility"), assessed.people), lines)
+    return draw_flow(first, columns, gettext("Flow of participants"))
 
 
 def _n(words: str, count: int) -> str:
@@ -161,6 +170,7 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "differences": difference_rows,
     "curves": curve_rows,
     "flow": flow_rows,
+    "screening": screening_rows,
     "changes": change_rows,
     "conduct": conduct_rows,
     "occurrences": occurrence_rows,
@@ -168,7 +178,7 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
 
 
 # What is shown before the end: the rest shows single people, or what tells an arm.
-INTERIM = frozenset({"registered", "differences", "flow", "changes", "conduct"})
+INTERIM = frozenset({"registered", "differences", "flow", "screening", "changes", "conduct"})
 
 
 def is_shown(results: Results, name: str) -> bool:

@@ -36,6 +36,7 @@ from rehab.studies.registration.outcome_changes import (
 from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences, unwalked
 from rehab.studies.results.reading import Analysis, analyze
+from rehab.studies.screening import Assessed, count_assessed
 
 # Of these the feedback type decides: who sees them of a group knows its arm.
 TELL_THE_TYPE = frozenset({"score", "points_per_100_steps"})
@@ -77,8 +78,8 @@ class Results:
         The arms' codes with the labels that are shown, in the order in which they are shown.
     outcomes, changes
         The registered outcomes, the first primary one first; every change of them.
-    occurrences
-        Harms and deviations.
+    occurrences, assessed
+        Harms and deviations; the numbers of the screening log.
     """
 
     study: Study
@@ -87,6 +88,7 @@ class Results:
     outcomes: tuple[RegisteredOutcome, ...]
     changes: tuple[OutcomeChange, ...]
     occurrences: tuple[Occurrence, ...]
+    assessed: Assessed
 
     @property
     def participants(self) -> tuple[Participant, ...]:
@@ -171,6 +173,7 @@ def read_results(study: Study, now: datetime) -> Results:
         registered_outcomes(study),
         outcome_changes(study),
         (*read_occurrences(study), *unwalked(analysis.participants)),
+        count_assessed(study),
     )
 
 
@@ -248,6 +251,15 @@ def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
     """Return one row for each group of the flow of participants."""
     rows = [asdict(one) | {"primary_outcome": results.primary} for one in results.flow]
     return [{"group": results.arms[row.pop("arm")]} | row for row in rows]
+
+
+def screening_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each number of the screening log, and for each criterion not met."""
+    assessed = results.assessed
+    for name in ("people", "not_eligible", "declined"):
+        yield {"what": name, "criterion": "", "people": getattr(assessed, name)}
+    for criterion, people in assessed.reasons.most_common():
+        yield {"what": "criterion not met", "criterion": criterion, "people": people}
 
 
 def change_rows(results: Results) -> Iterator[dict[str, Any]]:

@@ -99,14 +99,18 @@ def _find_protocol(clinic: Clinic) -> Protocol:
     return protocol
 
 
-def walk_study(study: Study, trial: Trial, seed: int, now: datetime) -> Iterator[int]:
+def walk_study(
+    study: Study, trial: Trial, seed: int, now: datetime, pace: Pace | None = None
+) -> Iterator[int]:
     """Enroll and walk the participants who are missing, and yield how many are done.
 
-    What was walked before stays: a study that was broken off goes on.
+    What was walked before stays: a study that was broken off goes on. ``pace``: as fast as strides
+    are stored unless given.
     """
     for number, (person, _group) in enumerate(trial.allocate(seed), start=1):
         if study.state == StudyState.RUNNING:
-            _walk_all(_find_or_enroll(study, number, now), trial, person, now)
+            enrollment = _find_or_enroll(study, number, now)
+            _walk_all(enrollment, trial, person, now, pace or Pace())
         yield number
 
 
@@ -123,7 +127,9 @@ def _find_or_enroll(study: Study, number: int, now: datetime) -> Enrollment:
     return enroll(study, patient, (), keep_data=True, by=None, now=now)
 
 
-def _walk_all(enrollment: Enrollment, trial: Trial, person: Person, now: datetime) -> None:
+def _walk_all(
+    enrollment: Enrollment, trial: Trial, person: Person, now: datetime, pace: Pace
+) -> None:
     while enrollment.withdrawn_at is None and (visit := next_visit(enrollment)) is not None:
         if 0 < person.leaves_before <= visit.number:
             withdraw(enrollment, None, now)
@@ -133,7 +139,7 @@ def _walk_all(enrollment: Enrollment, trial: Trial, person: Person, now: datetim
             return
         session = start_session(enrollment, PLACE, None, now)
         walker = person.at_visit(visit.number, trial.effects[arm.code], trial.population.kept)
-        asyncio.run(run_session(session.pk, partial(walk_through, walker), Pace()))
+        asyncio.run(run_session(session.pk, partial(walk_through, walker), pace))
 
 
 def finish_study(study: Study, now: datetime) -> Results:
