@@ -1,4 +1,4 @@
-"""Enrolling patients, allocating them, and what happens when one withdraws."""
+"""Enrollment of patients, their allocation, and withdrawal."""
 
 from __future__ import annotations
 
@@ -38,16 +38,32 @@ def enroll(
     now: datetime,
     met: Collection[str] = (),
 ) -> Enrollment:
-    """Take a patient into a running study: allocate, plan the visits, blind.
+    """Enroll a patient in a running study: allocate, plan the visits, blind.
 
-    ``met``: those of ``study.criteria`` that ``by`` confirms.
+    Parameters
+    ----------
+    study, patient
+        The study, and who joins it.
+    levels
+        The patient's level of each factor of the study.
+    keep_data
+        Whether sessions still count in the results if the participant withdraws.
+    by
+        Who enrolls; None for a program.
+    now
+        The time of the enrollment.
+    met
+        Those of ``study.criteria`` that ``by`` confirms.
 
-    Raises InvalidSetting for a patient who is not eligible, has not consented to research, is in
-    another study or has an open session, and for a study that is not running, is full, or has run
-    out of its list.
+    Raises
+    ------
+    InvalidSetting
+        For a patient who is not eligible, has not consented to research, is in another study or has
+        an open session; for a study that is not running, is full, or has run out of its list; and
+        where ``by`` is an assessor of the study.
     """
     with transaction.atomic():
-        lock(study)  # of two at once, the second is allocated after the first
+        lock(study)  # of two enrolled at once, the second is allocated after the first
         patient.lock()
         check_open(study, by)
         _check_may_enter(study, patient)
@@ -112,7 +128,11 @@ def _plan_visits(enrollment: Enrollment, periods: int, now: datetime) -> None:
     first_day = clinic_time(now, enrollment.study.clinic).date()
     for planned in enrollment.study.visit_plan.plan(periods, first_day):
         StudyVisit.everywhere.create(
-            enrollment=enrollment, number=planned.number, period=planned.period, day=planned.day
+            enrollment=enrollment,
+            number=planned.number,
+            period=planned.period,
+            follow_up=planned.follow_up,
+            day=planned.day,
         )
         if not enrollment.patient.visits.filter(day=planned.day).exists():
             plan_visit(enrollment.patient, planned.day, None)
@@ -122,6 +142,15 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
     """Record that a participant leaves the study; sessions count as was agreed at enrollment.
 
     An open session goes on, as a session of care, until the therapist ends it.
+
+    Parameters
+    ----------
+    enrollment
+        The participant; one who has withdrawn already is left as is.
+    by, now
+        Who records it (None for a program), and when.
+    reason
+        Why, as typed; may be empty.
     """
     with transaction.atomic():
         lock(enrollment.study)
@@ -142,7 +171,15 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
 
 
 def withdraw_everywhere(patient: Patient, by: User | None, now: datetime) -> None:
-    """Withdraw a patient from every running study, as when consent to research is withdrawn."""
+    """Withdraw a patient from every running study, as when consent to research is withdrawn.
+
+    Parameters
+    ----------
+    patient
+        Who leaves.
+    by, now
+        Who records it (None for a program), and when.
+    """
     running = patient.enrollments.filter(withdrawn_at=None, study__state=StudyState.RUNNING)
     for enrollment in running.select_related("study", "patient"):
         withdraw(enrollment, by, now)

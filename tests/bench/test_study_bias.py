@@ -117,7 +117,7 @@ def both_methods(
     groups = by_arm(people, ARMS, slug)
     a, b = (np.array(list(groups[arm].values())) for arm in ARMS)
     low, high = stats.ttest_ind(b, a, equal_var=False).confidence_interval(0.95)
-    yield Found(scenario, "before", b.mean() - a.mean() - true, low <= true <= high)
+    yield Found(scenario, "before", b.mean() - a.mean() - true, bool(low <= true <= high))
     [one] = compare(observations(people, slug), ARMS, crossover=False).differences
     interval = one.difference
     covers = interval.low <= true <= interval.high
@@ -158,7 +158,7 @@ def crossed(draw: np.random.Generator, lost: str) -> list[Found]:
     interval = one.difference
     name = f"crossover, effect 0, {lost} of BA with a bad first period misses the second"
     return [
-        Found(name, "before", float(np.mean(apart)), low <= 0 <= high),
+        Found(name, "before", float(np.mean(apart)), bool(low <= 0 <= high)),
         Found(name, "now", interval.estimate, interval.low <= 0 <= interval.high),
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -122,6 +123,15 @@ def test_what_a_visit_carries_to_the_next_is_measured():
     assert outcome("baseline_change", second, first) == pytest.approx(20)
     assert outcome("washout_change", second, first) == pytest.approx(20)  # not 0, of its own
     assert outcome("late_change", second, first) == pytest.approx(30)
+
+
+def test_a_follow_up_is_compared_with_the_first_baseline():
+    first = walk_of(2, 2.6, 2.2, 2.2)
+    rows: list[Any] = [(0, float(n), 2.3, 1.0, None, None, None, True, {}) for n in range(50)]
+    later = read_walk(PHASES[:1], rows, higher_is_better=True)
+    assert outcome("follow_up_change", later, first) == pytest.approx(15)
+    assert outcome("follow_up_change", first) is None
+    assert outcome("late_change", later, first) is None
 
 
 def test_what_was_kept_is_a_difference_that_exists_whoever_gained():

@@ -82,9 +82,7 @@ def live_with_parent() -> None:
         os.nice(10)
 
     def watch() -> None:
-        while os.read(
-            0, 4096
-        ):  # not sys.stdin: Python aborts where a thread holds its lock at the end
+        while os.read(0, 4096):  # not sys.stdin: Python aborts where a thread holds its lock
             pass
         os._exit(0)
 

@@ -41,9 +41,9 @@ class Pace:
     """
 
     speed: float | None = None
-    rest_s: float = 0.0
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
+    rest_s: float = 0.0
 
 
 def simulate_strides(

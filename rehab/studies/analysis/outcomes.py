@@ -118,6 +118,13 @@ def _carried(walk: Walk, history: History) -> float | None:
     return change(walk, np.array([walk.baseline]), history.baseline)
 
 
+def _follow_up(walk: Walk, history: History) -> float | None:
+    """Return the change of a session without any feedback, after one that had it."""
+    if history.before is None or any(phase.feedback for phase in walk.phases):
+        return None
+    return change(walk, walk.values(np.ones(len(walk.value), bool)), history.baseline)
+
+
 def _less(one: float | None, other: float | None) -> float | None:
     return None if one is None or other is None else one - other
 
@@ -259,6 +266,13 @@ OF_STRIDES: dict[str, Outcome] = {
             "%",
             f"Mean of this visit's baseline less the first one, {FIRST}; none at the first visit.",
             _carried,
+        ),
+        Outcome(
+            "follow_up_change",
+            gettext_noop("Change at the follow-up"),
+            "%",
+            f"Mean of all valid strides of the follow-up less the baseline, {FIRST}.",
+            _follow_up,
         ),
         Outcome(
             "between_visits",

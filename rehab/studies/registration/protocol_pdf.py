@@ -61,7 +61,7 @@ def _text(words: object, style: str = "BodyText") -> Paragraph:
 
 
 def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
-    """Yield what stands on paper of one version."""
+    """Yield the parts of the document for one version."""
     document = version.document
     yield _text(f"{document['code']}: {document['title']}", "Title")
     made = gettext("Version %(number)d of %(moment)s UTC, %(clinic)s")
@@ -174,6 +174,7 @@ def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Visits in each period"), visits["in_each_period"]),
         (gettext("Days between visits"), visits["days_between"]),
         (gettext("Days between periods"), visits["days_between_periods"]),
+        (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
         (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
         (gettext("Secondary outcomes (others are exploratory)"), secondary),
