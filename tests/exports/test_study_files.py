@@ -12,6 +12,8 @@ import pytest
 
 from rehab.exports.research.package import Package
 from rehab.exports.research.study_files import VERIFIER
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.studies.allocation.scheme import Secret
@@ -107,6 +109,10 @@ def test_everybody_who_was_allocated_has_a_row_and_every_version_is_there(world,
     study = studied(world)
     close(study, None, NOW + timedelta(days=1))
     files = exported(world.people[Role.RESEARCHER], tmp_path / "parts", study)
+    withdraw_consent(study.enrollments.get(code="VAL-001").patient, Purpose.RESEARCH, None, NOW)
+    again = exported(world.people[Role.RESEARCHER], tmp_path / "again", study)
+    assert len(rows_of(again["studies/VAL/participants.csv"])) == 5
+    assert rows_of(again["studies/VAL/participants.csv"])[0]["pseudonym"] == ""
     rows = rows_of(files["studies/VAL/participants.csv"])
     assert [row["participant"] for row in rows] == [f"VAL-00{n}" for n in range(1, 6)]
     assert all(row["group"] in {"A", "B"} for row in rows)

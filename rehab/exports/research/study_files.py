@@ -1,7 +1,8 @@
 """A study's own files in an export: enough to analyze it again, and to check its allocation.
 
-Everybody who was ever allocated has a row, whether walked, gone or removed: of those who wanted
-their data removed, the code and the allocation alone. Groups are empty until the study is closed.
+Everybody who was ever allocated has a row, walked, gone or removed: without the pseudonym of
+those whose data were removed, or whom the account may not see (any more). Groups are empty until
+the study is closed.
 """
 
 from __future__ import annotations
@@ -66,10 +67,11 @@ def study_files(
 def participant_rows(user: User, study: Study, *, shift_dates: bool) -> Iterator[tuple[Any, ...]]:
     """Yield the cells of `PARTICIPANTS` of everybody who was ever allocated, in their order."""
     related = ("patient", "allocation", "version")
-    enrollments = Enrollment.objects.visible_to(user).filter(study=study).select_related(*related)
+    enrollments = Enrollment.everywhere.filter(study=study).select_related(*related)
+    seen = set(Enrollment.objects.visible_to(user).filter(study=study).values_list("pk", flat=True))
     is_closed = study.state == StudyState.CLOSED
     for number, one in enumerate(enrollments.order_by("allocation__pk"), start=1):
-        pseudonym = one.patient.pseudonym if one.is_analyzed else ""
+        pseudonym = one.patient.pseudonym if one.is_analyzed and one.pk in seen else ""
         shift = shift_of(one.patient.pseudonym) if shift_dates else timedelta()
         yield (
             number,
