@@ -10,13 +10,7 @@ import pytest
 from scipy import stats
 
 from rehab.studies.analysis.curves import CurvePlace, average
-from rehab.studies.analysis.outcomes import (
-    OF_STRIDES,
-    OUTCOMES,
-    History,
-    channel_changes,
-    describe_phases,
-)
+from rehab.studies.analysis.outcomes import OF_STRIDES, OUTCOMES
 from rehab.studies.analysis.participants import (
     ParticipantVisit,
     curves_by_arm,
@@ -24,6 +18,8 @@ from rehab.studies.analysis.participants import (
     flow,
     make_participant,
 )
+from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
+from rehab.studies.analysis.walk_figures import History
 from rehab.studies.analysis.walks import read_walk
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people

@@ -16,12 +16,9 @@ from rehab.studies.analysis.comparison import (
     compare,
 )
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
-from rehab.studies.analysis.outcomes import (
-    History,
-    channel_changes,
-    compute_outcomes,
-    describe_phases,
-)
+from rehab.studies.analysis.outcomes import compute_outcomes
+from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
+from rehab.studies.analysis.walk_figures import History
 from rehab.studies.analysis.walks import Walk
 
 CHANNEL = "channel:"  # begins the slug of a further channel's change: never registered
