@@ -158,17 +158,18 @@ class _Round:
 
     def __init__(self, x: Floats, y: Floats, seen: Flags, parts: Floats, variances: Floats) -> None:
         weight = np.linalg.inv(_covariance(parts, seen, variances, 1.0))
-        weighted = weight @ x  # (n, t, k)
-        self.plain = np.linalg.pinv(np.einsum("ntk,ntl->kl", x, weighted), hermitian=True)
-        self.effects = self.plain @ np.einsum("ntk,nt->k", weighted, y)
+        self._x = x
+        self._across = np.swapaxes(x, 1, 2)
+        self.plain = np.linalg.pinv((self._across @ weight @ x).sum(0), hermitian=True)
+        self.effects = self.plain @ np.einsum("ntk,nt->k", weight @ x, y)
         error = np.einsum("nst,nt->ns", weight, y - x @ self.effects)
         self.squares = np.einsum("ns,vnst,nt->v", error, parts, error)
-        shaped = parts @ weighted  # (v, n, t, k)
-        self.slopes = np.einsum("ntk,vntl->vkl", weighted, shaped)
-        self.products = np.einsum("vnsk,nst,wntl->vwkl", shaped, weight, shaped, optimize=True)
-        both = weight @ parts
-        traces = np.einsum("vnst,wnts->vw", both, both, optimize=True)
-        once = np.einsum("kl,vwlk->vw", self.plain, self.products)
+        weighted = weight @ parts  # (v, n, t, t)
+        inner = weighted @ weight
+        self.slopes = (self._across @ inner @ x).sum(1)  # (v, k, k)
+        self._pairs = weighted[:, None] @ inner[None]  # (v, v, n, t, t)
+        traces = np.einsum("vnst,wnts->vw", weighted, weighted, optimize=True)
+        once = np.einsum("vwnst,nts->vw", self._pairs, x @ self.plain @ self._across)
         mixed = self.plain @ self.slopes
         twice = np.einsum("vkl,wlk->vw", mixed, mixed)
         self.information = (traces - 2 * once + twice) / 2
@@ -176,8 +177,11 @@ class _Round:
     def to_fit(self, span: Floats, freedom: int) -> Fit:
         """Return the fit with the correction of Kenward and Roger."""
         of_variances = np.linalg.pinv(self.information, hermitian=True)
-        crossed = np.einsum("vkl,lm,wmo->vwko", self.slopes, self.plain, self.slopes)
-        inner = np.einsum("vw,vwkl->kl", of_variances, self.products - crossed)
+        pairs = np.einsum("vw,vwnst->nst", of_variances, self._pairs)
+        crossed = np.einsum(
+            "vw,vkl,wlm->km", of_variances, self.slopes @ self.plain, self.slopes, optimize=True
+        )
+        inner = (self._across @ pairs @ self._x).sum(0) - crossed
         adjusted = self.plain + 2 * self.plain @ inner @ self.plain
         slopes = self.plain @ self.slopes @ self.plain
         return Fit(self.effects, span, self.plain, adjusted, slopes, of_variances, freedom)
