@@ -45,7 +45,13 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, Protocol
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.stations.tablets import COOKIE
 from rehab.studies.models import StudyMark, StudyVersion
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.participants import (
+    Allocation,
+    Enrollment,
+    Screening,
+    StudyEvent,
+    StudyVisit,
+)
 from rehab.studies.power_runs import PowerRun
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
@@ -328,6 +334,7 @@ def build_world(name: str) -> World:
         StudyMark.everywhere.get(study=study),
         Enrollment.everywhere.get(study=study),
         Allocation.everywhere.get(enrollment__study=study),
+        Screening.everywhere.get(study=study),
         StudyVisit.everywhere.get(enrollment__study=study),
         PowerRun.everywhere.get(study=study),
         StudyEvent.everywhere.get(study=study),
