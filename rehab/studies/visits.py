@@ -103,6 +103,7 @@ def start_session(
                 number=visit.number,
                 attempt=visit.attempt + 1,
                 period=visit.period,
+                follow_up=visit.follow_up,
                 day=now.date(),
             )
         visit.version = current_version(study)
@@ -112,14 +113,14 @@ def start_session(
                 patient=enrollment.patient,
                 valence=arm.valence,
                 goal=GoalRule(percent_of_baseline=study.goal_percent),
-                phases=arm.phases(),
+                phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
                 variety_seed=variety_seed(study.pk, visit.number),
                 created_by=by,
-                may_change_type=False,  # it is what the arm was allocated for
+                locked=True,
                 **{part.name: getattr(place, part.name) for part in fields(place)},
             )
         )

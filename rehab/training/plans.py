@@ -75,6 +75,8 @@ class PlanSettings:
         Whether goals follow the patient.
     variety_seed
         What the robot's varied answers follow from; None for the session's number.
+    locked
+        Whether what defines the condition stays as it was planned: in a study's session.
     """
 
     goal: GoalRule
@@ -85,6 +87,7 @@ class PlanSettings:
     schedule: Schedule = field(default_factory=Schedule)
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
     variety_seed: int | None = None
+    locked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +182,7 @@ class SessionPlan(PlanSettings):
             adaptation=_read_adaptation(data.get("adaptation")),
             variety_seed=data.get("variety_seed"),
             close_steps=CloseSteps(**data.get("close_steps", {})),
+            locked=data.get("locked", False),
             language=data.get("language", "en"),
         )
 

@@ -9,6 +9,7 @@ from django.db import IntegrityError, transaction
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
@@ -295,3 +296,17 @@ def test_the_robot_s_variants_follow_from_one_seed_for_all_participants_at_a_vis
     ]
     assert plans[0]["variety_seed"] == plans[1]["variety_seed"] == variety_seed(study.pk, 1)
     assert variety_seed(study.pk, 2) != variety_seed(study.pk, 1)
+
+
+def test_a_follow_up_is_registered_planned_and_walked_without_feedback(world):
+    study = running_study(world, visits=1, follow_up_days=30)
+    assert study.versions.get().document["visits"]["days_to_follow_up"] == 30
+    enrollment = enrolled(study, new_patient(world))
+    first, later = enrollment.visits.all()
+    assert (later.day - first.day).days == 30
+    kinds = []
+    for _visit in (first, later):
+        session = start_session(enrollment, Place(), None, NOW)
+        kinds.append([phase["kind"] for phase in session.plan["phases"]])
+        TrainingSession.everywhere.filter(pk=session.pk).update(state="finished")
+    assert kinds == [["baseline", "training", "washout"], ["baseline"]]
