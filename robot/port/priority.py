@@ -22,7 +22,7 @@ MUCH_S = 0.05
 
 
 def raise_priority() -> str:
-    """Give this process, and those that it forks, priority where the rights allow.
+    """Set the highest priority that the rights allow, for this process and those that it forks.
 
     Returns
     -------
