@@ -53,8 +53,9 @@ def test_explicit_feedback_stays_still():
 def test_a_score_is_over_before_its_motion_and_tells_that_it_begins(name):
     gesture = BUILT_IN[name]
     ends_s = ANNOUNCED_S + dry_run(gesture).took_s
-    for entry in (*gesture.score.lights, *gesture.score.notes):
-        assert 0 <= entry.at_s <= ends_s
+    begins_s = [light.at_s for light in gesture.score.lights]
+    begins_s += [note.at_s for note in gesture.score.notes]
+    assert all(0 <= at_s <= ends_s for at_s in begins_s)
     assert gesture.score.lights[0].at_s == gesture.score.notes[0].at_s == 0
     assert gesture.score.quiet == Score(gesture.score.lights)
 

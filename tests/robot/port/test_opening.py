@@ -79,7 +79,7 @@ def test_a_real_port_cannot_even_be_opened(kobuki, monkeypatch):
     assert fcntl.ioctl(port.fileno(), exclusive, b"\0" * 4) == b"\1\0\0\0"
     Path(kobuki.url).chmod(0o666)
     writing = ["/bin/sh", "-c", 'printf moves > "$0"', kobuki.url]
-    user = {"user": 65534} if os.getuid() == 0 else {}  # a superuser is not refused
+    user: Any = {"user": 65534} if os.getuid() == 0 else {}  # a superuser is not refused
     said = subprocess.run(writing, capture_output=True, text=True, cwd="/", **user).stderr.lower()
     assert "busy" in said
     fcntl.ioctl(port.fileno(), termios.TIOCNXCL)

@@ -38,7 +38,7 @@ def ros():
         stack.enter_context(Ticking(robot))
         served = ServedRos(FakeRosbridge(master.node("rosbridge"), has_rosapi=False))
         stack.enter_context(served)
-        served.master, served.robot = master, robot
+        vars(served).update(master=master, robot=robot)
         yield served
 
 
