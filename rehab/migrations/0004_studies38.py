@@ -9,7 +9,7 @@ from django.db import migrations, models
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0002_trust33"),
+        ("rehab", "0003_clinic34"),
     ]
 
     operations = [
