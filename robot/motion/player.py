@@ -199,11 +199,14 @@ class Player:
     def _lift(self, ramped: Twist, wanted: Twist) -> Twist:
         """Return an order that no wheel ignores: at its least speed, or still.
 
-        While it drives, the small turns that keep it on its line are left as they are.
+        While it drives, it is steered by as much as leaves both wheels at that speed.
         """
         v_m_s = _lift(ramped.v_m_s, wanted.v_m_s, self._least.v_m_s)
         if v_m_s:
-            return Twist(v_m_s, ramped.w_rad_s)
+            most_rad_s = math.inf
+            if self._least.v_m_s:
+                most_rad_s = 2 * (abs(v_m_s) - self._least.v_m_s) / WHEELBASE_M
+            return Twist(v_m_s, max(-most_rad_s, min(most_rad_s, ramped.w_rad_s)))
         return Twist(0.0, _lift(ramped.w_rad_s, wanted.w_rad_s, self._least.w_rad_s))
 
     def _rest_of_the_way(self, here: Pose, heading_rad: float) -> list[Segment]:
@@ -213,10 +216,10 @@ class Player:
         """
         rest: list[Segment] = []
         left_m = HOME.seen_from(Pose(here.x_m, here.y_m)).x_m
-        if abs(left_m) > 2 * self._near_m and not self._is_corrected:
+        if abs(left_m) > NEAR_M and not self._is_corrected:
             self._is_corrected = True
             rest.append(Drive(HOME.x_m, HOME.y_m, heading_rad, left_m))
-        if rest or abs(heading_rad - here.heading_rad) > self._near_rad:
+        if rest or abs(heading_rad - here.heading_rad) > NEAR_RAD:
             rest.append(Turn(heading_rad, 0.0))
         return rest
 
