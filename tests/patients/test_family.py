@@ -29,7 +29,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.better_or_worse import Result
 from rehab.sessions.reports.patient_summary import describe_weeks
 from rehab.studies.enrolling import withdraw
-from tests.support.studies import enrolled, running_study
+from tests.support.studies import STROKE, enrolled, running_study
 from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
@@ -116,6 +116,8 @@ def test_the_therapists_forms_come_with_an_origin(agreed):
 
 
 def leave_a_study(world):
+    world.patient.stroke_month = STROKE
+    world.patient.save()
     enrollment = enrolled(running_study(world), world.patient)
     withdraw(enrollment, None, NOW)
     world.patient.refresh_from_db()
