@@ -35,9 +35,7 @@ class OtherLeg:
     ----------
     reasons, flags
         Why the stride is invalid, and what the therapist should know of it.
-    step_s, step_length_m, step_symmetry
-        As in ``Stride``.
-    first_double_support_s, second_double_support_s, weight_ratio
+    step_s … weight_ratio
         As in ``Stride``.
     """
 
@@ -46,8 +44,14 @@ class OtherLeg:
     step_s: float | None = None
     step_length_m: float | None = None
     step_symmetry: float | None = None
+    propulsion_share: float | None = None
+    stance_ratio: float | None = None
+    swing_ratio: float | None = None
+    step_time_ratio: float | None = None
+    step_length_ratio: float | None = None
     first_double_support_s: float | None = None
     second_double_support_s: float | None = None
+    double_support_s: float | None = None
     weight_ratio: float | None = None
 
 

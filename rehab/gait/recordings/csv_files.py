@@ -13,12 +13,16 @@ from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 
+from rehab.gait.recordings.ankle import compute_ankle
 from rehab.gait.recordings.columns import (
     CHANNELS,
+    MARKED,
     OVERGROUND,
+    REQUIRED,
     SIGNAL_LAYOUTS,
     ColumnMap,
     SignalColumn,
+    find_required,
 )
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
@@ -158,16 +162,15 @@ def apply_columns(
         shifted: Floats = np.interp(time + column.delay_s, time, values)
         return shifted
 
-    return time, {
-        side: LegSamples(
-            np.asarray(read(leg["force"])),
-            np.asarray(read(leg["moment"])),
-            np.asarray(read(leg["angle"])),
-            read(leg.get("forward")),
-            read(leg.get("position")),
-        )
-        for side, leg in columns.legs.items()
-    }
+    legs = {}
+    for side, leg in columns.legs.items():
+        values = {channel: np.asarray(read(column)) for channel, column in leg.items()}
+        if find_required(leg) == MARKED:
+            values["moment"], values["angle"] = compute_ankle(values)
+        force, moment, angle = (values[channel] for channel in REQUIRED)
+        further = (values.get(channel) for channel in CHANNELS[3:])
+        legs[side] = LegSamples(force, moment, angle, *further)
+    return time, legs
 
 
 def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None:

@@ -12,7 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
-from rehab.gait.recordings.columns import OVERGROUND, ColumnMap, find_layout, read_column_map
+from rehab.gait.recordings.columns import (
+    OVERGROUND,
+    ColumnMap,
+    find_layout,
+    put_back_filtered,
+    read_column_map,
+)
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.signals.filters import Floats
@@ -93,7 +99,9 @@ def read_any_table(*paths: Path) -> Table:
     return table
 
 
-def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSignals:
+def read_signals(
+    *paths: Path, pairs: Sequence[str] | None = None, filtered_hz: float | None = None
+) -> RecordedSignals:
     """Return the signals of a recording.
 
     Parameters
@@ -102,6 +110,8 @@ def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSi
         The file, or those of one walk. A cell that is not a number is a missing sample: NaN.
     pairs
         Which column is which channel, as for ``read_column_map``; None to decide by the header.
+    filtered_hz
+        Cut-off of the causal low-pass that moments and angles have been through, if any.
 
     Raises
     ------
@@ -112,6 +122,8 @@ def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSi
     """
     path, table = paths[0], read_any_table(*paths)
     columns = read_column_map(pairs) if pairs else find_layout(list(table))
+    if filtered_hz is not None:
+        columns = put_back_filtered(columns, filtered_hz)
     require_columns(path, table, columns)
     names = [column.name for column in columns.columns]
     frame = None if columns.frame is None else columns.frame.name  # an empty one is ignored
