@@ -16,7 +16,7 @@ from tests.support.servers import Server, serve
 from tests.support.trials import AS_ACCOUNT, FAMILY, LEFT_OUT, STALE, TABLETS, VARYING
 from tests.support.visitors import Visitor
 
-pytestmark = pytest.mark.server
+pytestmark = [pytest.mark.server, pytest.mark.timeout(900)]  # of four servers
 SETTINGS = {"GARRY_PROXIES": "1"}
 Seed = Callable[[bool], tuple[Path, dict[str, Any]]]  # whether the sessions have ended
 SEED = """
