@@ -99,6 +99,17 @@ def test_a_file_without_moments_is_measured_from_its_markers(tmp_path):
     assert whole.proposal.guesses["left", "moment"].column == "LAnkleMoment.X"
 
 
+@pytest.mark.parametrize("factor", [0.7376, 0.8, 1.0, 1.2])
+@pytest.mark.parametrize("name", FILES)
+def test_a_moment_with_a_wrong_gain_is_told_by_plates_and_markers(name, factor):
+    """lbf·ft for N·m, and gains that no stride shows: the lever on the force stays a foot's."""
+    table = read_any_table(read_lab_file(FILES[name]))
+    for column in [one for one in table if one.endswith("AnkleMoment.X")]:
+        table[column] = table[column] * factor
+    told = [text for text in check_setup(table).findings if "times what the file's plates" in text]
+    assert bool(told) == (factor != 1.0), told
+
+
 def test_a_c3d_whose_second_axis_is_upward_gets_its_plates(tmp_path):
     path = read_lab_file(FILES["BTK motion3"])
     file, turned = ezc3d.c3d(str(path)), tmp_path / "y_up.c3d"
