@@ -11,7 +11,7 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import Stride
 
-# A stance's moment is 0.95 to 1.03 times that of plates and markers (gaitalytics, BTK's two; offsets
+# A stance's moment is 0.95 to 1.03 times that of plates and markers (gaitalytics, BTK's; offsets
 # up to 0.11 Nm/kg are where a model has its joint). Angles are 0.94 to 1.07 times ours in three of
 # five legs and 1.26 to 1.43 in two, whose models turn the joint otherwise: no gain of them is told.
 USUAL_GAIN = (0.88, 1.12)
