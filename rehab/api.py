@@ -25,6 +25,9 @@ from rehab.people.access import public
 from rehab.people.models import User
 from rehab.people.web.api_base import PerUserThrottle, Rejected, SessionAuth, TokenAuth, check_roles
 from rehab.sessions import api as sessions
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.pages.server.whereabouts import at_clinics_server
+from robot.wire.limits import SERVER_HEADER
 
 
 class Api(NinjaAPI):
@@ -67,6 +70,7 @@ api = Api(
     docs_decorator=for_members,
 )
 api.add_decorator(check_roles)
+api.add_decorator(at_clinics_server)
 for room in (people, sessions, boards, legacy):
     api.add_router("", room.router)
 
@@ -98,6 +102,16 @@ def on_unauthenticated(request: HttpRequest, problem: AuthenticationError) -> Ht
 def on_http_error(request: HttpRequest, problem: HttpError) -> HttpResponse:
     """Answer with what a call refused."""
     return problem_response(request, problem.status_code, str(problem))
+
+
+@api.exception_handler(OwnedElsewhere)
+def on_owned_elsewhere(request: HttpRequest, problem: OwnedElsewhere) -> HttpResponse:
+    """Send a call to the server that has the clinic."""
+    if not problem.server:  # a command
+        return problem_response(request, 409, str(problem))
+    response = problem_response(request, 421, str(problem))
+    response[SERVER_HEADER] = problem.server
+    return response
 
 
 @api.exception_handler(Http404)

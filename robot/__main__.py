@@ -47,6 +47,7 @@ from robot.connection_args import (
 )
 from robot.link import Link, LinkRefused
 from robot.original_topics import TOPICS, OriginalTopics
+from robot.ros.holder import add_driven_base_arguments, find_driven_base
 from robot.worker import Worker
 
 ROBOT_PATH = "/ws/robot/"
@@ -76,6 +77,7 @@ def make_parser() -> ArgumentParser:
         help="publish on these of the original's topics at the rosbridge, beside any base "
         "(without a name: on all)",
     )
+    add_driven_base_arguments(parser)
     parser.add_argument(
         "--black-box",
         default=os.environ.get("GARRY_ROBOT_BLACK_BOX", BLACK_BOX),
@@ -157,7 +159,8 @@ def run(options: Namespace) -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     base, originals = make_base(options, time.monotonic), None
     if options.original_topics is not None:
-        originals = OriginalTopics(options.ros_url, options.original_topics or TOPICS)
+        names = options.original_topics or TOPICS
+        originals = OriginalTopics(options.ros_url, names, find_driven_base(options))
     # By what stays the same: the token of a file is replaced now and then.
     own = token if options.token_file is None else str(options.token_file.resolve())
     folder = find_black_box(options.black_box, own)

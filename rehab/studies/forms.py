@@ -87,11 +87,16 @@ class StudyForm(ClinicForm):
     class Meta:
         model = Study
         fields = (
-            *("code", "title", "question", "participants", "months_since_stroke", "crossover"),
-            *("visits", "days_between", "washout_days", "goal_percent"),
+            *("code", "title", "question", "participants", "months_since_stroke"),
+            *("inclusion", "exclusion", "crossover"),
+            *("visits", "days_between", "washout_days", "follow_up_days", "goal_percent"),
             *("primary_outcome", "secondary_outcomes", "method"),
         )
-        widgets = {"question": forms.Textarea(attrs={"rows": 4})}
+        widgets = {
+            "question": forms.Textarea(attrs={"rows": 4}),
+            "inclusion": forms.Textarea(attrs={"rows": 3}),
+            "exclusion": forms.Textarea(attrs={"rows": 3}),
+        }
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -223,9 +228,16 @@ def save_draft(form: StudyForm, arms: Any) -> Study:
 
 
 class EnrollmentForm(forms.Form):
-    """Who is enrolled in a study, with the level of each factor."""
+    """Who is assessed for a study: the answer to each criterion, the level of each factor."""
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(queryset=None)
+    takes_part = forms.TypedChoiceField(
+        label=_("Takes part"),
+        choices=[("yes", _("yes")), ("no", _("no, declines"))],
+        coerce=lambda answer: answer == "yes",
+        initial="yes",
+        widget=forms.RadioSelect,
+    )
     keep_data = forms.TypedChoiceField(
         label=_("If the patient leaves the study, its sessions"),
         choices=[("yes", _("stay in its results")), ("no", _("are left out of its results"))],
@@ -241,10 +253,25 @@ class EnrollmentForm(forms.Form):
             ended_at=None, erased_at=None
         )
         fields["patient"].label = capfirst(gettext("patient"))
+        for number, criterion in enumerate(study.criteria):
+            fields[f"criterion_{number}"] = forms.ChoiceField(
+                label=criterion,
+                choices=[("yes", gettext("holds")), ("no", gettext("does not hold"))],
+                widget=forms.RadioSelect,
+            )
         for number, (name, levels) in enumerate(study.factors):
             fields[f"level_{number}"] = forms.ChoiceField(
                 label=name, choices=[(level, level) for level in levels], widget=forms.RadioSelect
             )
+
+    @property
+    def met(self) -> list[str]:
+        """The criteria that hold."""
+        return [
+            criterion
+            for number, criterion in enumerate(self.study.criteria)
+            if self.cleaned_data[f"criterion_{number}"] == "yes"
+        ]
 
     @property
     def levels(self) -> tuple[str, ...]:

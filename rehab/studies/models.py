@@ -96,9 +96,27 @@ class Study(ClinicModel):
         blank=True,
         help_text=_("Who may enroll. Empty: every patient, however recent the stroke."),
     )
+    inclusion = models.TextField(
+        _("criteria of inclusion"),
+        max_length=4000,
+        blank=True,
+        help_text=_("One a line. Each is asked when a patient is enrolled, and has to be met."),
+    )
+    exclusion = models.TextField(
+        _("criteria of exclusion"),
+        max_length=4000,
+        blank=True,
+        help_text=_("One a line. Who meets one of them is not enrolled."),
+    )
     visits = models.PositiveSmallIntegerField(_("visits in each period"), default=1)
     days_between = models.PositiveSmallIntegerField(_("days between visits"), default=1)
     washout_days = models.PositiveSmallIntegerField(_("days between periods"), default=7)
+    follow_up_days = models.PositiveSmallIntegerField(
+        _("days to the follow-up"),
+        null=True,
+        blank=True,
+        help_text=_("After the last visit: a baseline, without feedback. Empty: no follow-up."),
+    )
     goal_percent = models.FloatField(
         _("goal (% of baseline)"), default=100, validators=between(50, 200, "%")
     )
@@ -128,9 +146,24 @@ class Study(ClinicModel):
         return self.state == StudyState.DRAFT
 
     @property
+    def inclusion_criteria(self) -> list[str]:
+        """What each participant has to meet."""
+        return list(filter(None, map(str.strip, self.inclusion.splitlines())))
+
+    @property
+    def exclusion_criteria(self) -> list[str]:
+        """What no participant may meet."""
+        return list(filter(None, map(str.strip, self.exclusion.splitlines())))
+
+    @property
+    def criteria(self) -> list[str]:
+        """All that has to hold of a participant, in words: those of exclusion with “not” before."""
+        return [*self.inclusion_criteria, *(f"not: {one}" for one in self.exclusion_criteria)]
+
+    @property
     def visit_plan(self) -> VisitPlan:
         """When participants come. Raises InvalidSetting."""
-        return VisitPlan(self.visits, self.days_between, self.washout_days)
+        return VisitPlan(self.visits, self.days_between, self.washout_days, self.follow_up_days)
 
     def arm_rules(self) -> list[ArmRule]:
         """Return the arms in the form that the rules use. Raises InvalidSetting."""
@@ -247,6 +280,14 @@ class Arm(ScopedModel):
             message = gettext("The protocol of arm %(code)s was deleted. Choose another one.")
             raise InvalidSetting(message % {"code": self.code})
         return self.to_rule().condition.apply_to(self.protocol.to_rules())
+
+    def baseline(self) -> tuple[Phase, ...]:
+        """Return the first baseline alone, which a follow-up walks. Raises InvalidSetting."""
+        found = next((phase for phase in self.phases() if phase.kind == "baseline"), None)
+        if found is None:
+            message = gettext("The protocol of arm %(code)s has no baseline for a follow-up.")
+            raise InvalidSetting(message % {"code": self.code})
+        return (found,)
 
     def to_rule(self) -> ArmRule:
         """Return the arm in the form that the rules use. Raises InvalidSetting."""

@@ -8,7 +8,7 @@ from django.db import models
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.append_only import Allowed
+from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.audit.sealing import ERASED, SealableModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased_by, personal_fields, retained
@@ -117,6 +117,39 @@ class Allocation(SealableModel):
         return self.enrollment.study.arms.get(code=self.group.split("-")[period])
 
 
+class Screening(AppendOnlyModel):
+    """A patient who was assessed for a study: enrolled, not eligible, or not willing.
+
+    ``unmet``: the criteria that were not met, in the words of the study.
+    """
+
+    scope = PatientScope(clinic="study__clinic", patient="patient", tells_condition=False)
+    allowed_changes = (ACCOUNT_DELETED,)
+
+    study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="screenings")
+    patient = models.ForeignKey(Patient, on_delete=models.PROTECT, related_name="screenings")
+    unmet = models.JSONField(default=list)
+    declined = models.BooleanField(default=False)
+    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    at = models.DateTimeField(default=timezone.now)
+
+    personal = personal_fields(
+        {
+            "study patient unmet declined at": retained(
+                "the flow of a study's participants", shown=True, research=False
+            ),
+            "by": retained("staff", shown=False, research=False),
+        }
+    )
+
+    class Meta(AppendOnlyModel.Meta):
+        verbose_name = _("screening")
+        ordering: ClassVar = ["pk"]
+
+    def __str__(self) -> str:
+        return f"{self.study.code}: {self.at:%Y-%m-%d}"
+
+
 class StudyVisit(ScopedModel):
     """A visit that the study plans. An aborted session can be walked again."""
 
@@ -128,6 +161,7 @@ class StudyVisit(ScopedModel):
     number = models.PositiveSmallIntegerField()
     attempt = models.PositiveSmallIntegerField(default=1)
     period = models.PositiveSmallIntegerField()
+    follow_up = models.BooleanField(default=False)
     day = models.DateField(_("day"))
     session = models.OneToOneField(
         TrainingSession, on_delete=models.PROTECT, related_name="study_visit", null=True
@@ -135,7 +169,9 @@ class StudyVisit(ScopedModel):
     # Which version of the study its session was created from.
     version = models.ForeignKey(StudyVersion, on_delete=models.PROTECT, related_name="+", null=True)
 
-    personal = personal_fields({"enrollment number attempt period day session version": OF_STUDY})
+    personal = personal_fields(
+        {"enrollment number attempt period follow_up day session version": OF_STUDY}
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("study visit")

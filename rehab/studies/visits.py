@@ -19,6 +19,7 @@ from rehab.studies.registration.lifecycle import check_no_open_session, current_
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from robot.wire.cue_limits import SEED_MAX
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,11 @@ def next_visit(enrollment: Enrollment) -> StudyVisit | None:
         if visit.session is None or visit.session.state == State.ABORTED:
             return visit
     return None
+
+
+def variety_seed(study_id: int, visit: int) -> int:
+    """Return the seed of the robot's varied answers: the same for all participants at a visit."""
+    return (study_id * 1000 + visit) % SEED_MAX
 
 
 def start_session(
@@ -97,6 +103,7 @@ def start_session(
                 number=visit.number,
                 attempt=visit.attempt + 1,
                 period=visit.period,
+                follow_up=visit.follow_up,
                 day=now.date(),
             )
         visit.version = current_version(study)
@@ -106,13 +113,14 @@ def start_session(
                 patient=enrollment.patient,
                 valence=arm.valence,
                 goal=GoalRule(percent_of_baseline=study.goal_percent),
-                phases=arm.phases(),
+                phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
+                variety_seed=variety_seed(study.pk, visit.number),
                 created_by=by,
-                may_change_type=False,  # it is what the arm was allocated for
+                locked=True,
                 **{part.name: getattr(place, part.name) for part in fields(place)},
             )
         )

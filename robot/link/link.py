@@ -24,12 +24,10 @@ from robot.link.refusals import (
     LinkRefused,
 )
 from robot.wire.close_codes import CloseCode
-from robot.wire.limits import MAX_FRAME_BYTES
+from robot.wire.limits import MAX_FRAME_BYTES, SERVER_HEADER
 
 Message = dict[str, Any]
 
-# Tells a proxy which of several servers to choose: the one that the error `elsewhere` named.
-SERVER_HEADER = "GARRY-Server"
 ADDRESS = re.compile(r"[A-Za-z0-9.:\[\]_-]{1,100}")
 
 

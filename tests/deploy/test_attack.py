@@ -95,8 +95,10 @@ def attack(url: str, made: dict[str, Any], count: int) -> tuple[list[str], Count
         what = f"{method} {place['url']} {body[:200]!r}"
         model = models.get(place["model"] or "")
         route = Route(place["name"], f"{method} {place['url']}", place["owner"], model)
-        if method != "HEAD":
-            problems += what_leaks(actor, route, Said(answer), clinics, row["hidden"])
+        if method != "HEAD":  # a tablet shows the name of its own station
+            own = actor.clinic if actor.role == "device" else ""
+            others: Any = [clinic for clinic in clinics if clinic.name != own]
+            problems += what_leaks(actor, route, Said(answer), others, row["hidden"])
         if any(word in answer.body for word in TELLTALES):
             problems.append(f"{actor.label}: {what} tells how it failed")
         if answer.status >= 500 and place["name"] != "readyz":
@@ -128,7 +130,7 @@ def test_nothing_fails_and_nothing_foreign_is_shown(attacked):
     assert not problems, "\n".join(problems)
     assert statuses.total() == REQUESTS
     for label in ("lead of amber", "pt of birch", "program of a pt of amber", "tablet of amber"):
-        assert statuses[label, 200] > 10, (label, statuses)
+        assert statuses[label, 200] > 5, (label, statuses)
 
 
 def test_the_attack_finds_what_another_clinic_shows(attacked):

@@ -9,6 +9,7 @@ from django.db import IntegrityError, transaction
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
@@ -285,3 +286,17 @@ def test_what_is_asked_is_registered_and_changed_questions_need_a_new_version(wo
     Questionnaire.everywhere.filter(pk=own.pk).update(items="Hungry? | no | very | 5")
     with pytest.raises(InvalidSetting, match="new version"):
         current_version(study)
+
+
+def test_a_follow_up_is_registered_planned_and_walked_without_feedback(world):
+    study = running_study(world, visits=1, follow_up_days=30)
+    assert study.versions.get().document["visits"]["days_to_follow_up"] == 30
+    enrollment = enrolled(study, new_patient(world))
+    first, later = enrollment.visits.all()
+    assert (later.day - first.day).days == 30
+    kinds = []
+    for _visit in (first, later):
+        session = start_session(enrollment, Place(), None, NOW)
+        kinds.append([phase["kind"] for phase in session.plan["phases"]])
+        TrainingSession.everywhere.filter(pk=session.pk).update(state="finished")
+    assert kinds == [["baseline", "training", "washout"], ["baseline"]]

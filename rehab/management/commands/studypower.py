@@ -61,6 +61,8 @@ class Command(BaseCommand):
                 self.stderr.write(f"\r{stored.done} of {stored.simulations} studies", ending="")
                 self.stderr.flush()
         except InvalidSetting as problem:
+            if options["child"]:  # the run has noted it; the server would only start it again
+                return
             raise CommandError(str(problem)) from problem
         self.stderr.write("")
         self.stdout.write(f"Run {run.pk} of {run.study.code}: {run.done} studies")

@@ -42,8 +42,6 @@ UNTRACKED_FIELDS = {
     "rotated_at",
     "token_expires_at",
     "copy_seen_at",
-    "epoch",
-    "owner",
 }
 SECRET_FIELDS = {"password", "pin_hash"}  # that they changed is recorded, never their values
 MASK = "•••"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
@@ -20,6 +21,7 @@ from rehab.studies.forms import EnrollmentForm, PlaceForm
 from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participants import Enrollment
+from rehab.studies.screening import find_unmet, turn_away
 from rehab.studies.unblinding import reveal_arms
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
@@ -35,15 +37,21 @@ def get_enrollment(user: User, enrollment_id: int) -> Enrollment:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
-    """Enroll a patient in a running study."""
-    user = user_of(request)
+    """Assess a patient for a running study: enroll them, or note why not."""
+    user, now = user_of(request), timezone.now()
     study = get_study(user, study_id)
     form = EnrollmentForm(request.POST or None, study=study, by=user)
     if request.method == "POST" and form.is_valid():
         patient, keep_data = form.cleaned_data["patient"], form.cleaned_data["keep_data"]
+        declined = not form.cleaned_data["takes_part"]
         try:
+            unmet = find_unmet(study, patient, form.met, now)
+            if unmet or declined:
+                turn_away(study, patient, unmet, declined=declined, by=user, now=now)
+                messages.success(request, _("Noted in the screening log: not enrolled."))
+                return redirect("study", study_id=study.pk)
             enrollment = enroll(
-                study, patient, form.levels, keep_data=keep_data, by=user, now=timezone.now()
+                study, patient, form.levels, keep_data=keep_data, by=user, now=now, met=form.met
             )
         except InvalidSetting as problem:
             form.add_error(None, refuse(request, problem))

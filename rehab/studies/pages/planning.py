@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -28,12 +26,13 @@ from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
-from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState, has_mark
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.registration.lifecycle import close, register, revise, start
+from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
+from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import write_pdf
-from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.results import may_look
 from rehab.studies.unblinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.visits import next_visit
@@ -123,6 +122,8 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),
+        "primary": dict(OUTCOMES)[first_primary(study)],
+        "changes": outcome_changes(study),
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
@@ -205,27 +206,6 @@ def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpRes
     response = HttpResponse(content, content_type=f"application/{kind}")
     response["Content-Disposition"] = f'attachment; filename="{study.code}-protocol.{kind}"'
     return response
-
-
-def write_json(study: Study) -> str:
-    """Return a registered study with all its versions; of a closed one also the seed."""
-    protocol: dict[str, Any] = {
-        "registered_at": study.registered_at,
-        "closed_at": study.closed_at,
-        "versions": [
-            {
-                "number": version.number,
-                "at": version.at,
-                "reason": version.reason,
-                "sha256": version.digest,
-                "study": version.document,
-            }
-            for version in study.versions.all()
-        ],
-    }
-    if study.state == StudyState.CLOSED and study.sealed:
-        protocol["allocation_secret"] = asdict(unseal(study.sealed))
-    return json.dumps(protocol, indent=2, ensure_ascii=False, default=datetime.isoformat) + "\n"
 
 
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:

@@ -30,7 +30,7 @@ def describe(study: Study) -> dict[str, Any]:
     """Return the study as it is registered. Raises InvalidSetting for one that could not be run."""
     scheme = study.scheme()
     plan = study.visit_plan
-    document = {
+    document: dict[str, Any] = {
         "code": study.code,
         "title": study.title,
         "clinic": study.clinic.name,
@@ -50,6 +50,12 @@ def describe(study: Study) -> dict[str, Any]:
         "secondary_outcomes": study.secondary_outcomes,
         "scoring_rules_version": RULES_VERSION,
     }
+    if plan.follow_up_days is not None:
+        document["visits"]["days_to_follow_up"] = plan.follow_up_days
+        for arm in study.arms.all():
+            arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}
+    document |= {name: asked for name, asked in criteria.items() if asked}
     stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
     return stored
 

@@ -13,7 +13,7 @@ from rehab.training.steps import Side
 from rehab.training.valences import find_valence
 
 OUTCOME = "improvement_over_baseline"
-SECONDARY = ("late_change", "washout_change", "hit_rate", "kept_between_visits")
+SECONDARY = ("late_change", "washout_change", "hit_rate", "between_visits")
 BLOCK_SIZES = (4, 8)
 # Arm, feedback type, and what the arm truly adds [% of the baseline]. Simulated, not measured.
 ARMS = (

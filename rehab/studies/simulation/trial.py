@@ -16,8 +16,8 @@ from rehab.studies.analysis.participants import (
     AnalyzedSession,
     Participant,
     ParticipantVisit,
-    by_arm,
     make_participant,
+    observations,
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.simulation.walkers import ENDLESS, Person, Population, draw_person, walk_through
@@ -128,7 +128,9 @@ def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> AnalyzedSession:
     rows = (of_columns(step) for step in steps if step.side is plan.trained_side)
     better = plan.measure.higher_is_better
     return AnalyzedSession(
-        read_walk(plan.phases, rows, higher_is_better=better), compute_metrics(fold)
+        read_walk(plan.phases, rows, higher_is_better=better),
+        compute_metrics(fold),
+        plan.measure.slug,
     )
 
 
@@ -147,7 +149,7 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
                 kept = trial.population.kept
                 walker = person.at_visit(visit.number, trial.effects[arm], kept)
                 walked = walk_by_fold(trial.plans[arm], walker)
-            planned.append((ParticipantVisit(visit.number, arm), walked))
+            planned.append((ParticipantVisit(visit.number, arm, period=visit.period), walked))
         participants.append(
             make_participant(f"{number:03}", planned, has_left=person.leaves_before > 0)
         )
@@ -156,7 +158,7 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
 
 def differences(
     trial: Trial, participants: Sequence[Participant], slug: str = ""
-) -> list[Difference]:
+) -> tuple[Difference, ...]:
     """Return the differences between all pairs of arms in an outcome.
 
     Parameters
@@ -168,5 +170,5 @@ def differences(
     slug
         The outcome's; empty for the primary one.
     """
-    groups = by_arm(participants, list(trial.plans), slug or trial.outcome)
-    return compare(groups, paired=trial.is_crossover)
+    observed = observations(participants, slug or trial.outcome)
+    return compare(observed, list(trial.plans), crossover=trial.is_crossover).differences

@@ -171,6 +171,8 @@ class Control:
         The part of a mapping that reviews and marks show.
     mark
         How charts point it out; None where they do not.
+    when_locked
+        The values that it may still get where the plan is locked; None where that locks nothing.
     """
 
     kind: str
@@ -196,6 +198,19 @@ class Control:
     joint: str = ": "
     shown_part: str = ""
     mark: ChartMark | None = None
+    when_locked: frozenset[float] | None = None
+
+    def check_lock(self, plan: SessionPlan, value: ChangeValue) -> None:
+        """Raise NotAllowed where a locked plan fixes what the change would alter."""
+        if not plan.locked or self.when_locked is None:
+            return
+        if not isinstance(value, int | float) or value not in self.when_locked:
+            raise NotAllowed(
+                "This session belongs to a study, which fixes the {what}. For safety you can "
+                "always pause or end the session, stop the robot or switch it off: the study's "
+                "results tell it.",
+                what=Marked(self.log_label),
+            )
 
     def next_state(self, state: State) -> State:
         """Return the state after the change.

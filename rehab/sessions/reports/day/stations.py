@@ -58,6 +58,6 @@ def connected_devices(session: TrainingSession, now: datetime) -> dict[str, bool
 
 
 def find_live_session(session: TrainingSession) -> LiveSession | None:
-    """Return the live session, where this process runs or follows it."""
+    """Return the live session, where its clinic lives in this process."""
     running = runtime.peek()
-    return running.find(session.pk) if running else None
+    return running.sessions.get(session.pk) if running else None
