@@ -55,7 +55,9 @@ def compare(name: str) -> Comparison:
         theirs = np.asarray(walk.legs[one.side].moment_nm) / walk.mass_kg
         ours = np.asarray(own.legs[one.side].moment_nm) / walk.mass_kg
         found.rms.append(float(np.sqrt(np.nanmean((ours - theirs)[part] ** 2))))
-        found.noise.append(float(np.sqrt(np.mean((theirs - filtfilt(b, a, theirs))[part] ** 2))))
+        found.noise.append(
+            float(np.sqrt(np.mean((theirs - filtfilt(b, a, np.nan_to_num(theirs)))[part] ** 2)))
+        )
         ends = [abs(s.terminal_contact_s - one.end_s) if s.side == one.side else 9 for s in strides]
         a2 = strides[int(np.argmin(ends))].a2_w_kg
         found.by_power.append(a2 / one.file_a2_w_kg - 1)
