@@ -44,11 +44,11 @@ class OtherLeg:
     step_s: float | None = None
     step_length_m: float | None = None
     step_symmetry: float | None = None
-    propulsion_share: float | None = None
-    stance_ratio: float | None = None
-    swing_ratio: float | None = None
-    step_time_ratio: float | None = None
-    step_length_ratio: float | None = None
+    propulsion_percent: float | None = None
+    stance_ratio_percent: float | None = None
+    swing_ratio_percent: float | None = None
+    step_time_ratio_percent: float | None = None
+    step_length_ratio_percent: float | None = None
     first_double_support_s: float | None = None
     second_double_support_s: float | None = None
     double_support_s: float | None = None

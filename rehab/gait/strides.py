@@ -96,10 +96,10 @@ class Stride(NamedTuple):
         the two last step lengths.
     first_double_support_s, second_double_support_s, double_support_s
         Both feet on the floor after this initial and before this terminal contact, and both [s].
-    propulsion_share
+    propulsion_percent
         Propulsion impulse of this leg by that of both: of the paretic leg, paretic propulsion
         (Bowden 2006).
-    stance_ratio, swing_ratio, step_time_ratio, step_length_ratio
+    stance_ratio_percent, swing_ratio_percent, step_time_ratio_percent, step_length_ratio_percent
         This leg's newest by the other's before it, 1 where both are alike (Patterson 2010, Gait
         Posture 31:241).
     weight_ratio
@@ -136,11 +136,11 @@ class Stride(NamedTuple):
     first_double_support_s: float | None = None
     second_double_support_s: float | None = None
     double_support_s: float | None = None
-    propulsion_share: float | None = None
-    stance_ratio: float | None = None
-    swing_ratio: float | None = None
-    step_time_ratio: float | None = None
-    step_length_ratio: float | None = None
+    propulsion_percent: float | None = None
+    stance_ratio_percent: float | None = None
+    swing_ratio_percent: float | None = None
+    step_time_ratio_percent: float | None = None
+    step_length_ratio_percent: float | None = None
     weight_ratio: float | None = None
 
 

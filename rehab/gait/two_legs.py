@@ -171,11 +171,11 @@ class TwoLegDetector(Detector):
             step_s=step.step_s,
             step_length_m=length,
             step_symmetry=_find_symmetry(length, last.length_m),
-            propulsion_share=_find_share(step.impulse, last.impulse),
-            stance_ratio=_find_ratio(step.stance_s, last.stance_s),
-            swing_ratio=_find_ratio(step.swing_s, last.swing_s),
-            step_time_ratio=_find_ratio(step.step_s, last.step_s),
-            step_length_ratio=_find_ratio(length, last.length_m),
+            propulsion_percent=_find_share(step.impulse, last.impulse),
+            stance_ratio_percent=_find_ratio(step.stance_s, last.stance_s),
+            swing_ratio_percent=_find_ratio(step.swing_s, last.swing_s),
+            step_time_ratio_percent=_find_ratio(step.step_s, last.step_s),
+            step_length_ratio_percent=_find_ratio(length, last.length_m),
             first_double_support_s=doubles[0],
             second_double_support_s=doubles[1],
             double_support_s=None if None in doubles else math.fsum(filter(None, doubles)),
@@ -261,10 +261,10 @@ def _find_symmetry(this_m: float | None, other_m: float | None) -> float | None:
 def _find_ratio(this: float | None, other: float | None) -> float | None:
     if this is None or other is None or not other > 0:
         return None
-    return this / other
+    return 100 * this / other
 
 
 def _find_share(this: float | None, other: float | None) -> float | None:
     if this is None or other is None or not this + other > 0:
         return None
-    return this / (this + other)
+    return 100 * this / (this + other)

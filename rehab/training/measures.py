@@ -236,7 +236,36 @@ WORN_MEASURES = (
     ),
 )
 
-MEASURES: dict[str, Measure] = {one.slug: one for one in (A2, *WORN_MEASURES)}
+# Of force plates (docs/sources.md#other-measures): slug, name, unit, channel, the largest value and
+# goal that walking reaches, the first goal (a healthy walk's, moore2013), whether more is better.
+_PLATES = (
+    ("propulsion_peak", gettext_noop("propulsion (peak force)"), "N/kg", "propulsion_n_kg",
+     8.0, 6.0, 1.0, True),
+    ("propulsion_impulse", gettext_noop("propulsion (impulse)"), "N·s/kg",
+     "propulsion_impulse_n_s_kg", 3.0, 2.0, 0.25, True),
+    ("propulsion_share", gettext_noop("this leg’s share of propulsion"), "%", "propulsion_percent",
+     100.0, 100.0, 50.0, True),
+    ("braking_impulse", gettext_noop("braking (impulse)"), "N·s/kg", "braking_impulse_n_s_kg",
+     3.0, 2.0, 0.2, False),
+    ("step_length", gettext_noop("step length"), "m", "step_length_m", 1.8, 1.5, 0.5, True),
+    ("step_length_ratio", gettext_noop("step length by the other leg’s"), "%",
+     "step_length_ratio_percent", 500.0, 200.0, 100.0, True),
+    ("step_time", gettext_noop("step time"), "s", "step_s", 4.0, 3.0, 0.6, False),
+    ("step_time_ratio", gettext_noop("step time by the other leg’s"), "%",
+     "step_time_ratio_percent", 500.0, 200.0, 100.0, False),
+    ("stance_ratio", gettext_noop("stance time by the other leg’s"), "%", "stance_ratio_percent",
+     500.0, 200.0, 100.0, True),
+    ("swing_ratio", gettext_noop("swing time by the other leg’s"), "%", "swing_ratio_percent",
+     500.0, 200.0, 100.0, False),
+    ("double_support", gettext_noop("double support"), "s", "double_support_s",
+     4.0, 3.0, 0.4, False),
+)  # fmt: skip
+PLATE_MEASURES = tuple(
+    Measure(slug, name, unit, 0.0, most, 0.0, most_goal, is_more, channel, first_goal)
+    for slug, name, unit, channel, most, most_goal, first_goal, is_more in _PLATES
+)
+
+MEASURES: dict[str, Measure] = {one.slug: one for one in (A2, *PLATE_MEASURES, *WORN_MEASURES)}
 WORN_CHANNELS = {one.channel for one in WORN_MEASURES}
 
 

@@ -13,7 +13,9 @@ from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, measure_strides
 from rehab.sources.intake.measurements import to_measurement
-from rehab.training.steps import Side
+from rehab.training.measures import PLATE_MEASURES
+from rehab.training.scoring import judge
+from rehab.training.steps import Side, select_value
 from robot.wire.limits import MAX_EXTRA
 from tests.gait.corpus import CorpusWalk, find_stances
 from tests.gait.walks import read_moore, read_moore_columns
@@ -76,14 +78,14 @@ def measure_by_numpy():
             continue
         earlier_figures = found[OTHER[side], max(earlier)]
         for name, what in (
-            ("stance_ratio", "stance_s"),
-            ("swing_ratio", "swing_s"),
-            ("step_time_ratio", "step_s"),
-            ("step_length_ratio", "step_length_m"),
+            ("stance_ratio_percent", "stance_s"),
+            ("swing_ratio_percent", "swing_s"),
+            ("step_time_ratio_percent", "step_s"),
+            ("step_length_ratio_percent", "step_length_m"),
         ):
-            figures[name] = figures[what] / earlier_figures[what]
+            figures[name] = 100 * figures[what] / earlier_figures[what]
         impulses = [one["propulsion_impulse_n_s_kg"] for one in (figures, earlier_figures)]
-        figures["propulsion_share"] = impulses[0] / sum(impulses)
+        figures["propulsion_percent"] = 100 * impulses[0] / sum(impulses)
     return found
 
 
@@ -98,11 +100,11 @@ def measure_by_numpy():
         ("propulsion_n_kg", 0.03, 0.06),
         ("propulsion_impulse_n_s_kg", 0.004, 0.009),
         ("braking_impulse_n_s_kg", 0.004, 0.009),
-        ("propulsion_share", 0.003, 0.012),
-        ("stance_ratio", 0.01, 0.03),
-        ("swing_ratio", 0.02, 0.05),
-        ("step_time_ratio", 0.012, 0.03),
-        ("step_length_ratio", 0.005, 0.02),
+        ("propulsion_percent", 0.3, 1.2),
+        ("stance_ratio_percent", 1.0, 3.0),
+        ("swing_ratio_percent", 2.0, 5.0),
+        ("step_time_ratio_percent", 1.2, 3.0),
+        ("step_length_ratio_percent", 0.5, 2.0),
     ],
 )
 def test_against_numpy_alone(name, median, most):
@@ -130,8 +132,21 @@ def test_all_of_them_travel_with_a_step():
     _, strides = open_walk()
     whole = next(s for s in strides[10:] if s.valid)
     extra = to_measurement(whole, 1, Side.LEFT).extra
-    assert {"propulsion_share", "stance_ratio", "braking_impulse_n_s_kg"} <= extra.keys()
+    assert {"propulsion_percent", "stance_ratio_percent", "braking_impulse_n_s_kg"} <= extra.keys()
     assert len(extra) <= MAX_EXTRA
+
+
+@pytest.mark.parametrize("measure", PLATE_MEASURES, ids=lambda one: one.slug)
+def test_each_is_a_measure_that_can_be_trained(measure):
+    """A healthy walk has it, within its bounds, near the first goal."""
+    _, strides = open_walk()
+    steps = [to_measurement(s, n, Side.LEFT) for n, s in enumerate(strides, start=1) if s.valid]
+    values = [select_value(step, measure).value for step in steps]
+    known = [value for value in values if value is not None]
+    assert len(known) > 0.9 * len(values)
+    assert all(measure.value_min <= value <= measure.value_max for value in known)
+    performance = judge(measure, float(np.median(known)), 1.0, measure.first_goal).performance
+    assert 0.7 < performance < 1.4
 
 
 def test_steps_are_compared_with_the_other_legs_newest_alone():
@@ -140,5 +155,5 @@ def test_steps_are_compared_with_the_other_legs_newest_alone():
     t_s = np.where(walk.t_s > 30, walk.t_s + 4.0, walk.t_s)
     strides = measure_strides(t_s, walk.legs, rate_hz=100, mass_kg=walk.mass_kg)
     after = [s for s in strides if s.initial_contact_s > 34.0]
-    assert after[0].stance_ratio is None
-    assert all(s.stance_ratio is not None for s in after[3:10] if s.valid)
+    assert after[0].stance_ratio_percent is None
+    assert all(s.stance_ratio_percent is not None for s in after[3:10] if s.valid)

@@ -55,7 +55,9 @@ def compare(name: str) -> Comparison:
         theirs = np.asarray(walk.legs[one.side].moment_nm) / walk.mass_kg
         ours = np.asarray(own.legs[one.side].moment_nm) / walk.mass_kg
         found.rms.append(float(np.sqrt(np.nanmean((ours - theirs)[part] ** 2))))
-        found.noise.append(float(np.sqrt(np.mean((theirs - filtfilt(b, a, theirs))[part] ** 2))))
+        found.noise.append(
+            float(np.sqrt(np.mean((theirs - filtfilt(b, a, np.nan_to_num(theirs)))[part] ** 2)))
+        )
         ends = [abs(s.terminal_contact_s - one.end_s) if s.side == one.side else 9 for s in strides]
         a2 = strides[int(np.argmin(ends))].a2_w_kg
         found.by_power.append(a2 / one.file_a2_w_kg - 1)
@@ -97,6 +99,17 @@ def test_a_file_without_moments_is_measured_from_its_markers(tmp_path):
     assert check.valid >= 2
     whole = check_setup(read_any_table(read_lab_file(FILES["BTK motion3"])))
     assert whole.proposal.guesses["left", "moment"].column == "LAnkleMoment.X"
+
+
+@pytest.mark.parametrize("factor", [0.7376, 0.8, 1.0, 1.2])
+@pytest.mark.parametrize("name", FILES)
+def test_a_moment_with_a_wrong_gain_is_told_by_plates_and_markers(name, factor):
+    """lbf·ft for N·m, and gains that no stride shows: the lever on the force stays a foot's."""
+    table = read_any_table(read_lab_file(FILES[name]))
+    for column in [one for one in table if one.endswith("AnkleMoment.X")]:
+        table[column] = table[column] * factor
+    told = [text for text in check_setup(table).findings if "times what the file's plates" in text]
+    assert bool(told) == (factor != 1.0), told
 
 
 def test_a_c3d_whose_second_axis_is_upward_gets_its_plates(tmp_path):

@@ -18,6 +18,7 @@ class FakeGarry:
 
     def __init__(self) -> None:
         self.url = ""
+        self.measure = "a2"
         self.session: int | None = 7
         self.state = "running"
         self.phase = {"kind": "training", "name": "Push", "feedback": True, "gain": 1.0}
@@ -83,7 +84,7 @@ class FakeGarry:
         message: Message = {"type": "welcome", "session": self.session}
         if self.session is not None:
             message |= {"state": self.state, "next": len(self.log) + 1, "goal": 3.9}
-            message |= {"trained_side": "right", "measure": "a2", "unit": "W/kg"}
+            message |= {"trained_side": "right", "measure": self.measure, "unit": "W/kg"}
             message |= {"phase": self.phase}
         await socket.send(json.dumps(message))
 

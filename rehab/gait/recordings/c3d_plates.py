@@ -46,6 +46,8 @@ def add_plates(file: Any, table: Table) -> None:
         return
     if not ((channels >= 0) & (channels <= len(labels))).all() or not len(types):
         return
+    if corners.shape[:2] != (3, 4) or not corners.shape[2] == channels.shape[1] == len(types):
+        return
     unit = read_values(file, "POINT", "UNITS")
     to_m = {"m": 1.0, "cm": 0.01}.get(str(unit[0]).strip(), 0.001) if len(unit) else 0.001
     corners_m = to_m * corners.transpose(2, 1, 0)
@@ -126,10 +128,11 @@ def _read_plate(
     else:
         in_nm = kind == 2 and table.units.get(labels[channels[3] - 1], "").strip() in {"Nm", "N.m"}
         along = corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]
-        x, y = (edge / np.linalg.norm(edge) for edge in along)
+        x, y = (edge / max(float(np.linalg.norm(edge)), 1e-9) for edge in along)
         turn = np.array([x, y, np.cross(x, y)])  # the plate's axes, in the file's
         origins = np.asarray(read_values(file, "FORCE_PLATFORM", "ORIGIN"), dtype=np.float64)
-        sensor_m = to_m * origins[:, plate] if origins.ndim == 2 else np.zeros(3)
+        is_known = origins.ndim == 2 and origins.shape[0] == 3 and origins.shape[1] > plate
+        sensor_m = to_m * origins[:, plate] if is_known else np.zeros(3)
         # From the surface to the sensor, which lies below it, where the plate's third axis points.
         sensor_m = (sensor_m if sensor_m[2] >= 0 else -sensor_m) @ turn
         force = turn.T @ rows[:3]
@@ -148,11 +151,13 @@ def _find_direction(markers: dict[tuple[str, str], Floats]) -> Floats | None:
         for side in SIDES
         if (side, "toe") in markers
     ]
-    if len(feet) < 2:
-        return None
-    ahead: Floats = sum(np.nanmean(foot / np.linalg.norm(foot, axis=0), axis=1) for foot in feet)
-    length = float(np.linalg.norm(ahead))
-    return ahead / length if length > 1 else None  # of two: they turn, or are no feet
+    ahead = np.zeros(2)
+    for foot in feet:
+        length = np.linalg.norm(foot, axis=0)
+        known = np.isfinite(length) & (length > 0)
+        ahead += (foot[:, known] / length[known]).sum(axis=1) / max(1, np.count_nonzero(known))
+    size = float(np.linalg.norm(ahead))
+    return ahead / size if size > 1 else None  # of two: else they turn, or are no feet
 
 
 def _compute(

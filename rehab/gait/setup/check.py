@@ -16,6 +16,7 @@ from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import find_deceleration_peak
 from rehab.gait.setup.find_columns import CERTAIN_LIKE, Proposal, propose
 from rehab.gait.setup.names import read_label
+from rehab.gait.setup.own_kinetics import compare_with_own
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
@@ -117,6 +118,7 @@ def check_setup(
         f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt
     ]
     findings += _describe_missing(proposal) + _describe_timing(timing)
+    findings += compare_with_own(columns, time_s, legs, strides)
     findings += [finding.message for finding in check.findings]
     return SetupCheck(
         proposal=proposal,

@@ -18,6 +18,7 @@ from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import Recording
 from rehab.sources.synthetic import SyntheticWalker
+from rehab.sources.synthetic.measured import express, show_goal
 from rehab.training.changes import ChangeKind
 from rehab.training.fold import SessionFold
 from rehab.training.measures import A2
@@ -50,9 +51,10 @@ def simulate_strides(
     walker: SyntheticWalker, fold: SessionFold, count: int
 ) -> Iterator[Measurement]:
     """Yield a simulated patient's strides, each made for the session's phase and goal."""
+    measure = fold.plan.measure
     for _ in range(count):
-        walker.goal_w_kg = fold.goal
-        yield walker.next_stride(fold.phase)
+        show_goal(walker, fold.goal, measure)
+        yield express(walker.next_stride(fold.phase), walker, measure)
 
 
 async def run_session(

@@ -122,6 +122,7 @@ class SessionFollower:
         self.lost += self._queue.join(_read(message, "session", int), next_number, side)
         self.goal = self._feed.goal = _read_goal(message)
         self.unit = str(message.get("unit", ""))
+        self._feed.measure = str(message.get("measure", self._feed.measure))
         self._feed.phase = self._read_phase(message)
         if is_new:
             self._feed.start_session(side, next_number - 1)

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from rehab.sources.client.playback import UNSENT_MAX
 from rehab.sources.client.step_queue import add_own_reason
+from rehab.training.measures import A2
 from rehab.training.phases import make_phase
 from rehab.training.steps import InvalidReason, Measurement, Side
 from robot.wire.clocks import RemoteClock
@@ -24,8 +25,8 @@ class LiveFeed:
 
     Attributes
     ----------
-    phase, goal, valence
-        The session's phase, goal and feedback type, as far as they are known.
+    phase, goal, valence, measure
+        The session's phase, goal, feedback type and measure, as far as they are known.
     trained_side
         The leg that the session trains, None before there was a session.
     excluded
@@ -45,6 +46,7 @@ class LiveFeed:
         self.phase = make_phase("training")
         self.goal: float | None = None
         self.valence = "positive"
+        self.measure = A2.slug
         self.trained_side: Side | None = None
         self.excluded = self.refused = self.resumed = 0
         self.on_change: Callable[[], None] = lambda: None

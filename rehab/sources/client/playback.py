@@ -7,17 +7,19 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+from rehab.training.measures import A2
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_STEPS
 
 
 class Display(NamedTuple):
-    """What a stride is walked with: phase, goal (None until it is known) and feedback type."""
+    """What a stride is walked with: phase, goal (None if unknown), feedback type, measure."""
 
     phase: Phase
     goal: float | None
     valence: str
+    measure: str = A2.slug
 
 
 # Returns the next stride, walked with that; None at the end.
@@ -93,7 +95,7 @@ class StridePlayback:
 
     Attributes
     ----------
-    phase, goal, valence
+    phase, goal, valence, measure
         What the next stride is walked with: ``Display``.
     """
 
@@ -112,6 +114,7 @@ class StridePlayback:
         self.phase = make_phase("training")
         self.goal: float | None = None
         self.valence = "positive"
+        self.measure = A2.slug
         self._open_walk = open_walk
         self._clock = PlaybackClock(speed, monotonic)
         self._max_unacknowledged = max_unacknowledged
@@ -122,7 +125,7 @@ class StridePlayback:
 
     @property
     def _display(self) -> Display:
-        return Display(self.phase, self.goal, self.valence)
+        return Display(self.phase, self.goal, self.valence, self.measure)
 
     @property
     def speed(self) -> float | None:

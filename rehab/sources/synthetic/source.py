@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 from rehab.sources.client import Display, NextStride
 from rehab.sources.reporting import Notify
 from rehab.sources.source import PlayedSource
+from rehab.sources.synthetic.measured import express, show_goal
 from rehab.sources.synthetic.profiles import PROFILES
 from rehab.sources.synthetic.walker import SyntheticWalker
+from rehab.training.measures import A2, MEASURES
 from rehab.training.steps import Measurement, Side
 
 if TYPE_CHECKING:
@@ -59,8 +61,13 @@ class SyntheticSource(PlayedSource):
         def walk(display: Display) -> Measurement | None:
             nonlocal left
             left -= 1
-            walker.goal_w_kg, walker.valence = display.goal, display.valence
-            return strider.next_stride(display.phase) if left >= 0 else None
+            measure = MEASURES.get(display.measure, A2)
+            show_goal(walker, display.goal, measure)
+            walker.valence = display.valence
+            if left < 0:
+                return None
+            stride = strider.next_stride(display.phase)
+            return express(stride, walker, measure) if strider is walker else stride
 
         return walk
 

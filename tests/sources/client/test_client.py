@@ -171,6 +171,24 @@ async def test_a_server_that_does_not_speak_the_protocol_is_refused(garry, messa
             await run(make_client(garry, even_walk()))
 
 
+async def test_a_walk_is_told_what_its_session_measures(garry):
+    garry.measure = "step_length"
+    told = []
+
+    def open_walk(side):
+        walk = even_walk(3)(side)
+
+        def stride(display):
+            told.append(display.measure)
+            return walk(display)
+
+        return stride
+
+    async with serve_garry(garry):
+        await run(make_client(garry, open_walk))
+    assert set(told) == {"step_length"}
+
+
 async def test_words_that_it_does_not_know_are_no_reason_to_stop(garry):
     garry.state = "ready"
     async with serve_garry(garry), running(make_client(garry, even_walk(5))) as task:

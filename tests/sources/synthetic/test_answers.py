@@ -11,8 +11,9 @@ import pytest
 from rehab.sources.client import Display
 from rehab.sources.synthetic import ANSWERS, GOOD, PROFILES, SyntheticWalker, walk
 from rehab.sources.synthetic.source import SyntheticSource
+from rehab.training.measures import MEASURES
 from rehab.training.phases import make_phase
-from rehab.training.steps import Side
+from rehab.training.steps import Side, select_value
 from tests.sources.synthetic.protocols import usable
 
 
@@ -38,6 +39,31 @@ def test_a_live_walker_answers_as_a_headless_one(valence):
 
     for _ in range(300):
         assert live(Display(training(0.9), 4.4, valence)) == headless.next_stride(training(0.9))
+
+
+@pytest.mark.parametrize("measure", MEASURES.values(), ids=lambda one: one.slug)
+def test_every_measure_is_walked_and_answers_its_goal(measure):
+    """Begun at a healthy walk's value; trained in the measure's better direction."""
+    options = Namespace(seed=3, profile="good", side=None, signals=False, strides=None)
+    live = SyntheticSource(options, print).open_walk(Side.LEFT)
+    baseline = make_phase("baseline")
+    goal = measure.offered_goal
+
+    def values(phase, count):
+        found = []
+        for _ in range(count):
+            stride = live(Display(phase, goal, "positive", measure.slug))
+            value = select_value(stride, measure).value
+            if value is not None and not stride.reasons:
+                assert measure.value_min <= value <= measure.value_max
+                found.append(value)
+        return found
+
+    usual = mean(values(baseline, 100))
+    trained = mean(values(training(0.85), 600)[-200:])
+    assert usual == pytest.approx(goal, rel=0.15)
+    better = trained / usual if measure.higher_is_better else usual / trained
+    assert better > 1.05
 
 
 def test_the_plateau_follows_the_gain():
