@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import csv
 import json
+import os
+import socket
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ from typing import Any
 import pytest
 from django.core.management import CommandError, call_command
 
+from rehab.sessions.live.database import owners
 from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -19,7 +22,7 @@ from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.recording import read_recording
 from rehab.training.goals import GoalRule
 from tests.support.data import recording
-from tests.support.world import build_world
+from tests.support.world import build_world, set_owner
 
 pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection
 
@@ -199,3 +202,13 @@ def test_a_run_that_breaks_leaves_an_aborted_session_with_its_steps(tmp_path):
     session.refresh_from_db()
     assert session.state == "aborted"
     assert Step.everywhere.filter(session=session).count() == 2
+
+
+def test_a_clinic_that_another_process_runs_is_refused_before_anything_is_stored():
+    world, parent = build_world("amber"), os.getppid()
+    owner = f"{socket.gethostname()}|{parent}|{owners._start_time(parent)}"
+    set_owner(world.clinic.pk, owner)
+    before = TrainingSession.everywhere.count()
+    with pytest.raises(CommandError, match=rf"another process \({parent}\).* --clinic"):
+        run("--synthetic", 1, "--valence", "binary", "--clinic", world.clinic.name)
+    assert TrainingSession.everywhere.count() == before

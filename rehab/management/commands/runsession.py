@@ -15,6 +15,7 @@ from django.core.management import BaseCommand, CommandError
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.sign_in.first_start import first_clinic, prepare_database
+from rehab.sessions.live.database.owners import OwnedElsewhere, find_elsewhere
 from rehab.sessions.live.headless import (
     Pace,
     robot_steps,
@@ -111,6 +112,8 @@ class Command(BaseCommand):
         prepare_database()
         try:
             figures = self._run(options)
+        except OwnedElsewhere as problem:
+            raise CommandError(f"{problem} Or name another clinic: --clinic.") from problem
         except (InvalidSetting, RecordingError) as problem:
             raise CommandError(str(problem)) from problem
         self.stdout.write(json.dumps(figures, indent=2) if options["json"] else describe(figures))
@@ -124,9 +127,12 @@ class Command(BaseCommand):
         side = side or Side.LEFT
         phases, goal = recorded_plan(recording, options) if recording else synthetic_plan(options)
         began = time.perf_counter()
+        patient = find_patient(options, side)
+        if (problem := find_elsewhere(patient.clinic_id)) is not None:
+            raise problem
         session = create_session(
             SessionRequest(
-                patient=find_patient(options, side),
+                patient=patient,
                 valence=options["valence"],
                 goal=goal,
                 phases=phases,

@@ -22,6 +22,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
+from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.headless import GIVE_WAY_S, Pace
 from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES, name_pair, write_table
@@ -74,7 +75,7 @@ class Command(BaseCommand):
             for done in walk_study(study, trial, seed, now, give_way):
                 self._tell(f"{done} of {trial.participants} participants")
             results = finish_study(study, now)
-        except InvalidSetting as problem:
+        except (InvalidSetting, OwnedElsewhere) as problem:
             raise CommandError(str(problem)) from problem
         self.stderr.write("")
         with translation.override("en"):

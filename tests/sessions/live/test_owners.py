@@ -95,6 +95,22 @@ async def test_of_two_that_claim_a_clinic_at_once_one_has_it(place, monkeypatch)
     assert refused == [None]
 
 
+async def test_a_clinic_released_while_it_is_claimed_is_no_dead_servers(place, begun, monkeypatch):
+    session = await begun(place)
+    await runtimes.current().drain()
+    await own(session, f"{HOST}|{dead_pid()}|5")
+    find = owners.find_elsewhere
+
+    def find_late(clinic_id: int, owner: str) -> Any:
+        found = find(clinic_id, owner)
+        set_owner(clinic_id, owners.HANDED_ON)
+        return found
+
+    monkeypatch.setattr(owners, "find_elsewhere", find_late)
+    claimed = await sync_to_async(owners.claim)(place.clinic.pk)
+    assert (claimed.running, claimed.is_orphaned) == ([session.pk], False)
+
+
 FAKE_PS = """#!/bin/sh
 test "$*" = "-o lstart= -p {pid}" || exit 1
 echo "$LC_ALL $TZ  {when}  "

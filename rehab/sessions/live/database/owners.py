@@ -164,8 +164,9 @@ def claim(clinic_id: int) -> Claim:
         row = ClinicOwner.everywhere.get(pk=clinic_id)
         if (problem := find_elsewhere(clinic_id, row.owner)) is not None:
             raise problem
-        still = ClinicOwner.everywhere.filter(pk=clinic_id, epoch=row.epoch)
-        if still.update(epoch=row.epoch + 1, owner=own_name()):  # else another was faster
+        still = ClinicOwner.everywhere.filter(pk=clinic_id, epoch=row.epoch, owner=row.owner)
+        # Else another one was faster, or has just released it in order.
+        if still.update(epoch=row.epoch + 1, owner=own_name()):
             there = TrainingSession.everywhere.filter(clinic=clinic_id, state=State.RUNNING.value)
             running = list(there.order_by("pk").values_list("pk", flat=True))
             return Claim(clinic_id, row.epoch + 1, running, row.owner not in (*FREE, own_name()))
