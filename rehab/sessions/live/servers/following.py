@@ -36,9 +36,10 @@ from rehab.training.steps import InvalidMeasurement
 
 READ_TOGETHER = 100  # sessions of one query
 LATE = timedelta(seconds=2)  # a step that was read so long after it came is not shown as live
-WHO = ("source", "robot", "tablets", "storage")  # of the presence
+WHO = ("source", "source_trouble", "robot", "tablets", "storage")  # of the presence
 NO_ONE: Message = {
     "source": False,
+    "source_trouble": "",
     "robot": False,
     "tablets": 0,
     "stride_ago_s": None,

@@ -72,6 +72,7 @@ class LiveSession:
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
         self.source: ConnectedDevice | None = None
         self.source_clock: Lateness | None = None  # of its latest run
+        self.source_trouble = ""  # what a worn sensor says of itself
         self.robot: ConnectedDevice | None = None
         self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
         self.tablets = 0
@@ -219,6 +220,7 @@ class LiveSession:
         tablets = self.tablets + sum(one.tablets for one in self.feed.subscribers)
         return {
             "source": self.source is not None,
+            "source_trouble": self.source_trouble if self.source else "",
             "robot": self.robot is not None,
             "tablets": tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),
