@@ -1,0 +1,129 @@
+"""A phone on a shin: from the square that it scans to strides, whatever happens to it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.browsers import PATIENCE_MS, Visit
+from tests.support.servers import Server
+from tests.support.simulated_leg import random_mounting, walk_foot
+from tests.support.walk_seed import make_walks
+
+pytestmark = [pytest.mark.browser, pytest.mark.essential]
+
+# What a phone's browser says of a sample, as fast as it is given. Times are the phone's own.
+FEED = """([t0, rows]) => rows.forEach(([t, ax, ay, az, gx, gy, gz]) => {
+  const event = new DeviceMotionEvent("devicemotion", {
+    interval: 16,
+    accelerationIncludingGravity: { x: ax, y: ay, z: az },
+    rotationRate: { beta: gx, gamma: gy, alpha: gz },
+  });
+  Object.defineProperty(event, "timeStamp", { value: t0 + 1000 * t });
+  window.dispatchEvent(event);
+})"""
+
+
+class WornPhone:
+    """A phone's page, fed with the samples of a simulated leg."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        t_s, rate, acceleration = walk_foot(120, rate_hz=60)
+        rate[t_s < 4], acceleration[t_s < 4] = 0, (0, 0, 9.81)
+        matrix = random_mounting(3)
+        # An iPhone's acceleration has the other sign.
+        self._table = np.column_stack((t_s, -acceleration @ matrix.T, np.degrees(rate) @ matrix.T))
+        self._t_s = t_s
+        self._start_ms = page.evaluate("performance.now()")
+
+    def walk(self, begin_s: float, end_s: float) -> None:
+        """Feed it with the samples of that time."""
+        part = self._table[(self._t_s >= begin_s) & (self._t_s < end_s)]
+        self.page.evaluate(FEED, [self._start_ms, part.tolist()])
+
+    def restart_clock(self, walked_s: float) -> None:
+        """Go on after a reload, when the page's clock has begun anew."""
+        self._start_ms = self.page.evaluate("performance.now()") - 1000 * walked_s
+
+    @property
+    def strides(self) -> int:
+        """How many the page has found since it was loaded."""
+        return int(self.page.inner_text("[data-show=strides]"))
+
+
+def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: Visit):
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    pt = visit(walk.monitor_path, walk, size="laptop")
+    with browser.new_context(base_url=server.url) as pocket:
+        pocket.set_default_timeout(PATIENCE_MS)
+        page = pocket.new_page()
+        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
+        assert walk.source not in page.url  # it leaves the address at once
+        page.click("[data-begin]")
+        phone = WornPhone(page)
+        phone.walk(0, 4)
+        expect(page.locator("[data-check=still]")).to_have_class("done")
+        pt.click("[data-main]")  # the session starts
+        expect(pt.locator("[data-presence=source]")).to_contain_text("connected")
+        phone.walk(4, 24)
+        expect(page.locator("[data-check=walk]")).to_have_class("done")
+        expect(page.locator("[data-show=verdict]")).to_have_text("Good.")
+        page.click("[data-lock]")
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        assert phone.strides >= 14
+
+        pocket.set_offline(True)  # strides wait on the phone, also through a reload
+        page.evaluate("window.dispatchEvent(new Event('offline'))")
+        phone.walk(24, 48)
+        before = phone.strides
+        pocket.set_offline(False)
+        page.reload()
+        page.click("[data-begin]")
+        phone.restart_clock(48)
+        phone.walk(48, 72)
+        page.locator("[data-lock]").dispatch_event("click")
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        expect(page.locator("[data-show=state]")).to_contain_text("connected")
+        total = before + phone.strides
+        assert total >= 34
+        expect(pt.locator("[data-presence=source]")).to_contain_text("valid")
+
+        page.evaluate("""() => {
+          Object.defineProperty(document, "hidden", { get: () => true });
+          document.dispatchEvent(new Event("visibilitychange"));
+        }""")
+        presence = pt.locator("[data-presence=source]")
+        expect(presence).to_contain_text("the phone’s page is not in front")
+        expect(presence).to_have_class(re.compile(r"\blow\b"))
+        phone.walk(72, 80)
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        pt.click("[data-end]")
+        pt.click("text=End session")
+        pt.goto(f"{walk.path}details/")
+        expect(pt.locator("main")).to_contain_text(str(total + phone.strides - 16))
+
+
+def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
+    with browser.new_context(base_url=server.url) as pocket:
+        page = pocket.new_page()
+        page.goto("/sensor/")
+        expect(page.locator("[data-show=refusal]")).to_contain_text("Scan the square")
+        page.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false })")
+        page.goto("/sensor/#token=x&place=shank&side=left")
+        expect(page.locator("[data-show=refusal]")).to_contain_text("https")
+
+
+def test_a_therapist_shows_the_square_once(visit: Visit):
+    page = visit("/stations/", size="laptop")
+    page.click("text=A phone as a sensor")
+    page.check("[name=side][value=right]")
+    page.click("text=Show the square")
+    expect(page.locator(".qr svg")).to_be_visible()
+    expect(page.locator("main")).to_contain_text("Phone, right shin")
+    expect(page.locator("main")).to_contain_text("without https")
+    page.goto("/stations/")
+    expect(page.locator("main")).to_contain_text("Phone, right shin")
