@@ -30,7 +30,7 @@ def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     assert (device.kind, device.name) == ("source", "Phone, left shin")
     assert timedelta(0) < device.token_expires_at - timezone.now() <= LIFETIME
     assert device.has_expired(timezone.now() + LIFETIME)
-    assert AuditEntry.everywhere.filter(act=Act.TOKEN, object_id=device.pk).exists()
+    assert AuditEntry.everywhere.filter(act=Act.TOKEN, about__contains=device.name).exists()
 
 
 @pytest.mark.parametrize("wrong", [{"station": "0"}, {"place": "head"}, {"side": "both"}])

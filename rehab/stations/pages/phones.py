@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
+from typing import Any
 
 import segno
 from django.http import HttpRequest, HttpResponse
@@ -38,7 +39,7 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     first_station(clinic_of(user))
     stations = Station.objects.visible_to(user)
-    context = {"stations": stations, "legs": LEGS.items(), "places": PLACES.items()}
+    context: dict[str, Any] = {"stations": stations, "legs": LEGS.items(), "places": PLACES.items()}
     if request.method == "POST":
         station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
         place, side = request.POST.get("place"), request.POST.get("side")
