@@ -86,6 +86,7 @@ def in_doubt() -> Samples:
         ("foot", in_doubt, 1),
         ("foot", lambda: (np.arange(0, 9, 0.01), *stand(np.arange(0, 9, 0.01))), 0),
     ],
+    ids=["mounted one way", "another", "gaps", "turned over", "shank", "in doubt", "standing"],
 )
 def test_simulated_legs(place: str, make: Callable[[], Samples], least: int) -> None:
     assert compare(place, make()) >= least
@@ -98,6 +99,7 @@ def test_simulated_legs(place: str, make: Callable[[], Samples], least: int) -> 
         (lambda: turning_walks("5-2", "7-1"), 14),
         (captured_walks, 29),
     ],
+    ids=["stroke", "turns", "healthy"],
 )
 def test_real_legs(walks: Callable, least: int) -> None:  # type: ignore[type-arg]
     for walk in walks():
