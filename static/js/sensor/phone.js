@@ -37,6 +37,7 @@ const LINKS = {
 const scanned = location.hash.slice(1) || sessionStorage.getItem("sensor") || "";
 const { token, place, side } = Object.fromEntries(new URLSearchParams(scanned));
 history.replaceState(null, "", location.pathname);
+window.addEventListener("hashchange", () => location.reload()); // another square was scanned
 
 const body = document.body;
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
