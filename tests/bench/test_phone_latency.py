@@ -64,6 +64,7 @@ def test_from_the_contact_to_the_tablet():
             phone = pocket.new_page()
             phone.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
             phone.click("[data-begin]")
+            phone.wait_for_selector("body[data-step=check]")
             phone.evaluate(PLAY, rows)
             tablet.bring_to_front()
             tablet.wait_for_timeout(1000 * (WALKED_S + 2))

@@ -2,7 +2,8 @@
 
 const FIRST_PAUSE_MS = 500;
 const LONGEST_PAUSE_MS = 5_000;
-const MOST = 200; // steps in a frame; the server takes 256 that are not acknowledged
+const ANSWER_MS = 8_000; // after which a connection that owes an answer is dead
+const MOST = 80; // steps that are not acknowledged; so many fill half of the largest frame
 const FINAL = new Map([
   [4001, "unauthorized"],
   [4009, "replaced"],
@@ -17,7 +18,9 @@ export class Sender {
   #waiting = []; // strides that are not acknowledged, by number
   #sent = 0; // up to which number, over this connection
   #socket = null;
-  #isWelcome = false;
+  #isAnswered = false; // the hello
+  #isWelcome = false; // in a session
+  #heard_ms = 0; // when the server last said something, or was first asked
   #pause_ms = FIRST_PAUSE_MS;
   #trouble = "";
   #onState;
@@ -40,6 +43,7 @@ export class Sender {
     this.#run = run ?? { run: crypto.randomUUID(), session: null, last: 0 };
     this.#waiting = strides;
     this.#connect();
+    setInterval(() => this.#watch(), 1_000);
   }
 
   // Number a stride and store it, while a session takes strides. Returns whether it did.
@@ -63,22 +67,38 @@ export class Sender {
     const url = new URL(this.#path, location.href);
     url.protocol = url.protocol.replace("http", "ws");
     const own = (this.#socket = new WebSocket(url));
+    this.#heard_ms = performance.now();
     own.onopen = () => {
       const { run, last } = this.#run;
       const clock_s = (performance.timeOrigin + performance.now()) / 1000;
       this.#send({ type: "hello", version: 1, token: this.#token, run, last, clock_s });
     };
-    own.onmessage = ({ data }) => this.#receive(JSON.parse(data));
-    own.onclose = ({ code }) => {
-      this.#isWelcome = false;
-      if (FINAL.has(code)) {
-        this.#onState(FINAL.get(code), this.problem);
-        return;
-      }
-      this.#onState("lost");
-      setTimeout(() => this.#connect(), this.#pause_ms);
-      this.#pause_ms = Math.min(2 * this.#pause_ms, LONGEST_PAUSE_MS);
+    own.onmessage = ({ data }) => {
+      this.#heard_ms = performance.now();
+      if (own === this.#socket) this.#receive(JSON.parse(data));
     };
+    own.onclose = ({ code }) => own === this.#socket && this.#lose(code);
+  }
+
+  #lose(code) {
+    this.#socket = null;
+    this.#isAnswered = this.#isWelcome = false;
+    if (FINAL.has(code)) {
+      this.#onState(FINAL.get(code), this.problem);
+      return;
+    }
+    this.#onState("lost");
+    setTimeout(() => this.#connect(), this.#pause_ms);
+    this.#pause_ms = Math.min(2 * this.#pause_ms, LONGEST_PAUSE_MS);
+  }
+
+  // A network that is gone closes nothing: what is not answered in time is lost.
+  #watch() {
+    const socket = this.#socket;
+    const isOwed = !this.#isAnswered || this.#waiting.some(({ number }) => number <= this.#sent);
+    if (!socket || !isOwed || performance.now() - this.#heard_ms < ANSWER_MS) return;
+    this.#lose();
+    socket.close();
   }
 
   async #receive(message) {
@@ -109,6 +129,7 @@ export class Sender {
 
   async #join({ session, state, next }) {
     this.#pause_ms = FIRST_PAUSE_MS;
+    this.#isAnswered = true;
     this.state = state;
     if (session === null) {
       this.#onState("no session");
@@ -132,13 +153,15 @@ export class Sender {
 
   #flush() {
     if (!this.#isWelcome) return;
-    const due = this.#waiting.filter(({ number }) => number > this.#sent).slice(0, MOST);
+    const isIdle = !this.#waiting.some(({ number }) => number <= this.#sent);
+    if (isIdle) this.#heard_ms = performance.now();
+    const due = this.#waiting.slice(0, MOST).filter(({ number }) => number > this.#sent);
     if (!due.length) return;
     this.#sent = due[due.length - 1].number;
     this.#send({ type: "steps", steps: due });
   }
 
   #send(message) {
-    if (this.#socket.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
   }
 }
