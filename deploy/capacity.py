@@ -30,6 +30,9 @@ class Measured:
     server_us
         Processor time of a hosted process that has so many, each with tablet, monitor and robot
         [µs a step].
+    beat_ms, thorough_ms
+        Processor time of the database for each look of one server after what dead ones left: every
+        second, and twice a minute for owners without a lease, with 10,000 clinics.
     row_us
         From a batch to the commit, by COPY [µs a row], in one connection.
     row_bytes, index_bytes, parquet_bytes
@@ -40,6 +43,8 @@ class Measured:
 
     planned_sessions: float
     server_us: float
+    beat_ms: float
+    thorough_ms: float
     row_us: float
     row_bytes: float
     index_bytes: float
@@ -71,6 +76,8 @@ class Measured:
         return cls(
             planned_sessions=planned,
             server_us=server,
+            beat_ms=find(r"^\| a look after what dead servers left \| ([\d.]+) ms \|$")[0],
+            thorough_ms=find(r"^\| the thorough look, 10,000 clinics \| ([\d.]+) ms \|$")[0],
             row_us=row,
             row_bytes=find(r"^\| a row of `rehab_step`, PostgreSQL \| (\d+) \|$")[0],
             index_bytes=find(r"^\| its two indexes \| (\d+) \|$")[0],
@@ -94,14 +101,15 @@ class Assumed:
     other: float = 2.0  # of a database's bytes and work: events, boards, audit, free space
     online_months: float = 12  # that steps stay in the database before they are archived
     database_rows_at_once: float = 0.25  # of the time a connection's batch takes, one core's
-    connections_a_process: float = 8
-    connections: float = 500  # that a PostgreSQL without a pooler is given
+    connections_a_process: float = 10  # 8 of its pool, the writer's and the lease's
+    connections: float = 97  # PostgreSQL's default of 100 without those of the superuser
     memory_gb: float = 64  # of the database's machine: indexes and the newest month fit, or not
     one_disk_gb: float = 4000
     restore_mb_s: float = 100  # at which a database is copied back
     restore_h: float = 4  # that a clinic may be without its database at worst
     sockets_a_session: float = 4  # source, tablet, monitor, robot
     sockets_a_host: float = 28_000  # to one address of a server, by nginx's local ports
+    proxy_connections: float = 2 * 4096  # of an nginx with two workers; each socket takes two
     core_month: float = 15.0  # euros: a core with 4 GB
     disk_gb_month: float = 0.12
     copies: float = 3  # of the database: primary, replica, backups
@@ -141,14 +149,15 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     work = steps_s * measured.server_us / 1e6 / a.busy
     processes = max(2.0, math.ceil(work), math.ceil(sessions / measured.planned_sessions))
     row_s = measured.row_us / 1e6 * a.database_rows_at_once * a.other
-    database_cores = max(2.0, math.ceil(steps_s * row_s / a.busy))
+    beats = beat_cores(processes, clinics, measured)
+    database_cores = max(2.0, math.ceil((steps_s * row_s + beats) / a.busy))
     online = rows_month * a.online_months
     index_gb = online * measured.index_bytes / GB
     online_gb = online * (measured.row_bytes + measured.index_bytes) * a.other / GB
     archive_gb = 12 * rows_month * measured.parquet_bytes / GB
     sent = sum(size for whom, size in measured.frame_bytes.items() if whom != "source")
     egress_gb = rows_month * sent / GB
-    cores = processes + (a.copies - 1) * database_cores + 2  # Redis, nginx
+    cores = processes + (a.copies - 1) * database_cores + 2  # nginx
     cost = (
         cores * a.core_month
         + online_gb * a.copies * a.disk_gb_month
@@ -170,12 +179,18 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     )
 
 
+def beat_cores(processes: float, clinics: float, measured: Measured) -> float:
+    """Return the cores of the database that all servers take to look after each other."""
+    thorough_ms = measured.thorough_ms * clinics / 10_000 * 2 / 60
+    return processes * (measured.beat_ms + thorough_ms) / 1000
+
+
 # What breaks, and by how much of it so many clinics use: 1 is its end.
 Limit = tuple[str, str, Callable[[Need, Measured, Assumed], float]]
 LIMITS: tuple[Limit, ...] = (
     (
         "two server processes",
-        "add processes and hosts: sessions spread by the clinic's name",
+        "add processes and hosts: clinics spread by themselves",
         lambda n, m, a: n.sessions / m.planned_sessions / 2,
     ),
     (
@@ -190,13 +205,18 @@ LIMITS: tuple[Limit, ...] = (
     ),
     (
         "connections to one database",
-        "PgBouncer for pages; the writer's and the lease's connections stay their own",
+        "max_connections 500, then PgBouncer for pages; writers and leases keep their own",
         lambda n, m, a: n.processes * a.connections_a_process / a.connections,
     ),
     (
         "one disk",
         "archive months to Parquet, or shard",
         lambda n, m, a: n.online_gb / a.one_disk_gb,
+    ),
+    (
+        "connections of one nginx (two workers, 4,096 each)",
+        "raise worker_connections and the files that it may open",
+        lambda n, m, a: 2 * n.sessions * a.sockets_a_session / a.proxy_connections,
     ),
     (
         "sockets from one nginx to one address of a server",
@@ -212,7 +232,11 @@ LIMITS: tuple[Limit, ...] = (
         "cores of one database's machine (32)",
         "shard by clinic",
         lambda n, m, a: (
-            n.steps_s * m.row_us / 1e6 * a.database_rows_at_once * a.other / a.busy / 32
+            (
+                n.steps_s * m.row_us / 1e6 * a.database_rows_at_once * a.other
+                + beat_cores(n.processes, n.clinics, m)
+            )
+            / (32 * a.busy)
         ),
     ),
 )

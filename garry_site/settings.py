@@ -88,6 +88,7 @@ MIDDLEWARE = [
     "rehab.people.web.language.LanguageMiddleware",
     "rehab.people.web.language.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
+    "rehab.sessions.pages.server.whereabouts.ClinicServerMiddleware",
     "rehab.people.sign_in.lockout.LockoutMiddleware",
 ]
 ROOT_URLCONF = "garry_site.urls"
@@ -109,7 +110,7 @@ TEMPLATES = [
     }
 ]
 
-# --- database and channel layer -----------------------------------------------------------------
+# --- database and servers -----------------------------------------------------------------------
 
 DATABASE_URL = text(
     "GARRY_DATABASE_URL",
@@ -121,21 +122,9 @@ if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
     DATA_DIR.mkdir(parents=True, exist_ok=True)
 DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
-REDIS_URL = text("GARRY_REDIS_URL", "", "Redis, by which several servers hear each other")
 ADDRESS = text(
     "GARRY_ADDRESS", "", "host:port by which the proxy reaches this one of several servers"
 )
-CHANNEL_LAYERS = {
-    "default": {
-        # Pub/sub, not the core layer: docs/reference/stack.md#several-processes.
-        "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
-        # Orders to robots go over it: who does not know the key cannot give or read any.
-        "CONFIG": {"hosts": [REDIS_URL], "symmetric_encryption_keys": [SECRET_KEY]},
-    }
-    if REDIS_URL
-    else {"BACKEND": "channels.layers.InMemoryChannelLayer"}
-}
-
 # --- people -------------------------------------------------------------------------------------
 
 AUTH_USER_MODEL = "rehab.User"
@@ -277,7 +266,14 @@ LOGGING = {
         },
         "json": {"()": "garry_site.logs.JsonFormatter"},
     },
-    "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": LOG_FORMAT}},
+    "filters": {"refusals": {"()": "garry_site.logs.RefusalFilter"}},
+    "handlers": {
+        "stderr": {
+            "class": "logging.StreamHandler",
+            "formatter": LOG_FORMAT,
+            "filters": ["refusals"],
+        }
+    },
     "root": {"handlers": ["stderr"], "level": "WARNING"},
     "loggers": {
         "rehab": {"level": LOG_LEVEL},

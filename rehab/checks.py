@@ -61,23 +61,6 @@ def check_hosting(**_: Any) -> list[CheckMessage]:
 
 
 @register()
-def check_sharing(**_: Any) -> list[CheckMessage]:
-    """Check that Redis is set only where several servers may use it."""
-    sqlite = settings.DATABASES["default"]["ENGINE"].endswith("sqlite3")
-    if not settings.REDIS_URL or (settings.HOSTED and not sqlite):
-        return []
-    return [
-        Error(
-            "GARRY_REDIS_URL is set, but nothing uses it: only hosted servers on PostgreSQL share "
-            "a database.",
-            hint="Unset GARRY_REDIS_URL, or set GARRY_HOSTED=1 and "
-            "GARRY_DATABASE_URL=postgres://user:password@host/name.",
-            id="garry.E012",
-        )
-    ]
-
-
-@register()
 def check_data_folder(**_: Any) -> list[CheckMessage]:
     """Check that the data folder is writable."""
     folder = settings.DATA_DIR

@@ -25,6 +25,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 
 from robot import calibrate, doctor, play_gesture, replay
@@ -47,6 +48,7 @@ from robot.connection_args import (
 )
 from robot.link import Link, LinkRefused
 from robot.original_topics import TOPICS, OriginalTopics
+from robot.ros.holder import add_driven_base_arguments, find_driven_base
 from robot.worker import Worker
 
 ROBOT_PATH = "/ws/robot/"
@@ -76,6 +78,7 @@ def make_parser() -> ArgumentParser:
         help="publish on these of the original's topics at the rosbridge, beside any base "
         "(without a name: on all)",
     )
+    add_driven_base_arguments(parser)
     parser.add_argument(
         "--black-box",
         default=os.environ.get("GARRY_ROBOT_BLACK_BOX", BLACK_BOX),
@@ -95,7 +98,7 @@ def find_black_box(named: str, own: str) -> Path | None:
     named
         The option: a folder, or off.
     own
-        What stays the same of this robot: its token's file, or the token.
+        What identifies this robot from run to run: its token's file, or the token.
     """
     if named in ("", "off"):
         return None
@@ -153,15 +156,17 @@ def run(options: Namespace) -> int:
     """
     url = websocket_url(options.server, ROBOT_PATH)
     token = find_token(options, "GARRY_ROBOT_TOKEN", "a robot")
-    if options.child:  # Ctrl-C reaches both of us; the server tells when to end
+    if options.child:  # Ctrl-C reaches server and robot; the server decides when to end
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     base, originals = make_base(options, time.monotonic), None
     if options.original_topics is not None:
-        originals = OriginalTopics(options.ros_url, options.original_topics or TOPICS)
+        names = options.original_topics or TOPICS
+        originals = OriginalTopics(options.ros_url, names, find_driven_base(options))
     # By what stays the same: the token of a file is replaced now and then.
     own = token if options.token_file is None else str(options.token_file.resolve())
     folder = find_black_box(options.black_box, own)
-    box = None if folder is None else BlackBox(folder)
+    keeps_motion = find_spec("mcap") is not None
+    box = None if folder is None else BlackBox(folder, keeps_motion=keeps_motion)
     with base, originals or contextlib.nullcontext(), box or contextlib.nullcontext():
         if apply_calibration(base):
             print_notice(f"{base.identity} answers as it was measured to.")

@@ -1,8 +1,9 @@
 """`python -m robot calibrate --base BASE`: measures how a base answers, and stores it.
 
-It stands still for some seconds, then drives and turns a little, twice. That takes 1 m × 1 m and
-arms a real base: stand at its switch. Measured are how late it answers, how large its wheels are
-(by its gyro), and how fast its gyro turns at rest. Do it once for each base, and after each repair.
+It turns slowly to both sides, stands still for some seconds, then drives and turns a little, twice.
+That takes 1 m × 1 m and arms a real base: stand at its switch. Measured are the slowest turn that
+its wheels follow, how late it answers, how large its wheels are (by its gyro), and how fast its
+gyro turns at rest. Do it once for each base and floor, and after each repair.
 Exit status: 0 it was measured; 1 it was not, or the base does not answer; 2 the command line cannot
 be used; 130 Ctrl-C.
 """
@@ -22,14 +23,21 @@ from robot.base_options import (
     print_notice,
 )
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
+from robot.behavior.body import Body
 from robot.behavior.performer import Performer, control_loop
 from robot.calibration import BadCalibration, store_calibration
-from robot.motion.base_response import Response
+from robot.motion.base_response import MOST_STICTION_M_S, Response
 from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.limits import TICK_S
 from robot.motion.player import DONE
+from robot.motion.twist import Twist
 
 REST_S = 4.0
+# Each speed of the wheels [m/s] is ordered for so long [s]; by then a base that follows has turned.
+STICTION_STEP_M_S, STICTION_STEP_S = 0.004, 0.7
+# It follows where it turns by this share of the order in the second half of that time.
+FOLLOWS_SHARE = 0.5
+STICTION_MARGIN = 1.25  # floors differ, and so do wheels (ours)
 TIMES = 2
 TURN_RAD = 1.5
 MEASURED = Gesture(
@@ -69,6 +77,8 @@ def measure(
         Where it does not answer any more.
     """
     base.calibrate(Response())
+    stiction_m_s = measure_stiction(Performer(base).body, monotonic, sleep)
+    base.calibrate(Response(stiction_m_s=stiction_m_s))
     performer = Performer(base)
     by_both, by_gyro = 0.0, 0.0  # headings by the gyro times those by the wheels, and by themselves
     for _ in range(round(REST_S / TICK_S)):
@@ -98,7 +108,65 @@ def measure(
         lag_s=lag_s,
         wheel_scale=round(by_both / by_gyro, 4),  # the slope of a line through the origin
         gyro_bias_rad_s=round(base.read().sensors.drift_rad_s, 6),
+        stiction_m_s=stiction_m_s,
     )
+
+
+def measure_stiction(
+    body: Body, monotonic: Callable[[], float], sleep: Callable[[float], object]
+) -> float:
+    """Return the slowest speed of its wheels [m/s] that a base follows both ways, with a margin.
+
+    It turns on the spot, each step a little faster than the one before, by turns to both sides.
+
+    Parameters
+    ----------
+    body
+        The base with what stops it; this arms it.
+    monotonic, sleep
+        The clock [s] that it runs by, and how to wait by it.
+
+    Raises
+    ------
+    NotMeasured
+        Where something stops it, or where it follows none of the speeds.
+    """
+    body.safety.is_watched = True
+    body.arm(monotonic())
+    follows_from: dict[int, float] = {}
+    for step in range(1, math.floor(MOST_STICTION_M_S / STICTION_MARGIN / STICTION_STEP_M_S) + 1):
+        speed_m_s = step * STICTION_STEP_M_S
+        for side in {1, -1} - set(follows_from):
+            if _follows(
+                body, Twist.of_wheels(-side * speed_m_s, side * speed_m_s), monotonic, sleep
+            ):
+                follows_from[side] = speed_m_s
+        if len(follows_from) == 2:
+            body.base.set_home()
+            return round(STICTION_MARGIN * max(follows_from.values()), 4)
+    raise NotMeasured(
+        f"Its wheels do not follow {speed_m_s:g} m/s. Look at them, and at the floor."
+    )
+
+
+def _follows(
+    body: Body, twist: Twist, monotonic: Callable[[], float], sleep: Callable[[float], object]
+) -> bool:
+    """Order a turn for a moment, and return whether the base follows it. Raises NotMeasured."""
+    began_s, halfway_rad = monotonic(), None
+    try:
+        while (elapsed_s := monotonic() - began_s) < STICTION_STEP_S:
+            there = body.read()
+            if reason := body.safety.blocking_reason(there):
+                raise NotMeasured(f"The base may not move: {reason}.")
+            body.base.drive(twist)
+            if halfway_rad is None and elapsed_s >= STICTION_STEP_S / 2:
+                halfway_rad = there.pose.heading_rad
+            sleep(TICK_S)
+    finally:
+        body.base.stop()
+    turned_rad = body.read().pose.heading_rad - (halfway_rad or 0.0)
+    return turned_rad / twist.w_rad_s >= FOLLOWS_SHARE * STICTION_STEP_S / 2
 
 
 def format_result(response: Response) -> str:
@@ -106,8 +174,8 @@ def format_result(response: Response) -> str:
     drift_deg_min = 60 * math.degrees(response.gyro_bias_rad_s)
     return (
         f"It answers after {1000 * response.delay_s:.0f} ms (dead time and lag), its wheels roll "
-        f"{response.wheel_scale:.3f} m for each, and its gyro turns by {drift_deg_min:.1f}°/min at "
-        f"rest."
+        f"{response.wheel_scale:.3f} m for each and follow orders from {response.stiction_m_s:.3f} "
+        f"m/s on, and its gyro turns by {drift_deg_min:.1f}°/min at rest."
     )
 
 

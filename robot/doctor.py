@@ -1,4 +1,9 @@
-"""`python -m robot doctor`: finds a Kobuki's port, and says what is wrong with it."""
+"""`python -m robot doctor`: finds a Kobuki's port, and says what is wrong with it.
+
+With --cut it tries the hardware cut (docs/safety.md), with the wheels off the floor: it sends
+nothing for some seconds, then asks for the emergency stop to be pressed, and says whether the base
+lost its power.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +12,17 @@ import time
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
 
-from robot.bases.kobuki import KobukiBase
+from robot.bases.kobuki import STOP_FRAME, KobukiBase
+from robot.bases.kobuki_protocol.frames import BAUD
 from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
+from robot.port.opening import PortOpener
+from robot.port.owner import SerialPort
+from robot.port.priority import explain_jitter, find_priority, measure_jitter
 from robot.port.usb import Diagnosis, check_port, find_port, list_ports
 
 LISTEN_S = 0.5
+SILENT_S = 0.5  # a base that has power sends 50 frames a second
+WATCHDOG_S, PRESS_S = 3.0, 20.0
 FRAMES_PER_S = 45.0  # a base sends 50; some may be lost
 
 CURES = {
@@ -62,6 +73,54 @@ def listen(port: str) -> Iterator[Diagnosis]:
         yield Diagnosis(f"It feels: {hazard}.", CURES.get(hazard, ""))
 
 
+def try_computer() -> Iterator[Diagnosis]:
+    """Yield how late this computer lets a program go on."""
+    worst_s = measure_jitter(time.monotonic, time.sleep)
+    yield Diagnosis(
+        f"A pause of 20 ms took up to {1000 * worst_s:.0f} ms longer; the port's process runs with "
+        f"{find_priority()} priority.",
+        explain_jitter(worst_s),
+    )
+
+
+def try_cut(port: str) -> Iterator[Diagnosis]:
+    """Yield whether a watchdog, or else a person's emergency stop, takes the base's power."""
+    try:
+        line = PortOpener(port, BAUD)()
+    except (OSError, ValueError) as problem:
+        yield Diagnosis(f"{port} cannot be opened: {problem}", _cure_opening(str(problem)))
+        return
+    try:
+        line.write(STOP_FRAME)
+        silent_after_s = _until_silent(line, WATCHDOG_S)
+        if silent_after_s is not None:
+            yield Diagnosis(
+                f"A watchdog took its power after {silent_after_s:.1f} s without orders."
+            )
+            return
+        yield Diagnosis("No watchdog takes its power. Press the emergency stop now.")
+        pressed_s = _until_silent(line, PRESS_S)
+    finally:
+        line.close()
+    if pressed_s is None:
+        yield Diagnosis(
+            "Nothing took its power.", "Add a hardware cut (docs/safety.md) before it drives."
+        )
+    else:
+        yield Diagnosis("The emergency stop took its power.")
+
+
+def _until_silent(line: SerialPort, within_s: float) -> float | None:
+    """Return when it last said anything [s]; None where it never fell silent."""
+    began_s = heard_s = time.monotonic()
+    while (now_s := time.monotonic()) - began_s < within_s:
+        if line.read(4096):
+            heard_s = now_s
+        elif now_s - heard_s >= SILENT_S:
+            return heard_s - began_s
+    return None
+
+
 def _cure_opening(problem: str) -> str:
     words = problem.lower()
     if "exclusively lock" in words or "busy" in words or "access is denied" in words:
@@ -75,9 +134,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the results of all checks. Return 0 where nothing is wrong, else 1."""
     parser = ArgumentParser(prog="python -m robot doctor", description=__doc__)
     parser.add_argument("--port", help="instead of the one that is found")
-    port = parser.parse_args(arguments).port or find_port()
+    parser.add_argument("--cut", action="store_true", help="try the hardware cut, wheels up")
+    options = parser.parse_args(arguments)
+    port = options.port or find_port()
     wrong = 0
-    for look in (check_port(port, list_ports()), listen(port)):
+    looks = [check_port(port, list_ports()), try_computer(), listen(port)]
+    for look in [try_cut(port)] if options.cut else looks:
         for diagnosis in look:
             wrong += bool(diagnosis.cure)
             cure = f"\n      Cure: {diagnosis.cure}" if diagnosis.cure else ""

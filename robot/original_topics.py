@@ -6,7 +6,9 @@ published again on every connection.
 
 Its gesture node acts on the last ``True`` for as long as no ``False`` comes. So where our own robot
 may not act, ``False`` is all that is published, again and again; so it is on each new connection,
-at the end, and where no decision follows a ``True``.
+at the end, and where no decision follows a ``True``. What it has begun is stopped at its base
+(``robot.ros.holder``), and by a gate (deploy/ros/garry_watchdog.py) that passes its Twists on only
+while it hears on ``/garry/may_act`` that a robot may act.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Self
 
+from robot.behavior.safety import LAPSED_S
 from robot.ros.bridge import Bridge
 from robot.ros.frames import (
     Frame,
@@ -30,12 +33,14 @@ from robot.ros.frames import (
     unadvertise,
     unsubscribe,
 )
+from robot.ros.holder import DrivenBase, Holder
 from robot.ros.messages import BOOL, STRING
 from robot.wire.frames import BadFrame, read_number
 
 FEEDBACK_TYPE = Topic("/garry/feedback_type", STRING)
 GOOD_STEP = Topic("/garry/good_step", BOOL)
 DATA = Topic("/garry/data", "garry_ros/UserData")
+MAY_ACT = Topic("/garry/may_act", BOOL)
 TOPICS = {"feedback_type": FEEDBACK_TYPE, "good_step": GOOD_STEP, "data": DATA}
 
 # Exactly as gesture_generation.py compares them.
@@ -54,6 +59,7 @@ LATE_S = 2.0  # a message without an echo by then has not arrived
 NUMBER_MAX = 1e6
 FALSE_EVERY_S = 0.5  # a new subscriber, or one that ROS has not connected yet, misses some
 FIRST_FALSES = LAST_FALSES = 3
+MAY_ACT_EVERY_S = 0.1  # the gate closes 0.5 s after the last one
 # Without another decision after so many windows there are no steps: a True is taken back.
 HOLDS_WINDOWS = 1.5
 
@@ -65,15 +71,20 @@ class OriginalTopicClient:
     ----------
     names
         Which of ``TOPICS`` to publish on.
+    base
+        The base that its nodes drive, which stops have to reach; None where they drive none.
 
     Attributes
     ----------
     is_allowed
         Whether anything that moves a robot is published.
+    allowed_until_s
+        When that is over, unless it is moved on: whoever allowed it may hang.
     """
 
-    def __init__(self, names: Collection[str]) -> None:
+    def __init__(self, names: Collection[str], base: DrivenBase | None = None) -> None:
         self._topics = [TOPICS[name] for name in names]
+        self._holder = None if base is None else Holder(base)
         self._valence = ""
         self._published = ""  # the feedback type, on this connection
         self._events: deque[tuple[float, Topic, Mapping[str, Any]]] = deque(maxlen=MAX_EVENTS)
@@ -81,16 +92,40 @@ class OriginalTopicClient:
         self._is_open = self.is_allowed = False
         self._falses = FIRST_FALSES  # so many are still to come on this connection
         self._false_s = -math.inf  # the last one
-        self._true_until_s = math.inf
+        self._true_until_s = self.allowed_until_s = math.inf
+        self._told_s = -math.inf  # whether it may act, the last time
 
-    def allow(self, is_allowed: bool) -> None:
-        """Allow ``True`` and data where our own robot may act; else take back what was said."""
+    def allow(self, is_allowed: bool, now_s: float) -> None:
+        """Allow ``True`` and data where our own robot may act; else withdraw what was published.
+
+        Parameters
+        ----------
+        is_allowed
+            Whether a robot may act.
+        now_s
+            The time [s].
+        """
+        if self.is_allowed != is_allowed:
+            self._told_s = -math.inf
         if self.is_allowed and not is_allowed:
             self._take_back()
+            if self._holder is not None:
+                self._holder.hold(now_s)
+        elif is_allowed and self._holder is not None:
+            self._holder.release()
         self.is_allowed = is_allowed
 
     def handle_message(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Handle a message of the server; a step without finite numbers is not published."""
+        """Handle a message of the server.
+
+        Parameters
+        ----------
+        message
+            Of a step, the shown value and the goal are published; one without finite numbers is
+            not. Of a welcome or a cue, the feedback type is stored.
+        now_s
+            When it came [s].
+        """
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
@@ -103,7 +138,7 @@ class OriginalTopicClient:
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
     def publish_decision(self, above: bool, window_s: float, now_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above.
+        """Publish a decision about a window.
 
         Parameters
         ----------
@@ -126,9 +161,22 @@ class OriginalTopicClient:
         for topic in self._topics:
             yield advertise(topic, latch=topic is FEEDBACK_TYPE)
             yield subscribe(topic)
+        yield advertise(MAY_ACT)
+        if self._holder is not None:
+            yield from self._holder.open()
+            if not self.is_allowed:
+                self._holder.hold(now_s)  # whoever was here before may have been stopped
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
+        if now_s > self.allowed_until_s:
+            self.allow(False, now_s)
+        if self._holder is not None:
+            yield from self._holder.due(now_s)
+        every_s = MAY_ACT_EVERY_S if self.is_allowed else FALSE_EVERY_S
+        if now_s - self._told_s >= every_s - 1e-6:
+            self._told_s = now_s
+            yield publish(MAY_ACT, {"data": self.is_allowed})
         feedback_type = FEEDBACK_TYPES.get(self._valence, "")
         if FEEDBACK_TYPE in self._topics and feedback_type and feedback_type != self._published:
             self._published = feedback_type
@@ -145,13 +193,23 @@ class OriginalTopicClient:
                 yield self._publish(topic, message, now_s)
 
     def handle(self, incoming: Incoming, now_s: float) -> None:
-        """Confirm a message by its echo."""
+        """Handle a frame of the bridge. Raises BadRosFrame.
+
+        Parameters
+        ----------
+        incoming
+            A publication is the echo that confirms its topic, or odometry; a response is ignored.
+        now_s
+            The time [s].
+        """
+        if self._holder is not None:
+            self._holder.handle(incoming, now_s)
         if isinstance(incoming, Publication):
             self._unconfirmed.pop(incoming.topic, None)
 
     def disconnect(self, now_s: float) -> None:
         """Drop what was to be sent: it would be out of date on the next connection."""
-        self._is_open, self._published = False, ""
+        self._is_open, self._published, self._told_s = False, "", -math.inf
         self._take_back()
         self._unconfirmed.clear()
 
@@ -160,9 +218,18 @@ class OriginalTopicClient:
         if GOOD_STEP in self._topics:
             for _ in range(LAST_FALSES):
                 yield publish(GOOD_STEP, {"data": False})
+        if self._holder is not None:
+            self._holder.hold(now_s)
+            for _ in range(LAST_FALSES):
+                yield from self._holder.due(now_s)
+        for _ in range(LAST_FALSES):
+            yield publish(MAY_ACT, {"data": False})
         for topic in self._topics:
             yield unsubscribe(topic)
             yield unadvertise(topic)
+        yield unadvertise(MAY_ACT)
+        if self._holder is not None:
+            yield from self._holder.end()
 
     def problem(self, now_s: float) -> str:
         """Return which topic does not arrive; empty where all do."""
@@ -196,10 +263,11 @@ class OriginalTopics:
         self,
         url: str,
         names: Collection[str] = tuple(TOPICS),
+        base: DrivenBase | None = None,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url, self._monotonic = url, monotonic
-        self._client = OriginalTopicClient(names)
+        self._client = OriginalTopicClient(names, base)
         self._bridge = Bridge(self._client, monotonic)
 
     def __enter__(self) -> Self:
@@ -223,12 +291,22 @@ class OriginalTopics:
             self._client.handle_message(message, self._monotonic())
 
     def publish_decision(self, above: bool, window_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above."""
+        """Publish a decision about a window.
+
+        Parameters
+        ----------
+        above
+            Whether the window's mean reached the threshold.
+        window_s
+            Length of a window [s].
+        """
         with self._bridge.sending():
             self._client.publish_decision(above, window_s, self._monotonic())
 
     def allow(self, is_allowed: bool) -> None:
-        """Allow what moves a robot, or take back what was said."""
-        if self._client.is_allowed != is_allowed:  # asked at each tick, by the only one who sets it
+        """Allow what moves a robot, or withdraw what was published; to be called at each tick."""
+        now_s = self._monotonic()
+        self._client.allowed_until_s = now_s + LAPSED_S
+        if self._client.is_allowed != is_allowed:
             with self._bridge.sending():
-                self._client.allow(is_allowed)
+                self._client.allow(is_allowed, now_s)

@@ -24,7 +24,7 @@ from rehab.people.consent.models import Consent
 from rehab.people.field_policy import describe
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
-from rehab.studies.participants import Enrollment
+from rehab.studies.participants import Enrollment, Screening
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {
@@ -166,6 +166,16 @@ def list_studies(user: User, patient: Patient) -> list[dict[str, Any]]:
             "events": [{"at": event.at, "what": event.kind} for event in row.events.all()],
         }
         for row in rows.order_by("pk")
+    ] + [
+        {
+            "study": row.study.title,
+            "assessed_at": row.at,
+            "criteria_not_met": row.unmet,
+            "declined": row.declined,
+        }
+        for row in Screening.objects.visible_to(user)
+        .filter(patient=patient)
+        .select_related("study")
     ]
 
 

@@ -1,8 +1,8 @@
 """Strides with A2 from raw signals, while a person walks. Pure: no Django, no clock.
 
 ``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` a whole
-recording with the same code, ``WearableDetector`` those of a sensor on a foot or shank. The
-comments of thresholds name their sources.
+recording with the same code, ``WearableDetector`` those of a sensor on a foot or shank. Comments
+name the source of each threshold.
 """
 
 from rehab.gait.offline import make_detector, measure_strides

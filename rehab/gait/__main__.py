@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from rehab.gait.offline import measure_strides
-from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
+from rehab.gait.recordings.columns import ALL_CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
 from rehab.gait.recordings.limits import limit_resources
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
@@ -85,10 +85,16 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
         "--overground", action="store_true", help="over plates in a floor, a step or two at a time"
     )
     parser.add_argument(
+        "--filtered",
+        type=float,
+        metavar="HZ",
+        help="moment and angle come through a causal low-pass of this cut-off: take its delay out",
+    )
+    parser.add_argument(
         "--columns",
         nargs="+",
         metavar="CHANNEL=COLUMN",
-        help="time=… and {left,right}.{" + ",".join(CHANNELS) + "}=…; COLUMN*FACTOR changes "
+        help="time=… and {left,right}.{" + ",".join(ALL_CHANNELS) + "}=…; COLUMN*FACTOR changes "
         "unit or sign, COLUMN@DELAY takes out a delay [s]; frame=… counts samples",
     )
     parser.add_argument("--plot", type=Path, metavar="out.png", help="draw it (needs matplotlib)")
@@ -97,7 +103,10 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
     path = paths[0]
-    time, legs, frames, is_overground = read_signals(*paths, pairs=options.columns)
+    time, legs, frames, says_so = read_signals(
+        *paths, pairs=options.columns, filtered_hz=options.filtered
+    )
+    is_overground = options.overground or says_so
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     strides = measure_strides(
@@ -106,7 +115,7 @@ def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         look_ahead_s=options.look_ahead,
-        is_overground=options.overground or is_overground,
+        is_overground=is_overground,
         frame=frames,
     )
     check = check_signals(
@@ -116,6 +125,7 @@ def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         strides=strides,
+        is_overground=is_overground,
     )
     if options.json:
         found = {

@@ -76,6 +76,9 @@ class Stride(NamedTuple):
         Moment and angular velocity where the power peaks.
     propulsion_n_kg
         Largest forward force of the second half of stance, if a forward force is sent.
+    propulsion_impulse_n_s_kg, braking_impulse_n_s_kg
+        Forward force that drives and that brakes, each summed over the stance and above 0, by body
+        mass [N·s/kg], if a forward force is sent (Bowden 2006, Stroke 37:872).
     position_m
         Where the foot was at initial contact, if a position is sent [m, forward].
     offset_n
@@ -91,8 +94,14 @@ class Stride(NamedTuple):
     step_s, step_length_m, step_symmetry
         From the other foot's initial contact to this one, and (this − other) / (this + other) of
         the two last step lengths.
-    first_double_support_s, second_double_support_s
-        Both feet on the floor after this initial and before this terminal contact [s].
+    first_double_support_s, second_double_support_s, double_support_s
+        Both feet on the floor after this initial and before this terminal contact, and both [s].
+    propulsion_share
+        Propulsion impulse of this leg by that of both: of the paretic leg, paretic propulsion
+        (Bowden 2006).
+    stance_ratio, swing_ratio, step_time_ratio, step_length_ratio
+        This leg's newest by the other's before it, 1 where both are alike (Patterson 2010, Gait
+        Posture 31:241).
     weight_ratio
         Mean force of both plates over the cycle that ended here, by body weight.
     """
@@ -113,6 +122,8 @@ class Stride(NamedTuple):
     a2_moment_nm_kg: float | None = None
     a2_velocity_rad_s: float | None = None
     propulsion_n_kg: float | None = None
+    propulsion_impulse_n_s_kg: float | None = None
+    braking_impulse_n_s_kg: float | None = None
     position_m: float | None = None
     offset_n: float = 0.0
     late_s: float = 0.0
@@ -124,6 +135,12 @@ class Stride(NamedTuple):
     step_symmetry: float | None = None
     first_double_support_s: float | None = None
     second_double_support_s: float | None = None
+    double_support_s: float | None = None
+    propulsion_share: float | None = None
+    stance_ratio: float | None = None
+    swing_ratio: float | None = None
+    step_time_ratio: float | None = None
+    step_length_ratio: float | None = None
     weight_ratio: float | None = None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -24,7 +24,20 @@ from rehab.gait.strides import Flag, RejectionReason, Stride
 # mass, unit or plate.
 SUPPORTED_BELOW = 0.95
 WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
+LATEST_S = 2.5  # between two steps that are compared; later, somebody stood between them
 ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its change to running
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepFigures:
+    """What a leg's newest stride is compared by with the other leg's: as in ``Stride``."""
+
+    begin_s: float
+    step_s: float | None = None
+    length_m: float | None = None
+    stance_s: float | None = None
+    swing_s: float | None = None
+    impulse: float | None = None
 
 
 class TwoLegDetector(Detector):
@@ -43,7 +56,7 @@ class TwoLegDetector(Detector):
     def __init__(self, rate_hz: float, mass_kg: float, **settings: Any) -> None:
         super().__init__(rate_hz, mass_kg, sides=("left", "right"), **settings)
         self._left, self._right = self._legs
-        self._steps_m: dict[str | None, float | None] = {}
+        self._latest: dict[str | None, StepFigures] = {}
 
     def feed(
         self,
@@ -135,18 +148,37 @@ class TwoLegDetector(Detector):
         elif not self._is_overground and ratio is not None and ratio < SUPPORTED_BELOW:
             flags.append(Flag.SUPPORTED)
         length = None if first is None else _find_length(stride.stance, other, this.begin_index)
-        symmetry = _find_symmetry(length, self._steps_m.get(other.side))
-        self._steps_m[leg.side] = length
+        is_seen = first is not None and first.is_onset_seen
+        step = StepFigures(
+            begin_s=this.begin_s,
+            step_s=_find_time(first.begin_s, this.begin_s) if first and is_seen else None,
+            length_m=length,
+            stance_s=_find_time(this.begin_s, this.end_s) if is_whole else None,
+            swing_s=stride.swing_s,
+            impulse=stride.stance.propulsion_impulse_n_s_kg,
+        )
+        last = self._latest.get(other.side)
+        self._latest[leg.side] = step
+        if last is None or not this.begin_s - last.begin_s < LATEST_S:
+            last = StepFigures(begin_s=this.begin_s)
+        doubles = (
+            _find_time(this.begin_s, first.end_s) if first else None,
+            _find_time(second.begin_s, this.end_s) if second else None,
+        )
         return OtherLeg(
             reasons=reasons,
             flags=flags,
-            step_s=_find_time(first.begin_s, this.begin_s)
-            if first and first.is_onset_seen
-            else None,
+            step_s=step.step_s,
             step_length_m=length,
-            step_symmetry=symmetry,
-            first_double_support_s=_find_time(this.begin_s, first.end_s) if first else None,
-            second_double_support_s=_find_time(second.begin_s, this.end_s) if second else None,
+            step_symmetry=_find_symmetry(length, last.length_m),
+            propulsion_share=_find_share(step.impulse, last.impulse),
+            stance_ratio=_find_ratio(step.stance_s, last.stance_s),
+            swing_ratio=_find_ratio(step.swing_s, last.swing_s),
+            step_time_ratio=_find_ratio(step.step_s, last.step_s),
+            step_length_ratio=_find_ratio(length, last.length_m),
+            first_double_support_s=doubles[0],
+            second_double_support_s=doubles[1],
+            double_support_s=None if None in doubles else math.fsum(filter(None, doubles)),
             weight_ratio=ratio,
         )
 
@@ -224,3 +256,15 @@ def _find_symmetry(this_m: float | None, other_m: float | None) -> float | None:
     if this_m is None or other_m is None or not this_m + other_m > 0:
         return None
     return (this_m - other_m) / (this_m + other_m)
+
+
+def _find_ratio(this: float | None, other: float | None) -> float | None:
+    if this is None or other is None or not other > 0:
+        return None
+    return this / other
+
+
+def _find_share(this: float | None, other: float | None) -> float | None:
+    if this is None or other is None or not this + other > 0:
+        return None
+    return this / (this + other)

@@ -75,6 +75,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "SessionEvent": _VIEWED,
     "SessionMetric": _VIEWED,
     "RobotIncident": _VIEWED,
+    "ClinicOwner": {},
     "SessionCorrection": _VIEWED | dict.fromkeys(_CARERS, Right.VIEW | Right.ADD),
     # Changed by their pages alone, which know how far a study is.
     "Study": _VIEWED,

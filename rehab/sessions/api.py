@@ -25,7 +25,6 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
-from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -151,7 +150,7 @@ def change(
     session = get_session(user, session_id)
     try:
         change_session(session, given.kind, given.value, by=user)
-    except (NotAllowed, OwnedElsewhere) as problem:
+    except NotAllowed as problem:
         raise HttpError(409, str(problem)) from problem
     except InvalidSetting as problem:
         raise Rejected({"value": str(problem)}) from problem

@@ -61,7 +61,7 @@ async def _update_session(session_id: int, valence: Valence, by: User) -> None:
     in_server = runtime.peek() is not None
     live_runtime = runtime.current()
     try:
-        live = await live_runtime.viewed_session(session_id)
+        live = await live_runtime.session(session_id)
         known = live.aggregate.fold.valences.known.get(valence.slug)
         if known is None or known.bands == valence.bands:
             return

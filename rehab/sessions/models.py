@@ -170,13 +170,10 @@ class TrainingSession(ClinicModel):
     # Of an imported session, which has no steps: its key and row in the original GARRY's database.
     legacy_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
     legacy_row = models.JSONField(null=True, editable=False)
-    # The log's end as it was last noted: with changes and checkpoints, and when its owner left it.
+    # The log's end as it was last noted: with changes and checkpoints, and when it is unloaded.
     last_number = models.PositiveIntegerField(default=0, editable=False)
     # Of an open session: the fold of its first steps, so that the rest is quickly folded.
     checkpoint = models.JSONField(null=True, editable=False)
-    # The process that writes the log; a new owner raises the epoch, which locks the old one out.
-    epoch = models.PositiveIntegerField(default=0, editable=False)
-    owner = models.CharField(max_length=200, blank=True, editable=False, db_index=True)
 
     personal = personal_fields(
         {
@@ -195,7 +192,7 @@ class TrainingSession(ClinicModel):
             "active_s excluded": WALKED,
             "clinic station created_by": retained("places and staff", shown=False, research=False),
             "checkpoint": retained("None once it has ended", shown=False, research=False),
-            "last_number epoch owner": retained("the server's own", shown=False, research=False),
+            "last_number": retained("the server's own", shown=False, research=False),
         }
     )
 
@@ -207,6 +204,11 @@ class TrainingSession(ClinicModel):
             models.Index(fields=["clinic", "-created_at"], name="session_by_clinic_and_date"),
             models.Index(fields=["patient", "-created_at"], name="session_by_patient_and_date"),
             models.Index(fields=["station", "state"], name="session_by_station_and_state"),
+            models.Index(
+                fields=["clinic"],
+                condition=Q(state=State.RUNNING.value),
+                name="running_session_by_clinic",
+            ),
         ]
         constraints: ClassVar = [
             models.UniqueConstraint(

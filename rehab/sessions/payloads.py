@@ -103,6 +103,8 @@ def describe_cue(fold: SessionFold) -> Message:
         "count": timing.count,
         "rest_s": timing.rest_s,
         "intensity": fold.robot_intensity,
+        "only_informs": not fold.valence.has_points,
+        "seed": fold.plan.variety_seed,
         "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
     }
 

@@ -56,8 +56,7 @@ class SessionRequest(PlanSettings):
     ``phases``: those of the protocol unless given. ``measure``: A2 unless given.
     ``trained_side``: the patient's paretic side unless given. ``cue``: that of the feedback type
     unless given. ``source_args``: arguments of `python -m rehab.sources` for a source that the
-    server runs beside the session. ``may_change_type``: whether the feedback type can be another
-    one along the way.
+    server runs beside the session.
     """
 
     patient: Patient
@@ -73,7 +72,6 @@ class SessionRequest(PlanSettings):
     simulated: bool = False
     source_args: Sequence[str] = ()
     walking: WalkingConditions = field(default_factory=WalkingConditions)
-    may_change_type: bool = True
 
 
 def check_station_is_free(station: Station) -> None:
@@ -153,7 +151,7 @@ def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPl
     valence = default if request.cue is None else replace(default, cue=request.cue)
     gestures = {gesture["name"]: gesture for gesture in composed_gestures(patient, valence.cue)}
     alternatives: list[Valence] = []
-    for other in others.values() if request.may_change_type else ():
+    for other in others.values() if not request.locked else ():
         cue = silence_cue(other.cue, default.cue, valence.cue)
         try:
             gestures |= {gesture["name"]: gesture for gesture in composed_gestures(patient, cue)}

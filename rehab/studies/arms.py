@@ -89,7 +89,15 @@ class ArmRule:
 
 
 def check_arms(arms: Sequence[ArmRule], *, crossover: bool) -> None:
-    """Raise InvalidSetting for arms that a study could not compare."""
+    """Raise InvalidSetting for arms that a study could not compare.
+
+    Parameters
+    ----------
+    arms
+        2 to ``MAX_ARMS`` arms, of different codes and conditions.
+    crossover
+        Whether each participant walks every arm, so that all weights have to be 1.
+    """
     if not 2 <= len(arms) <= MAX_ARMS:
         raise InvalidSetting("A study compares 2 to {most} arms.", most=MAX_ARMS)
     conditions: dict[Condition, ArmRule] = {}

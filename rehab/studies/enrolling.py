@@ -1,8 +1,8 @@
-"""Enrolling patients, allocating them, and what happens when one withdraws."""
+"""Enrollment of patients, their allocation, and withdrawal."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 
 from django.db import transaction
@@ -14,8 +14,8 @@ from rehab.people.consent.services import active_consents
 from rehab.people.models import Patient, User
 from rehab.sessions.formatting import clinic_time
 from rehab.studies.allocation.groups import Allocated
-from rehab.studies.models import Study, StudyMark, StudyState, has_mark
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.models import Study, StudyState
+from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.registration.lifecycle import (
     check_no_open_session,
     check_secret,
@@ -24,6 +24,7 @@ from rehab.studies.registration.lifecycle import (
     note,
     set_blinded,
 )
+from rehab.studies.screening import check_open, find_unmet
 from rehab.training.measures import InvalidSetting
 
 
@@ -35,22 +36,41 @@ def enroll(
     keep_data: bool,
     by: User | None,
     now: datetime,
+    met: Collection[str] = (),
 ) -> Enrollment:
-    """Take a patient into a running study: allocate, plan the visits, blind.
+    """Enroll a patient in a running study: allocate, plan the visits, blind.
 
-    Raises InvalidSetting for a patient who has not consented to research, is in another study or
-    has an open session, and for a study that is not running, is full, or has run out of its list.
+    Parameters
+    ----------
+    study, patient
+        The study, and who joins it.
+    levels
+        The patient's level of each factor of the study.
+    keep_data
+        Whether sessions still count in the results if the participant withdraws.
+    by
+        Who enrolls; None for a program.
+    now
+        The time of the enrollment.
+    met
+        Those of ``study.criteria`` that ``by`` confirms.
+
+    Raises
+    ------
+    InvalidSetting
+        For a patient who is not eligible, has not consented to research, is in another study or has
+        an open session; for a study that is not running, is full, or has run out of its list; and
+        where ``by`` is an assessor of the study.
     """
     with transaction.atomic():
-        lock(study)  # of two at once, the second is allocated after the first
+        lock(study)  # of two enrolled at once, the second is allocated after the first
         patient.lock()
+        check_open(study, by)
         _check_may_enter(study, patient)
-        if by is not None and has_mark(study, by, StudyMark.Task.ASSESSOR):
+        if unmet := find_unmet(study, patient, met, now):
             raise InvalidSetting(
-                gettext(
-                    "You are an assessor in this study. Ask a colleague who treats to enroll "
-                    "patients."
-                )
+                gettext("%(patient)s is not eligible: %(criteria)s.")
+                % {"patient": patient.nickname, "criteria": "; ".join(unmet)}
             )
         version = current_version(study)
         before = Allocation.everywhere.filter(enrollment__study=study).order_by("pk")
@@ -71,6 +91,7 @@ def enroll(
             enrolled_by=by,
         )
         Allocation.everywhere.create(enrollment=enrollment, group=group, at=now)
+        Screening.everywhere.create(study=study, patient=patient, by=by, at=now)
         note(study, StudyEvent.Kind.ENROLLED, by, now, enrollment=enrollment)
         _plan_visits(enrollment, len(group.split("-")), now)
         set_blinded(patient)
@@ -78,8 +99,6 @@ def enroll(
 
 
 def _check_may_enter(study: Study, patient: Patient) -> None:
-    if study.state != StudyState.RUNNING:
-        raise InvalidSetting(gettext("Only a running study can enroll patients. Start it first."))
     if study.enrollments.count() >= study.participants:
         message = gettext(
             "The study has all its %(count)s participants. Close it, or revise the number."
@@ -109,7 +128,11 @@ def _plan_visits(enrollment: Enrollment, periods: int, now: datetime) -> None:
     first_day = clinic_time(now, enrollment.study.clinic).date()
     for planned in enrollment.study.visit_plan.plan(periods, first_day):
         StudyVisit.everywhere.create(
-            enrollment=enrollment, number=planned.number, period=planned.period, day=planned.day
+            enrollment=enrollment,
+            number=planned.number,
+            period=planned.period,
+            follow_up=planned.follow_up,
+            day=planned.day,
         )
         if not enrollment.patient.visits.filter(day=planned.day).exists():
             plan_visit(enrollment.patient, planned.day, None)
@@ -119,6 +142,15 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
     """Record that a participant leaves the study; sessions count as was agreed at enrollment.
 
     An open session goes on, as a session of care, until the therapist ends it.
+
+    Parameters
+    ----------
+    enrollment
+        The participant; one who has withdrawn already is left as is.
+    by, now
+        Who records it (None for a program), and when.
+    reason
+        Why, as typed; may be empty.
     """
     with transaction.atomic():
         lock(enrollment.study)
@@ -139,7 +171,15 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
 
 
 def withdraw_everywhere(patient: Patient, by: User | None, now: datetime) -> None:
-    """Withdraw a patient from every running study, as when consent to research is withdrawn."""
+    """Withdraw a patient from every running study, as when consent to research is withdrawn.
+
+    Parameters
+    ----------
+    patient
+        Who leaves.
+    by, now
+        Who records it (None for a program), and when.
+    """
     running = patient.enrollments.filter(withdrawn_at=None, study__state=StudyState.RUNNING)
     for enrollment in running.select_related("study", "patient"):
         withdraw(enrollment, by, now)

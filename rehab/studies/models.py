@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.translation import valence_choices
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
+from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
@@ -95,9 +96,27 @@ class Study(ClinicModel):
         blank=True,
         help_text=_("Who may enroll. Empty: every patient, however recent the stroke."),
     )
+    inclusion = models.TextField(
+        _("criteria of inclusion"),
+        max_length=4000,
+        blank=True,
+        help_text=_("One a line. Each is asked when a patient is enrolled, and has to be met."),
+    )
+    exclusion = models.TextField(
+        _("criteria of exclusion"),
+        max_length=4000,
+        blank=True,
+        help_text=_("One a line. Who meets one of them is not enrolled."),
+    )
     visits = models.PositiveSmallIntegerField(_("visits in each period"), default=1)
     days_between = models.PositiveSmallIntegerField(_("days between visits"), default=1)
     washout_days = models.PositiveSmallIntegerField(_("days between periods"), default=7)
+    follow_up_days = models.PositiveSmallIntegerField(
+        _("days to the follow-up"),
+        null=True,
+        blank=True,
+        help_text=_("After the last visit: a baseline, without feedback. Empty: no follow-up."),
+    )
     goal_percent = models.FloatField(
         _("goal (% of baseline)"), default=100, validators=between(50, 200, "%")
     )
@@ -107,7 +126,7 @@ class Study(ClinicModel):
     created_at = models.DateTimeField(default=timezone.now, editable=False)
     registered_at = models.DateTimeField(null=True, editable=False)
     started_at = models.DateTimeField(null=True, editable=False)
-    # From then on nothing is hidden from anybody.
+    # From then on nothing is hidden.
     closed_at = models.DateTimeField(null=True, editable=False)
 
     class Meta(ClinicModel.Meta):
@@ -127,9 +146,24 @@ class Study(ClinicModel):
         return self.state == StudyState.DRAFT
 
     @property
+    def inclusion_criteria(self) -> list[str]:
+        """What each participant has to meet."""
+        return list(filter(None, map(str.strip, self.inclusion.splitlines())))
+
+    @property
+    def exclusion_criteria(self) -> list[str]:
+        """What no participant may meet."""
+        return list(filter(None, map(str.strip, self.exclusion.splitlines())))
+
+    @property
+    def criteria(self) -> list[str]:
+        """All that has to hold of a participant, in words: those of exclusion with “not” before."""
+        return [*self.inclusion_criteria, *(f"not: {one}" for one in self.exclusion_criteria)]
+
+    @property
     def visit_plan(self) -> VisitPlan:
         """When participants come. Raises InvalidSetting."""
-        return VisitPlan(self.visits, self.days_between, self.washout_days)
+        return VisitPlan(self.visits, self.days_between, self.washout_days, self.follow_up_days)
 
     def arm_rules(self) -> list[ArmRule]:
         """Return the arms in the form that the rules use. Raises InvalidSetting."""
@@ -151,7 +185,7 @@ class Study(ClinicModel):
 
     @property
     def risks_early_punishment(self) -> bool:
-        """Whether people may meet negative feedback early after their stroke.
+        """Whether participants may get negative feedback early after their stroke.
 
         It then worked worse than reward (docs/reference/gait.md#feedback-and-time-since-stroke).
         """
@@ -220,7 +254,7 @@ class Arm(ScopedModel):
     measure = models.ForeignKey(
         MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
     )
-    # None once it was deleted; what was walked stands in the study's versions.
+    # None once it was deleted; the study's versions still have what was walked.
     protocol = models.ForeignKey(
         Protocol, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("protocol")
     )
@@ -247,6 +281,14 @@ class Arm(ScopedModel):
             raise InvalidSetting(message % {"code": self.code})
         return self.to_rule().condition.apply_to(self.protocol.to_rules())
 
+    def baseline(self) -> tuple[Phase, ...]:
+        """Return the first baseline alone, which a follow-up walks. Raises InvalidSetting."""
+        found = next((phase for phase in self.phases() if phase.kind == "baseline"), None)
+        if found is None:
+            message = gettext("The protocol of arm %(code)s has no baseline for a follow-up.")
+            raise InvalidSetting(message % {"code": self.code})
+        return (found,)
+
     def to_rule(self) -> ArmRule:
         """Return the arm in the form that the rules use. Raises InvalidSetting."""
         answers = {name: getattr(self, name) for name in SCHEDULE_FIELDS}
@@ -261,29 +303,34 @@ class Arm(ScopedModel):
         return ArmRule(self.code, self.name, self.weight, condition)
 
 
-class StudyMark(AppendOnlyModel):
+class StudyMark(SealableModel):
     """What an account is in a study besides its role, until ``ended_at``."""
 
     class Task(models.TextChoices):
-        """What the mark says."""
+        """What the mark allows or hides."""
 
         ASSESSOR = "assessor", _("Assesses, and must not know the arm")
         INTERIM = "interim", _("May look before the study is closed")
 
     scope = Scope(clinic="study__clinic")
+    # With the event, which is sealed, of who ended it.
     allowed_changes = (
-        Allowed(("ended_at",), "OLD.ended_at IS NULL AND NEW.ended_at IS NOT NULL"),
-        ACCOUNT_DELETED,
+        Allowed(
+            ("ended_at",),
+            "OLD.ended_at IS NULL AND EXISTS (SELECT 1 FROM rehab_studyevent e WHERE "
+            "e.study_id = NEW.study_id AND e.kind = 'unmarked' AND e.at = NEW.ended_at)",
+        ),
     )
+    sealed_fields = ("study", "user", "task", "by", "at")
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="marks")
     user = models.ForeignKey(User, on_delete=models.PROTECT, related_name="study_marks")
     task = models.CharField(_("task"), max_length=8, choices=Task.choices)
-    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    by = models.ForeignKey(User, on_delete=models.PROTECT, related_name="+", null=True)
     at = models.DateTimeField(default=timezone.now)
     ended_at = models.DateTimeField(null=True)
 
-    class Meta(AppendOnlyModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("mark")
         ordering: ClassVar = ["pk"]
         constraints: ClassVar = [
@@ -299,5 +346,5 @@ class StudyMark(AppendOnlyModel):
 
 
 def has_mark(study: Study, user: Any, task: StudyMark.Task) -> bool:
-    """Return whether an account has a mark of a study now."""
+    """Return whether the account ``user`` has the mark ``task`` in a study now."""
     return study.marks.filter(user=user, task=task, ended_at=None).exists()

@@ -19,6 +19,7 @@ from rehab.studies.registration.lifecycle import check_no_open_session, current_
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from robot.wire.cue_limits import SEED_MAX
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,11 @@ def next_visit(enrollment: Enrollment) -> StudyVisit | None:
     return None
 
 
+def variety_seed(study_id: int, visit: int) -> int:
+    """Return the seed of the robot's varied answers: the same for all participants at a visit."""
+    return (study_id * 1000 + visit) % SEED_MAX
+
+
 def start_session(
     enrollment: Enrollment,
     place: Place,
@@ -53,11 +59,23 @@ def start_session(
 ) -> TrainingSession:
     """Create the session of a participant's next visit, with the arm's condition.
 
-    ``chosen_id``: key of the visit that the page showed as the next one; None without a page.
+    Parameters
+    ----------
+    enrollment
+        The participant.
+    place
+        Where and how the session is walked.
+    by, now
+        Who starts it (None for a program), and when.
+    chosen_id
+        Key of the visit that the page showed as the next one; None without a page.
 
-    Raises InvalidSetting for a participant who has withdrawn, walked all visits or has a session
-    that is open, where another visit is next, for a study that is not running or was changed, a
-    person to whom the arm is hidden, and what `create_session` refuses.
+    Raises
+    ------
+    InvalidSetting
+        For a participant who has withdrawn, walked all visits or has an open session; where another
+        visit is next; for a study that is not running or was changed; and for what `create_session`
+        refuses, such as an assessor.
     """
     study = enrollment.study
     with transaction.atomic():
@@ -79,12 +97,13 @@ def start_session(
             raise InvalidSetting(
                 gettext("Somebody else has started that visit. Look at the list, then start again.")
             )
-        if visit.session is not None:  # it was broken off
+        if visit.session is not None:  # it was aborted
             visit = StudyVisit(
                 enrollment=enrollment,
                 number=visit.number,
                 attempt=visit.attempt + 1,
                 period=visit.period,
+                follow_up=visit.follow_up,
                 day=now.date(),
             )
         visit.version = current_version(study)
@@ -94,13 +113,14 @@ def start_session(
                 patient=enrollment.patient,
                 valence=arm.valence,
                 goal=GoalRule(percent_of_baseline=study.goal_percent),
-                phases=arm.phases(),
+                phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
+                variety_seed=variety_seed(study.pk, visit.number),
                 created_by=by,
-                may_change_type=False,  # it is what the arm was allocated for
+                locked=True,
                 **{part.name: getattr(place, part.name) for part in fields(place)},
             )
         )

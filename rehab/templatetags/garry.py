@@ -17,7 +17,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.training.valences import VALENCES
 from robot.wire.close_codes import FINAL_FOR_PAGES
-from robot.wire.limits import PAGE_HEARTBEAT_S
+from robot.wire.limits import PAGE_HEARTBEAT_S, SERVER_COOKIE
 
 register = template.Library()
 
@@ -35,7 +35,11 @@ def icon(name: str) -> SafeString:
 @register.simple_tag
 def wire_limits() -> SafeString:
     """Return what a page's scripts have to know of the wire, as the JSON element ``wire``."""
-    limits = {"final_codes": sorted(FINAL_FOR_PAGES), "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S}
+    limits = {
+        "final_codes": sorted(FINAL_FOR_PAGES),
+        "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S,
+        "server_cookie": SERVER_COOKIE,
+    }
     return json_script(limits, "wire")
 
 

@@ -29,7 +29,7 @@ class Measure:
     Attributes
     ----------
     slug, name, unit
-        For programs, for people (translated by pages), and of its values.
+        Its name in programs, its name for people (translated by pages), its values' unit.
     value_min, value_max
         Values lie in [value_min, value_max]; others are invalid.
     goal_min, goal_max

@@ -13,7 +13,6 @@ from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.robot_cueing import (
-    DEFAULT_ACTIVATION_THRESHOLD,
     CueTiming,
     check_activation_threshold,
     check_cue_rule,
@@ -22,6 +21,7 @@ from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence
 from robot.marking import gettext_noop
+from robot.wire.cue_limits import DEFAULT_THRESHOLD
 
 # How lively the robot is: the share of a gesture's size, by a name that pages translate. The robot
 # itself makes half of it gentle (no sounds, half the speed).
@@ -65,7 +65,7 @@ class PlanSettings:
     Attributes
     ----------
     goal, target
-        What a step should reach, and what is wanted of the whole session.
+        What a step should reach, and the target of the whole session.
     activation_threshold, robot_intensity, cue_timing
         Mean performance at which the robot celebrates, the share of its gestures' size, and what
         they answer.
@@ -73,15 +73,21 @@ class PlanSettings:
         After which steps the patient gets feedback.
     adaptation
         Whether goals follow the patient.
+    variety_seed
+        What the robot's varied answers follow from; None for the session's number.
+    locked
+        Whether what defines the condition stays as it was planned: in a study's session.
     """
 
     goal: GoalRule
     target: Target = field(default_factory=Target)
-    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
+    activation_threshold: float = DEFAULT_THRESHOLD
     robot_intensity: float = 1.0
     cue_timing: CueTiming = field(default_factory=CueTiming)
     schedule: Schedule = field(default_factory=Schedule)
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
+    variety_seed: int | None = None
+    locked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +103,7 @@ class SessionPlan(PlanSettings):
     gestures
         Composed gestures that a cue names, as they are sent to the robot.
     alternatives
-        Valences that the session may be changed to, as they are then.
+        Valences that the session may be changed to, as edited by the clinic until its creation.
     close_steps
         Which steps are too uncertain to count as hit or miss.
     language
@@ -159,7 +165,7 @@ class SessionPlan(PlanSettings):
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> SessionPlan:
-        """Return the plan of ``to_json``'s data, also of versions that had fewer fields."""
+        """Return the plan that ``to_json`` wrote, also in a version that had fewer fields."""
         return cls(
             measure=Measure(**data["measure"]),
             valence=_read_valence(data["valence"]),
@@ -174,7 +180,9 @@ class SessionPlan(PlanSettings):
             cue_timing=_read_cue_timing(data.get("cue_timing", {})),
             schedule=_read_schedule(data.get("schedule", {})),
             adaptation=_read_adaptation(data.get("adaptation")),
+            variety_seed=data.get("variety_seed"),
             close_steps=CloseSteps(**data.get("close_steps", {})),
+            locked=data.get("locked", False),
             language=data.get("language", "en"),
         )
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from rehab.training.measures import InvalidSetting
 from robot.wire.cue_limits import (
     COUNT_MAX,
+    DEFAULT_COUNT,
+    DEFAULT_REST_S,
+    DEFAULT_WINDOW_S,
     REST_MAX_S,
     THRESHOLD_MAX,
     WINDOW_MAX_S,
     WINDOW_MIN_S,
     CueRule,
 )
-
-# The paper's default (P 3.4.1): the robot responds to windows of at least 90 % of the goal.
-DEFAULT_ACTIVATION_THRESHOLD = 0.90
 
 
 def check_activation_threshold(threshold: float) -> float:
@@ -50,7 +50,7 @@ class CueTiming:
     window_s
         ``windows``: length of a window, by the source's clock [s].
     count
-        ``streaks``: steps in a row; ``steps``: steps of which each last one is answered.
+        ``streaks``: steps in a row; ``steps``: steps whose mean performance is answered.
     rest_s
         Least time from the start of one gesture to the start of the next [s].
 
@@ -61,9 +61,9 @@ class CueTiming:
     """
 
     rule: CueRule = CueRule.WINDOWS
-    window_s: float = 5.0
-    count: int = 5
-    rest_s: float = 5.0
+    window_s: float = DEFAULT_WINDOW_S
+    count: int = DEFAULT_COUNT
+    rest_s: float = DEFAULT_REST_S
 
     def __post_init__(self) -> None:
         if not WINDOW_MIN_S <= self.window_s <= WINDOW_MAX_S:

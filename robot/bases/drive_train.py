@@ -37,7 +37,7 @@ class DriveTrain:
     lag_s
         Time constant of the motors [s].
     stiction_m_s
-        A wheel that stands is not moved by an order below this speed [m/s].
+        A wheel follows no order below this speed [m/s]: it stays, or comes to rest.
     held
         Share of its speed that something takes from it, 0 to 1: 1 is a foot in its way.
     wheels_m_s
@@ -99,8 +99,8 @@ class DriveTrain:
         return self.wheels_m_s
 
     def _move(self, speed: float, target: float, share: float) -> float:
-        if speed == 0 and abs(target) < self.stiction_m_s:
-            return 0.0
+        if abs(target) < self.stiction_m_s:
+            target = 0.0
         speed += (target - speed) * share
         return target if abs(target - speed) < 1e-4 else speed
 

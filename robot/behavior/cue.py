@@ -8,7 +8,12 @@ from typing import Any
 
 from robot.wire.cue_limits import (
     COUNT_MAX,
+    DEFAULT_COUNT,
+    DEFAULT_REST_S,
+    DEFAULT_THRESHOLD,
+    DEFAULT_WINDOW_S,
     REST_MAX_S,
+    SEED_MAX,
     THRESHOLD_MAX,
     WINDOW_MAX_S,
     WINDOW_MIN_S,
@@ -41,18 +46,25 @@ class Cue:
         on the source's clock [s], so that what a robot does follows from the log.
     intensity
         Share of a gesture's size, 0.1 to 1; 0 for no gesture at all.
+    only_informs
+        Whether the feedback judges nothing, as explicit feedback: then no gesture answers, whatever
+        ``above`` and ``below`` name.
+    seed
+        What varied answers follow from; None for the session's number.
     gestures
         Composed gestures as JSON data, not parsed yet.
     """
 
     above: str | None = None
     below: str | None = None
-    threshold: float = 0.9
+    threshold: float = DEFAULT_THRESHOLD
     rule: CueRule = CueRule.WINDOWS
-    count: int = 1
-    window_s: float = 5.0
-    rest_s: float = 5.0
+    count: int = DEFAULT_COUNT
+    window_s: float = DEFAULT_WINDOW_S
+    rest_s: float = DEFAULT_REST_S
     intensity: float = 1.0
+    only_informs: bool = False
+    seed: int | None = None
     gestures: tuple[Any, ...] = ()
 
     @classmethod
@@ -66,7 +78,15 @@ class Cue:
         # A server from before there were rules names none.
         if (rule := cue.get("rule", CueRule.WINDOWS)) not in list(CueRule):
             raise BadFrame(f'"rule" is one of: {", ".join(CueRule)}.')
+        count = DEFAULT_COUNT
+        if "count" in cue:
+            count = read_whole(cue, "count", low=1, high=COUNT_MAX)
+        seed = cue.get("seed")
+        if seed is not None:
+            seed = read_whole(cue, "seed", low=0, high=SEED_MAX)
         gestures = cue.get("gestures", [])
+        if not isinstance(only_informs := cue.get("only_informs", False), bool):
+            raise BadFrame('"only_informs" is true or false.')
         if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
             raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')
         return cls(
@@ -74,10 +94,12 @@ class Cue:
             below=_read_gesture(cue, "below"),
             threshold=read_number(cue, "threshold", 0.0, THRESHOLD_MAX),
             rule=CueRule(rule),
-            count=read_whole(cue, "count", low=1, high=COUNT_MAX) if "count" in cue else 1,
+            count=count,
             window_s=read_number(cue, "window_s", WINDOW_MIN_S, WINDOW_MAX_S),
             rest_s=read_number(cue, "rest_s", 0.0, REST_MAX_S),
             intensity=intensity,
+            only_informs=only_informs,
+            seed=seed,
             gestures=tuple(gestures),
         )
 
@@ -85,6 +107,11 @@ class Cue:
     def is_quiet(self) -> bool:
         """Whether it is to be performed without sounds, and slowly."""
         return self.intensity <= QUIET
+
+    @property
+    def moves(self) -> bool:
+        """Whether any gesture may answer."""
+        return self.intensity > 0 and not self.only_informs
 
     def gesture(self, above: bool) -> str | None:
         """Return the gesture after a window above or below the threshold."""

@@ -103,7 +103,7 @@ class Performer:
             and self._is_running
             and not self._has_hung
             and self.body.safety.is_watched
-            and self.decider.cue.intensity > 0
+            and self.decider.cue.moves
             and not self.body.safety.blocking_reason(self.body.read())
         )
 
@@ -204,7 +204,7 @@ class Performer:
                 raise BadFrame("A welcome says in which state the session is.")
             if session != self.session:
                 self.decider = WindowDecider(cue)
-                self.variety = Variety(seed=session)
+                self.variety = Variety(seed=session if cue.seed is None else cue.seed)
                 self.reports.clear()
             self._set_cue(cue)
             self.decider.drop_window()

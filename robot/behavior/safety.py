@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from robot.bases.base import Abilities, BaseState
 from robot.behavior.resistance import Resistance
 from robot.motion.gesture import Gesture
-from robot.motion.limits import ORDER_HOLDS_S, TETHER_M
+from robot.motion.limits import AT_HOME_M, AT_HOME_RAD, ORDER_HOLDS_S, TETHER_M
 from robot.motion.pose import HOME
 from robot.motion.twist import Twist
 
@@ -42,10 +42,6 @@ BATTERY_WARN_V = 14.0
 BATTERY_LOW_V = 13.5
 BATTERY_EMPTY_V = 13.2
 EMPTY_S = 1.0  # a voltage dips when wheels start (our choice)
-
-# Further from home than this [m, rad] a gesture is refused, not corrected for.
-AT_HOME_M = 0.05
-AT_HOME_RAD = 0.087  # 5°
 
 # An arming sooner than this after the robot stopped itself [s] was given before anyone could look
 # (our choice; people react to what they see after 0.2 s and more).

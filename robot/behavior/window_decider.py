@@ -25,6 +25,7 @@ LATE = "late"  # the step that ended the window came more than a window after it
 PERFORMING = "performing"
 RESTING = "resting"
 OFF = "off"  # the order's intensity is 0
+ONLY_INFORMS = "only_informs"  # the feedback judges nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +175,8 @@ class WindowDecider:
         """
         if self.cue.gesture(decision.above) is None:
             return NO_GESTURE
+        if self.cue.only_informs:
+            return ONLY_INFORMS
         if not self.cue.intensity:
             return OFF
         if decision.is_late:

@@ -2,7 +2,7 @@
 
 Nothing here holds up the loop that drives the base: it appends to a list in memory, and a thread
 writes. Where the disk is too slow, the oldest records are dropped and counted. A power cut may lose
-the last seconds: they are written every half second, but the disk is not told to hurry.
+the last seconds: they are written every half second, but the disk may take its time.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self
 
 from robot.atomic_file import write_atomically
 from robot.black_box.ring import Ring
+from robot.black_box.session_motion import SessionMotion
 from robot.wire.incident import Record, pack, read_lines, to_lines
 
 WAITING = 6_000  # records in memory: of a minute
@@ -58,6 +59,8 @@ class BlackBox:
         The clock of the records [s].
     now
         The time of day.
+    keeps_motion
+        Whether the motion of each session is kept as MCAP; the package mcap has to be there.
 
     Attributes
     ----------
@@ -74,12 +77,17 @@ class BlackBox:
         folder: Path,
         monotonic: Callable[[], float] = time.monotonic,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
+        *,
+        keeps_motion: bool = False,
     ) -> None:
         self.folder = folder
         self.incidents: deque[Incident] = deque(maxlen=TO_SEND)
         self.lost, self.problem = 0, ""
         self._monotonic, self._now = monotonic, now
         self._ring = Ring(folder)
+        self._motion: SessionMotion | None = None
+        if keeps_motion:
+            self._motion = SessionMotion(folder / "sessions", now().timestamp() - monotonic())
         self._waiting: deque[Record] = deque()
         self._reported_lost = 0
         self._retention: _Retention | None = None
@@ -141,6 +149,10 @@ class BlackBox:
         except OSError:
             self.lost += len(records)
             raise
+        if self._motion is not None:
+            self._motion.add(records)
+            if self._is_closing.is_set():
+                self._motion.close()
         retention = self._retention
         if retention is not None and (
             self._is_closing.is_set() or self._monotonic() - retention.at_s >= AFTER_S

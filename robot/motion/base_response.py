@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import pairwise
 
 from robot.motion.pose import Pose, advance
@@ -13,6 +13,8 @@ from robot.motion.twist import STILL, Twist
 # No base is waited for longer than this [s]: twice the worst that is reported
 # (docs/reference/kobuki.md#dead-time).
 LONGEST_DELAY_S = 0.6
+# Wheels that take more than this to start [m/s] are blocked, or their floor is no floor for them.
+MOST_STICTION_M_S = 0.08
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,9 @@ class Response:
         Distance by its wheels over the true one.
     gyro_bias_rad_s
         How fast its gyro turns at rest [rad/s].
+    stiction_m_s
+        Its wheels follow no order below this speed [m/s]. Default: what users report of a Kobuki
+        (0.33 rad/s, docs/reference/kobuki.md#what-users-report), and a third more.
 
     The defaults are for a base that nobody has measured yet: the middle of what is reported
     (docs/reference/kobuki.md#dead-time). ``python -m robot calibrate`` measures one.
@@ -38,15 +43,17 @@ class Response:
     lag_s: float = 0.04
     wheel_scale: float = 1.0
     gyro_bias_rad_s: float = 0.0
+    stiction_m_s: float = 0.05
 
     def __post_init__(self) -> None:
-        numbers = (self.dead_time_s, self.lag_s, self.wheel_scale, self.gyro_bias_rad_s)
-        if not all(map(math.isfinite, numbers)):
+        if not all(map(math.isfinite, astuple(self))):
             raise ValueError("A base's response has finite numbers.")
         if min(self.dead_time_s, self.lag_s) < 0 or self.delay_s > LONGEST_DELAY_S:
             raise ValueError(f"Dead time and lag are 0 or more, together {LONGEST_DELAY_S:g} s.")
         if not 0.8 <= self.wheel_scale <= 1.2:
             raise ValueError("A wheel scale lies between 0.8 and 1.2.")
+        if not 0 <= self.stiction_m_s <= MOST_STICTION_M_S:
+            raise ValueError(f"A stiction lies between 0 and {MOST_STICTION_M_S:g} m/s.")
 
     @property
     def delay_s(self) -> float:
@@ -54,7 +61,7 @@ class Response:
         return self.dead_time_s + self.lag_s
 
 
-AT_ONCE = Response(dead_time_s=0.0, lag_s=0.0)
+AT_ONCE = Response(dead_time_s=0.0, lag_s=0.0, stiction_m_s=0.0)
 
 
 class OrdersInFlight:

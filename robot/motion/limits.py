@@ -13,6 +13,10 @@ TICK_S = 0.02  # between two orders to a base: 50 Hz, the rate of a Kobuki's fee
 # (docs/reference/kobuki.md#beside-a-person).
 TETHER_M = 0.30
 REACH_M = 0.25
+# Further from home than this [m, rad] a gesture is refused, and one that ends there has failed
+# (docs/reference/kobuki.md#beside-a-person).
+AT_HOME_M = 0.05
+AT_HOME_RAD = 0.087  # 5°
 
 # A limiter counts at most this between two orders [s]: a program that hung must not make a base
 # lurch

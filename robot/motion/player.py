@@ -10,10 +10,10 @@ from robot.marking import gettext_noop
 from robot.motion.base_response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.delay_meter import DelayMeter
 from robot.motion.gesture import MIN_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
-from robot.motion.limits import Limits
+from robot.motion.limits import AT_HOME_M, AT_HOME_RAD, Limits
 from robot.motion.path import Drive, Segment, Turn, plan_path
 from robot.motion.pose import HOME, Pose, wrap
-from robot.motion.twist import STILL, Twist
+from robot.motion.twist import STILL, WHEELBASE_M, Twist
 
 DONE = "done"
 OUT_OF_TIME = gettext_noop("out_of_time")
@@ -28,6 +28,9 @@ CLOSING_PER_S = 8.0
 # At home it waits for the orders that are still on their way, and this much longer [s]; then it
 # turns once more if they have carried it past.
 SETTLE_S = 0.1
+# One that is nearly at home when its time is over goes the rest at half its pace, so long [s].
+LATE_S = 2.0
+LATE_PACE = 0.5
 # While driving: heading offset for each meter beside the line [rad/m], and its maximum [rad].
 STEER_RAD_M = 2.5
 STEER_MAX_RAD = 0.3
@@ -53,11 +56,18 @@ class Player:
 
     def __init__(self, limits: Limits, response: Response = AT_ONCE) -> None:
         self.limits = limits
+        self._least = Twist(response.stiction_m_s, 2 * response.stiction_m_s / WHEELBASE_M)
+        # One that does not creep comes nearer to its places in the same time.
+        creeps = response.stiction_m_s <= CLOSING_PER_S * NEAR_M
+        self._near_m, self._near_rad = (NEAR_M, NEAR_RAD) if creeps else (NEAR_M / 2, NEAR_RAD / 2)
+        # It stops short, too: a base that turned round at once would seem to be held.
+        self._pause_s = 0.0 if creeps else SETTLE_S
         self._in_flight = OrdersInFlight(response.delay_s)
         self._meter = DelayMeter()
         self.gesture: Gesture | None = None
         self.outcome = ""  # of the gesture that was played last
         self.twist = STILL  # what was ordered last
+        self._ramped = STILL  # the same before it was lifted over the stiction
         self._time_s: float | None = None
         self._waypoints: deque[Waypoint] = deque()
         self._segments: deque[Segment] = deque()
@@ -68,6 +78,8 @@ class Player:
         self._verdict = ""  # the outcome, set while the base comes to rest
         self._turns_rad = 0.0  # full turns that were made before the gesture
         self._pace = 1.0
+        self._is_late = False  # its time is over, and it was nearly at home
+        self._is_corrected = False  # it has driven the rest of the way home
 
     @property
     def is_busy(self) -> bool:
@@ -100,6 +112,7 @@ class Player:
         if self.gesture is not None:
             raise RuntimeError(f"{self.gesture.name} is being played.")
         self.gesture, self._verdict, self._pace = gesture, "", pace
+        self._is_late = self._is_corrected = False
         self._turns_rad = pose.heading_rad - wrap(pose.heading_rad)
         self._waypoints = deque(gesture.waypoints)
         self._begins_s = time_s + after_s
@@ -114,7 +127,7 @@ class Player:
         """End the gesture and order a stop at once, without slowing down first."""
         if self.is_busy:
             self._end(self._verdict or reason)
-        self.twist = STILL
+        self.twist = self._ramped = STILL
 
     def step(self, time_s: float, pose: Pose) -> Twist:
         """Return the twist to order now.
@@ -135,8 +148,9 @@ class Player:
         self._meter.add(self.twist, pose, time_s)
         self._in_flight.delay_s = self._meter.delay_s or self._in_flight.delay_s
         limits, wanted = self._wanted_twist(time_s, self._in_flight.predict(pose, time_s))
-        self.twist = limits.approach(self.twist, wanted, elapsed_s)
-        if self._verdict and self.twist.is_still:
+        self._ramped = limits.approach(self._ramped, wanted, elapsed_s)
+        self.twist = self._lift(self._ramped, wanted)
+        if self._verdict and self._ramped.is_still:
             self._end(self._verdict)
         self._in_flight.add(self.twist, time_s)
         return self.twist
@@ -158,27 +172,78 @@ class Player:
             if time_s < self._begins_s:
                 return limits, STILL
             if self._there_s is None and time_s > self._until_s:
-                self._verdict = OUT_OF_TIME
+                if self._is_late or self._waypoints or not _is_near_home(here):
+                    self._verdict = OUT_OF_TIME
+                else:
+                    self._is_late, self._until_s = True, time_s + LATE_S
             elif self._segments:
-                wanted = _follow(self._segments[0], here, limits)
+                wanted = self._follow(self._segments[0], here, limits)
                 if wanted is not None:
                     return limits, wanted
                 self._segments.popleft()
             elif self._there_s is None:
                 self._there_s = time_s
             elif time_s - self._there_s < max(
-                self._waypoint.hold_s, 0 if self._waypoints else self._settle_s
+                self._waypoint.hold_s, self._pause_s if self._waypoints else self._settle_s
             ):
                 return limits, STILL
-            elif (
-                not self._waypoints
-                and abs(self._waypoint.heading_rad - here.heading_rad) > NEAR_RAD
+            elif not self._waypoints and (
+                rest := self._rest_of_the_way(here, self._waypoint.heading_rad)
             ):
-                self._segments.append(Turn(self._waypoint.heading_rad, 0.0))
+                self._segments.extend(rest)
                 self._there_s = None
             else:
                 self._next_waypoint(self._waypoint.pose, time_s)
         return self.limits, STILL
+
+    def _lift(self, ramped: Twist, wanted: Twist) -> Twist:
+        """Return an order that no wheel ignores: at its least speed, or still.
+
+        While it drives, the small turns that keep it on its line are left as they are.
+        """
+        v_m_s = _lift(ramped.v_m_s, wanted.v_m_s, self._least.v_m_s)
+        if v_m_s:
+            return Twist(v_m_s, ramped.w_rad_s)
+        return Twist(0.0, _lift(ramped.w_rad_s, wanted.w_rad_s, self._least.w_rad_s))
+
+    def _rest_of_the_way(self, here: Pose, heading_rad: float) -> list[Segment]:
+        """Return what is left at home, once the base has come to rest: ahead or back, and a turn.
+
+        One that answers sooner than was assumed has stopped too early; it drives the rest once.
+        """
+        rest: list[Segment] = []
+        left_m = HOME.seen_from(Pose(here.x_m, here.y_m)).x_m
+        if abs(left_m) > 2 * self._near_m and not self._is_corrected:
+            self._is_corrected = True
+            rest.append(Drive(HOME.x_m, HOME.y_m, heading_rad, left_m))
+        if rest or abs(heading_rad - here.heading_rad) > self._near_rad:
+            rest.append(Turn(heading_rad, 0.0))
+        return rest
+
+    def _follow(self, segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
+        """Return the twist that follows a segment; None at its end."""
+        match segment:
+            case Turn():
+                left_rad = segment.heading_rad - pose.heading_rad
+                if abs(left_rad) <= self._near_rad:
+                    return None
+                return Twist(
+                    w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2)
+                )
+            case Drive():
+                goal = Pose(segment.x_m, segment.y_m)
+                left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))
+                left_m, beside_m = left.x_m, -left.y_m
+                ahead = math.copysign(1.0, segment.by_m)
+                if left_m * ahead <= self._near_m:
+                    return None
+                # Towards the line; backwards that is by turning the other way.
+                steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
+                turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
+                return Twist(
+                    _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
+                    turn_rad * CLOSING_PER_S / 2,
+                )
 
     def _next_waypoint(self, start: Pose, time_s: float) -> None:
         self._there_s = None
@@ -196,7 +261,7 @@ class Player:
 
     def _share(self, waypoint: Waypoint) -> float:
         """Return the share of the limits for a waypoint."""
-        return max(MIN_PACE, waypoint.pace * self._pace)
+        return max(MIN_PACE, waypoint.pace * self._pace * (LATE_PACE if self._is_late else 1.0))
 
     def _end(self, outcome: str) -> None:
         self.gesture, self._waypoint = None, None
@@ -205,28 +270,15 @@ class Player:
         self._segments.clear()
 
 
-def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
-    """Return the twist that follows a segment; None at its end."""
-    match segment:
-        case Turn():
-            left_rad = segment.heading_rad - pose.heading_rad
-            if abs(left_rad) <= NEAR_RAD:
-                return None
-            return Twist(w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2))
-        case Drive():
-            goal = Pose(segment.x_m, segment.y_m)
-            left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))
-            left_m, beside_m = left.x_m, -left.y_m
-            ahead = math.copysign(1.0, segment.by_m)
-            if left_m * ahead <= NEAR_M:
-                return None
-            # Towards the line; backwards that is by turning the other way.
-            steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
-            turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
-            return Twist(
-                _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
-                turn_rad * CLOSING_PER_S / 2,
-            )
+def _is_near_home(pose: Pose) -> bool:
+    return pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
+
+
+def _lift(ramped: float, wanted: float, least: float) -> float:
+    """Return a speed of at least the least one on its way to what is wanted, or 0."""
+    if abs(ramped) >= least:
+        return ramped
+    return math.copysign(least, wanted) if wanted and ramped * wanted >= 0 else 0.0
 
 
 def _approach_speed(left: float, speed: float, slow_down: float) -> float:

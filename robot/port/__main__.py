@@ -33,6 +33,7 @@ from typing import Any
 from robot.port.opening import PortOpener
 from robot.port.orphan_stop import OrphanStop
 from robot.port.owner import PortOwner
+from robot.port.priority import raise_priority
 from robot.port.setpoint import MAX_FRAME_BYTES
 
 LINES_KEPT = 25  # received ones, while nobody reads them: half a second
@@ -92,6 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--owes-stop", action="store_true", help="the process before this one lost a moving base"
     )
     options = parser.parse_args(arguments)
+    raise_priority()
     opener = PortOpener(options.url, options.baud)
     orphan_stop = OrphanStop(opener, options.stop)  # before there are threads
     writer = PipeWriter(sys.stdout.fileno())

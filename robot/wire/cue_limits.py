@@ -1,4 +1,4 @@
-"""What a cue may ask of a robot: plans are made within these limits, and robots refuse others."""
+"""What a cue asks of a robot: its limits, which plans keep to, and what it is by default."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ THRESHOLD_MAX = 2.0  # share of the goal; it lies above 0
 WINDOW_MIN_S, WINDOW_MAX_S = 2.0, 60.0  # two steps at least, and still an answer to something
 REST_MAX_S = 600.0
 COUNT_MAX = 100
+SEED_MAX = 2**31 - 1
+
+# The paper's (P 3.4.1), but for the count of steps, which is ours.
+DEFAULT_THRESHOLD = 0.9
+DEFAULT_WINDOW_S = DEFAULT_REST_S = 5.0
+DEFAULT_COUNT = 5
 
 VARIED = "varied"  # in place of a gesture: one of a pool that follows from the walking
 

@@ -1,8 +1,11 @@
-"""Sizes, numbers and times that both ends of a websocket keep to (docs/protocol.md)."""
+"""Sizes, numbers and times that both ends of a websocket respect (docs/protocol.md)."""
 
 from __future__ import annotations
 
 PROTOCOL_VERSION = 1
+# Tells a proxy before several servers which of them to ask: the one that `elsewhere` named.
+SERVER_HEADER = "GARRY-Server"
+SERVER_COOKIE = "garry_server"  # the same of browsers
 
 MAX_FRAME_BYTES = 64 * 1024
 MAX_REPORT_CHARS = 8 * 1024

@@ -14,6 +14,7 @@ from tests.bench.own_database import copy_rows, set_up
 WALKED = 1800  # steps a session: half an hour
 EVENTS = 60  # a session
 OPEN = 100  # sessions that run
+CLINICS = 1_000  # beside theirs
 GROWING = ("rehab_step", "rehab_sessionevent", "rehab_trainingsession", "rehab_sessionmetric")
 BASE = 1_000_000  # keys of what is made begin there
 
@@ -23,9 +24,11 @@ def fill(rows: int) -> list[int]:
     from django.db import connection, transaction
     from django.utils import timezone
 
+    from rehab.people.models import Clinic
     from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.log import Remark, SessionEvent, Step
     from rehab.sessions.models import TrainingSession
+    from rehab.sessions.ownership import ClinicOwner
     from rehab.training.steps import Measurement, Side
     from tests.support.live_seed import seed
     from tests.support.world import store
@@ -40,10 +43,12 @@ def fill(rows: int) -> list[int]:
             if number % (WALKED // EVENTS) == 0:
                 store(aggregate, [aggregate.log_event(Remark.HANDRAIL, None, at, {})])
     TrainingSession.everywhere.filter(pk=key).update(last_number=WALKED, **aggregate.summary())
+    others = Clinic.everywhere.bulk_create(Clinic(name=f"other {n}") for n in range(CLINICS))
+    ClinicOwner.everywhere.bulk_create(ClinicOwner(clinic=clinic) for clinic in others)
     count = max(OPEN, rows // WALKED)
     new = {"session_id": f"{BASE} + i"}
     state = f"CASE WHEN i <= {OPEN} THEN 'running' ELSE 'finished' END"
-    sessions = {"id": f"{BASE} + i", "state": state, "station_id": "NULL", "owner": "''"}
+    sessions = {"id": f"{BASE} + i", "state": state, "station_id": "NULL"}
     copy_rows(TrainingSession, count, f"t.id = {key}", sessions)
     for model in (Step, SessionEvent):
         copy_rows(model, count, f"t.session_id = {key}", new)
@@ -60,25 +65,26 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from rehab.sessions.live import auth
     from rehab.sessions.live.database import owners
     from rehab.sessions.live.protocol import backlog
-    from rehab.sessions.live.servers import following
     from rehab.sessions.live.session import loading
     from rehab.sessions.live.session.commits import Job, commit
-    from rehab.sessions.log import SessionEvent
+    from rehab.sessions.models import TrainingSession
     from rehab.stations.models import Device
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.measures import Measure
     from rehab.training.steps import Measurement, Side
 
     yield "find_ownerless", owners.find_ownerless
-    found = loading.load_together(keys[:1])[keys[0]]
+    clinic = TrainingSession.everywhere.get(pk=keys[0]).clinic_id
+    epoch = owners.claim(clinic).epoch
+    found = loading.load_together({keys[0]: epoch})[keys[0]]
     assert isinstance(found, loading.LoadedSession), found
     aggregate = found.aggregate
-    yield "load one", lambda: loading.load_together([keys[1]])
-    yield "load fifty", lambda: loading.load_together(keys[2:52])
+    yield "load one", lambda: loading.load_together({keys[1]: epoch})
+    yield "load fifty", lambda: loading.load_together(dict.fromkeys(keys[2:52], epoch))
 
     def job(rows: Any, summary: Any = None) -> Job:
         session = aggregate.session
-        return Job(aggregate, session.pk, session.epoch, rows, summary, lambda _: None)
+        return Job(aggregate, session.pk, epoch, rows, summary, lambda _: None)
 
     def step() -> Any:
         number = aggregate.fold.last_number + 1
@@ -96,10 +102,6 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
         "commit a change",
         lambda: commit([job(aggregate.change(pause, None, timezone.now()), aggregate.summary())]),
     )
-    yield "follow one", lambda: following.load_followed(keys[60])
-    newest = SessionEvent.everywhere.order_by("-pk")[0].pk
-    behind = [(key, WALKED - 2, newest) for key in keys]
-    yield "follow a hundred", lambda: following.read_new_rows(behind)
     yield "a page's past steps", lambda: async_to_sync(backlog.read_backlog)(keys[0], 900, 1800)
     resent, measure = Measurement(900, 990.0, Side.LEFT, 3.0), aggregate.fold.plan.measure
     assert isinstance(measure, Measure)
@@ -112,7 +114,8 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "a station's open session", lambda: async_to_sync(auth.find_open_session)(device, None)
     yield "its newest", lambda: loading.find_newest_open(device.station_id)
     yield "may a tablet open it", lambda: async_to_sync(auth.may_open)(tablet, keys[0])
-    yield "release", lambda: owners.release_all(keys[:52])
+    yield "note ends", lambda: owners.note_ends(keys[:52])
+    yield "release", lambda: owners.release([clinic])
 
 
 def measure(rows: int) -> dict[str, Any]:

@@ -18,6 +18,7 @@ def fill(count: int) -> None:
     from rehab.sessions.live.session.aggregate import CHECKPOINT_STEPS, SessionAggregate
     from rehab.sessions.log import Step
     from rehab.sessions.models import TrainingSession
+    from rehab.sessions.ownership import ClinicOwner
     from rehab.sources.synthetic import PROFILES, SyntheticWalker
     from rehab.training.fold.checkpoints import fold_to_json
     from rehab.training.steps import Side
@@ -43,9 +44,8 @@ def fill(count: int) -> None:
             "WHERE step.session_id = %s AND session.id <> %s",
             [ids[0], ids[0]],
         )
-    TrainingSession.everywhere.filter(pk__in=ids).update(
-        last_number=STEPS, checkpoint=checkpoint, owner="gone|1|1"
-    )
+    TrainingSession.everywhere.filter(pk__in=ids).update(last_number=STEPS, checkpoint=checkpoint)
+    ClinicOwner.everywhere.update(owner="gone|1|1")
 
 
 async def restore() -> tuple[int, float, float]:

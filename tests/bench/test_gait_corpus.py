@@ -82,6 +82,7 @@ def judge(walk: CorpusWalk) -> Row:
     check = check_signals(
         walk.t_s, walk.legs["left"], walk.legs["right"], rate_hz=walk.rate_hz, mass_kg=walk.mass_kg
     )
+    assert not any(finding.doubt for finding in check.findings)
     return Row(
         len(clean),
         valid,

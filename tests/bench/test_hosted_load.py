@@ -1,9 +1,8 @@
-"""Hosted servers on one PostgreSQL and one Redis, each session with tablet, monitor and robot.
+"""Hosted servers on one PostgreSQL, each session with tablet, monitor and robot, beside a relay.
 
-Beside a relay. Every page of a session comes to one
-server, as nginx sends a clinic's name to one. The soak takes GARRY_TEST_SOAK_MINUTES (2; the aim is
-said for 60), beside a probe of the disk and the processor: a twelfth in which the machine made
-everybody wait tells nothing of the servers.
+Each session is in a clinic of its own, and each clinic lives in one server. The soak takes
+GARRY_TEST_SOAK_MINUTES (2; the aim is said for 60), beside a probe of the disk and the processor: a
+twelfth in which the machine made everybody wait tells nothing of the servers.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import os
 import statistics
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,7 @@ import pytest
 
 from tests.bench.driving import BUSY_MS, allow_many_files, drive, relay
 from tests.bench.waiting import watch_machine
-from tests.support.hosted import find_missing, run_postgres, run_redis
+from tests.support.hosted import find_missing, run_postgres
 from tests.support.pair import Message, Pair
 
 pytestmark = [
@@ -47,12 +45,9 @@ def many_files() -> None:
 
 
 @pytest.fixture
-def database_and_redis() -> Iterator[tuple[str, str]]:
-    with ExitStack() as stack:
-        yield (
-            stack.enter_context(run_postgres(disk=DISK, settings=POSTGRES)),
-            stack.enter_context(run_redis()),
-        )
+def database() -> Iterator[str]:
+    with run_postgres(disk=DISK, settings=POSTGRES) as url:
+        yield url
 
 
 async def run_load(pair: Pair, folder: Path, count: int, **how: Any) -> list[Message]:
@@ -63,7 +58,7 @@ async def run_load(pair: Pair, folder: Path, count: int, **how: Any) -> list[Mes
         for place, (port, process) in enumerate(zip(pair.ports, pair.processes, strict=True)):
             assert process is not None
             file = folder / f"rows {place}.json"
-            file.write_text(json.dumps(rows[place :: len(pair.ports)]))
+            file.write_text(json.dumps([row for row in rows if pair.place_of(row) == place]))
             runs.append(asyncio.to_thread(drive, "garry", port, process.pid, file, VIEWERS, **how))
         return await asyncio.gather(*runs)
 
@@ -78,7 +73,7 @@ def sum_up(runs: list[Message]) -> Message:
 
 
 @pytest.mark.parametrize("count", SIZES)
-def test_step_to_screen(tmp_path: Path, database_and_redis: tuple[str, str], count: int):
+def test_step_to_screen(tmp_path: Path, database: str, count: int):
     rows = tmp_path / "rows.json"
     rows.write_text(json.dumps([{"session": number} for number in range(count)]))
     with relay() as (port, pid):
@@ -87,7 +82,7 @@ def test_step_to_screen(tmp_path: Path, database_and_redis: tuple[str, str], cou
     for processes in PROCESSES:
         folder = tmp_path / str(processes)
         folder.mkdir()
-        pair = Pair(folder, *database_and_redis, count=processes)
+        pair = Pair(folder, database, count=processes)
         with watch_machine(DISK) as (disk, _):
             seen[f"{processes} processes"] = sum_up(asyncio.run(run_load(pair, folder, count)))
         print(f"\nthe disk kept a page within {disk.p99_ms():.1f} ms (p99)", end="")
@@ -109,8 +104,8 @@ def test_step_to_screen(tmp_path: Path, database_and_redis: tuple[str, str], cou
         assert is_busy or processes == 1 or ours["view_p99_ms"] <= MAX_P99_MS
 
 
-def test_soak(tmp_path: Path, database_and_redis: tuple[str, str]):
-    pair = Pair(tmp_path, *database_and_redis)
+def test_soak(tmp_path: Path, database: str):
+    pair = Pair(tmp_path, database)
     how = {"seconds": 60 * SOAK_MINUTES, "slices": SLICES}
     with watch_machine(DISK) as (disk, processor):
         runs = asyncio.run(run_load(pair, tmp_path, SOAKED, **how))

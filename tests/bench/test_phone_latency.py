@@ -100,10 +100,11 @@ def test_half_an_hour_on_a_slow_phone():
             monitor.click("[data-main]")
             pocket.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 6})
             page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
-            phone, found = None, 0
+            phone: WornPhone | None = None
+            found = 0
             for minute in range(minutes):
                 if minute in (0, 10, 20):
-                    if minute:
+                    if phone is not None:
                         found += phone.strides
                         page.reload()
                     page.click("[data-begin]")
@@ -112,6 +113,7 @@ def test_half_an_hour_on_a_slow_phone():
                     phone = phone or WornPhone(page, 60 * minutes)
                 pocket.set_offline(minute == 15)
                 phone.walk(60 * minute, 60 * minute + 60)
+            assert phone is not None
             found += phone.strides
             page.wait_for_function(
                 "() => document.querySelector('[data-show=state]').textContent.includes('· 0 w')"

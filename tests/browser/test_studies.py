@@ -72,7 +72,7 @@ def plan_by_clicks(page: Page) -> None:
     page.fill("#id_question", "Which way keeps more of the push-off?")
     page.fill("#id_participants", "12")
     page.fill("#id_block_sizes", "2, 4")
-    page.select_option("#id_primary_outcome", "retention_in_washout")
+    page.select_option("#id_primary_outcome", "washout_change")
     for row, (code, name, valence) in enumerate(
         (("A", "Sunny side", "explicit"), ("B", "Stern side", "negative"))
     ):

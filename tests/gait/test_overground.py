@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from rehab.gait import LegSamples, RejectionReason
+from rehab.gait import LegSamples, RejectionReason, check_signals
 from rehab.gait.recordings.csv_files import save_signals
 from rehab.sources.arguments import make_parser
 from rehab.sources.client import Display
@@ -72,6 +72,19 @@ def test_one_plate_and_one_leg_are_enough(treadmill):
     assert sum(stride.valid for stride in found) >= 9
     for stride, other in pairs_of([s for s in found if s.valid], own):
         assert stride.a2_w_kg == pytest.approx(other.a2_w_kg, rel=0.03)
+
+
+def test_the_check_of_a_live_source_weighs_nobody_over_plates(treadmill):
+    walk, clean = treadmill
+    passing = pass_over(walk, clean)
+    settings = {"rate_hz": walk.rate_hz, "mass_kg": walk.mass_kg}
+
+    def check(**how):
+        return check_signals(passing.t_s, passing.left, passing.right, **settings, **how)
+
+    assert "weight" in {one.code for one in check().findings}
+    assert not any(one.doubt for one in check(is_overground=True).findings)
+    assert check(is_overground=True).valid > 10
 
 
 @pytest.mark.parametrize("load", [0.4, 0.6])

@@ -58,7 +58,7 @@ def test_a_port_that_is_taken_is_named_with_the_cure(tmp_path):
 
 
 def test_several_servers_have_no_address_in_common(monkeypatch, settings):
-    settings.HOSTED, settings.REDIS_URL = True, "redis://127.0.0.1:1/0"
+    settings.HOSTED = True
     settings.ADDRESS = "10.0.0.1:8000"
     monkeypatch.setattr(command, "connection", SimpleNamespace(vendor="postgresql"))
     with pytest.raises(CommandError, match="Unset it"):

@@ -7,10 +7,12 @@ import pytest
 
 from robot import calibrate, play_gesture
 from robot.base_options import VirtualClock
+from robot.bases import SensorState
 from robot.bases.kinematic import Imperfections, KinematicBase
-from robot.calibrate import NotMeasured, measure
+from robot.calibrate import NotMeasured, measure, measure_stiction
 from robot.calibration import BadCalibration, apply_calibration, store_calibration
 from robot.motion.base_response import Response
+from tests.support.robot_stage import FeelingBase, Stage
 
 pytestmark = pytest.mark.matrix
 
@@ -44,9 +46,29 @@ def test_wheels_and_gyro_are_measured(file, scale, drift_deg_min):
     assert response.gyro_bias_rad_s == pytest.approx(drift_rad_s, abs=math.radians(0.3 / 60))
 
 
+@pytest.mark.parametrize("stiction_m_s", [0.0, 0.008, 0.03, 0.05])
+@pytest.mark.parametrize("dead_time_s", [0.0, 0.25])
+def test_the_slowest_turn_is_measured_with_a_margin(file, stiction_m_s, dead_time_s):
+    response = measured(Imperfections(dead_time_s, 0.04, stiction_m_s))
+    assert stiction_m_s <= response.stiction_m_s <= 1.25 * (stiction_m_s + 0.008)
+
+
+def test_wheels_that_follow_nothing_are_not_measured(file):
+    with pytest.raises(NotMeasured, match="Look at them"):
+        measured(Imperfections(stiction_m_s=0.2))
+
+
 def test_a_base_that_is_held_is_not_measured(file):
-    with pytest.raises(NotMeasured, match="stalled"):
+    with pytest.raises(NotMeasured, match="do not follow"):
         measured(Imperfections(held=1.0))
+
+
+def test_a_bump_ends_the_slow_turns(file):
+    stage = Stage(FeelingBase)
+    stage.base.sensors = SensorState(hazards=frozenset({"bump"}))
+    with pytest.raises(NotMeasured, match="bump"):
+        measure_stiction(stage.robot.body, lambda: stage.now_s, lambda _span_s: None)
+    assert stage.base.read().twist.is_still
 
 
 def test_the_command_stores_it_and_a_gesture_uses_it(file, capsys, monkeypatch):

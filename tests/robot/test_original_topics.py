@@ -4,8 +4,11 @@ import math
 
 import pytest
 
+from robot.__main__ import make_parser
 from robot.original_topics import TOPICS, OriginalTopicClient
-from robot.ros.frames import Publication
+from robot.ros.frames import Publication, Topic
+from robot.ros.holder import GESTURE_S, DrivenBase, find_driven_base
+from robot.ros.messages import TWIST
 
 WELCOME = {"type": "welcome", "session": 7, "state": "running"}
 STEP = {"type": "step", "number": 1, "performance": 0.9, "shown": 0.99, "goal": 1.1}
@@ -15,7 +18,7 @@ def begin(valence="positive", names=tuple(TOPICS)):
     """Return a client on an open connection that knows its session, and all that it said."""
     client = OriginalTopicClient(names)
     opened = list(client.open(0.0))
-    client.allow(True)
+    client.allow(True, 0.0)
     client.handle_message(WELCOME | {"valence": valence}, 0.0)
     opened += client.due(0.0)
     for now_s in (0.5, 0.99):
@@ -26,8 +29,13 @@ def begin(valence="positive", names=tuple(TOPICS)):
 FALSE, TRUE = ("/garry/good_step", {"data": False}), ("/garry/good_step", {"data": True})
 
 
-def published(frames):
-    return [(frame["topic"], frame["msg"]) for frame in frames if frame["op"] == "publish"]
+MAY_ACT, HELD = "/garry/may_act", "/mobile_base/commands/velocity"
+
+
+def published(frames, *, beside=(MAY_ACT,)):
+    """Return what frames publish, beside on some topics."""
+    frames = [frame for frame in frames if frame["op"] == "publish"]
+    return [(frame["topic"], frame["msg"]) for frame in frames if frame["topic"] not in beside]
 
 
 @pytest.mark.parametrize(
@@ -116,14 +124,14 @@ def told_to_celebrate():
 
 def test_where_our_robot_may_not_act_false_is_all_that_is_said():
     client = told_to_celebrate()
-    client.allow(False)
+    client.allow(False, 1.0)
     client.publish_decision(True, 5.0, 1.01)
     client.handle_message(STEP, 1.01)
     said = published_until(client, 22.0)
     assert said[0] == (1.02, FALSE)
     assert [one for _, one in said] == [FALSE] * len(said)
     assert len(said) >= 40  # whoever subscribes later hears it, too
-    client.allow(True)
+    client.allow(True, 0.0)
     client.publish_decision(True, 5.0, 22.0)
     assert TRUE in published(client.due(22.0))
 
@@ -132,7 +140,7 @@ def test_what_waits_is_dropped_with_a_stop():
     client, _ = begin()
     client.publish_decision(True, 5.0, 1.0)
     client.handle_message(STEP, 1.0)
-    client.allow(False)
+    client.allow(False, 1.0)
     assert published(client.due(1.0)) == [FALSE]
 
 
@@ -155,7 +163,7 @@ def test_only_the_chosen_topics_are_used():
     client.handle_message(STEP, 1.0)
     client.publish_decision(True, 5.0, 1.0)
     said += [*client.due(1.0), *client.end(1.0)]
-    assert {frame["topic"] for frame in said} == {"/garry/good_step"}
+    assert {frame["topic"] for frame in said} == {"/garry/good_step", MAY_ACT}
 
 
 def test_what_does_not_come_back_is_told_with_the_cure():
@@ -171,3 +179,105 @@ def test_what_does_not_come_back_is_told_with_the_cure():
     assert "build the package garry_ros there" in client.problem(3.1)
     client.handle(Publication("/garry/data", {"a2": 0.99, "goal": 1.1}), 3.2)
     assert client.problem(9.0) == ""
+
+
+# --- a gesture that its node has begun ------------------------------------------------------------
+
+
+def run(client, until_s, from_s, allow=None, odometry=None):
+    """Return what is published, with when, on the topics of the base and of the gate."""
+    said, now_s = [], from_s
+    while now_s < until_s:
+        now_s = round(now_s + 0.02, 2)
+        if allow is not None:
+            client.allowed_until_s = now_s + 0.25
+            client.allow(allow, now_s)
+        if odometry is not None:
+            client.handle(Publication("/odom", odometry(now_s)), now_s)
+        said += [(now_s, *one) for one in published(client.due(now_s), beside=TOPIC_NAMES)]
+    return said
+
+
+TOPIC_NAMES = [topic.name for topic in TOPICS.values()]
+STAND = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+
+
+def odometry(speed):
+    """Return a message of odometry at a speed [m/s]."""
+    at = {"position": {"x": 0.0, "y": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    twist = {"linear": {"x": speed}, "angular": {"z": 0.0}}
+    return {"pose": {"pose": at}, "twist": {"twist": twist}}
+
+
+def begin_with_base():
+    client = OriginalTopicClient(TOPICS, DrivenBase())
+    list(client.open(0.0))
+    run(client, 10.0, 0.0, allow=False)
+    assert not any(topic == HELD for _, topic, _ in run(client, 12.0, 10.0, allow=False))
+    client.handle_message(WELCOME | {"valence": "positive"}, 12.0)
+    assert not any(topic == HELD for _, topic, _ in run(client, 14.0, 12.0, allow=True))
+    return client
+
+
+def holds(said):
+    """Return when the base was ordered to stand."""
+    assert all(message == STAND for _, topic, message in said if topic == HELD)
+    return [at_s for at_s, topic, _ in said if topic == HELD]
+
+
+def test_a_stop_holds_its_base_fifty_times_a_second_for_as_long_as_a_gesture_runs():
+    client = begin_with_base()
+    times = holds(run(client, 30.0, 14.0, allow=False))
+    assert times[0] == pytest.approx(14.02)
+    assert len(times) == pytest.approx(50 * GESTURE_S, abs=2)
+    assert times[-1] - times[0] == pytest.approx(GESTURE_S, abs=0.1)
+
+
+def test_what_still_moves_then_is_held_until_it_has_been_still():
+    client = begin_with_base()
+    rolls = lambda now_s: odometry(0.1 if now_s < 25.0 else 0.0)  # noqa: E731
+    times = holds(run(client, 40.0, 14.0, allow=False, odometry=rolls))
+    assert times[-1] == pytest.approx(26.0, abs=0.1)
+
+
+def test_it_is_let_go_once_a_robot_may_act_again():
+    client = begin_with_base()
+    run(client, 15.0, 14.0, allow=False)
+    assert holds(run(client, 20.0, 15.0, allow=True)) == []
+
+
+def test_a_worker_that_hangs_is_held_by_its_own_bridge():
+    client = begin_with_base()
+    said = run(client, 15.0, 14.0)
+    assert holds(said)[0] == pytest.approx(14.25, abs=0.03)
+    assert (14.26, MAY_ACT, {"data": False}) in said
+
+
+def test_the_gate_is_told_ten_times_a_second_and_at_once():
+    client = begin_with_base()
+    told = [one for one in run(client, 15.0, 14.0, allow=True) if one[1] == MAY_ACT]
+    assert {message["data"] for *_, message in told} == {True}
+    assert len(told) == pytest.approx(10, abs=1)
+    told = [one for one in run(client, 15.1, 15.0, allow=False) if one[1] == MAY_ACT]
+    assert told == [(15.02, MAY_ACT, {"data": False})]
+    client.disconnect(16.0)
+    list(client.open(17.0))
+    assert (17.02, MAY_ACT, {"data": False}) in run(client, 17.1, 17.0, allow=False)
+    assert (MAY_ACT, {"data": False}) in published(client.end(18.0), beside=())
+
+
+@pytest.mark.parametrize(
+    ("words", "base"),
+    [
+        ("--base null", DrivenBase()),
+        ("--base rosbridge", None),
+        ("--base null --original-cmd-topic none", None),
+        (
+            "--base null --original-cmd-topic /cmd_vel --original-odom-topic none",
+            DrivenBase(Topic("/cmd_vel", TWIST), None),
+        ),
+    ],
+)
+def test_which_base_is_held(words, base):
+    words = f"{words} --original-topics --server http://127.0.0.1:1".split()
+    assert find_driven_base(make_parser().parse_args(words)) == base

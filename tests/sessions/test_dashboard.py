@@ -157,7 +157,7 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
         aggregate=SimpleNamespace(fold=fold),
         presence=lambda _now: {"source": True, "tablets": 0, "robot": False},
     )
-    live = SimpleNamespace(find={session.pk: running}.get)
+    live = SimpleNamespace(sessions={session.pk: running})
     monkeypatch.setattr(runtime, "peek", lambda: live)
     assert sessions_today(pt, world.clinic, NOW)[0].hit_rate == "75\N{NO-BREAK SPACE}%"
     page = front(pt)
@@ -280,6 +280,7 @@ def test_the_front_page_costs_the_same_however_much_was_walked(
     pt = client_of(world)
     now = timezone.now()
     ago(rosa, "positive", strides(2, 1), now)
+    world.add_tablet()
     pt.get("/admin/")
     with django_assert_max_num_queries(15) as first:
         pt.get("/admin/")

@@ -14,7 +14,7 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from tests.support.walks import make_session
-from tests.support.world import build_world, client_of
+from tests.support.world import build_world, client_of, set_owner
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -113,7 +113,7 @@ def test_another_clinic_keeps_its_words(world, pt):
 def test_a_session_of_another_process_keeps_its_words_and_the_admin_says_so(world, pt):
     session = begin(world)
     other = f"{socket.gethostname()}|{os.getppid()}|{owners._start_time(os.getppid())}"
-    type(session).everywhere.filter(pk=session.pk).update(owner=other)
+    set_owner(session.clinic_id, other)
     page = pt.post(f"{ADD}?slug=positive", form(), follow=True).content.decode()
     assert "keeps its words" in page
     assert f"run by another process ({os.getppid()})" in page

@@ -64,6 +64,19 @@ def test_files_of_one_walk_are_stored_side_by_side():
         uploaded_file(7, ".mot", recordings.FILES_MAX)
 
 
+@pytest.mark.parametrize("at", [0, 5])
+def test_no_part_is_written_through_a_link(tmp_path, at):
+    secret = tmp_path / "secret_key"
+    secret.write_bytes(b"12345")
+    file = uploaded_file(7, ".csv")
+    file.symlink_to(secret)
+    try:
+        add_part(file, b"mine", at)
+    except UploadRefused:
+        assert at
+    assert secret.read_bytes() == b"12345"
+
+
 def upload(client, files):
     """Send files as the page does, in parts; return what it then sends as their endings."""
     for place, file in enumerate(files):

@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 from rehab.gait import measure_strides
 from rehab.gait.recordings.columns import read_column_map
 from rehab.gait.recordings.readers import read_signals
+from rehab.gait.selfcheck.shapes import SHAPES
+from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.walker import walk
 from rehab.training.steps import Side
 from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure, rows_of
 
@@ -305,3 +308,48 @@ def test_the_clock_that_is_told_follows_a_slow_sensor_and_one_that_begins_anew(b
         device_s = 1.0
         harness.intake.add_rows([{"time_s": device_s, "value": 4.0}])
     assert harness.feed.clock_s == pytest.approx(device_s, abs=0.1)
+
+
+def knee_of(made, side):
+    """Return the angle of a knee [rad] in a made walk, from contact to contact."""
+    begins = [s.initial_contact_s for s in made.strides if s.side == side]
+    stride = np.searchsorted(begins, made.t_s, side="right") - 1
+    lengths = np.append(np.diff(begins), np.diff(begins)[-1])
+    begin_s, length_s = np.array(begins)[stride], lengths[stride]
+    share = np.clip((made.t_s - begin_s) / length_s, 0, 1)
+    return np.interp(share, np.arange(100) / 100, SHAPES["knee angle"])
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "has_knee", "doubt"),
+    [(MASS, False, None), (1.2 * MASS, False, "doubt_weight"), (MASS, True, "doubt_angle")],
+)
+def test_strides_wait_for_a_person_where_no_stride_tells_what_is_wrong(mass_kg, has_knee, doubt):
+    """After the check of the first half minute they do not count, until somebody has looked."""
+    made = make_signals(list(walk(seed=4, strides=70)), MASS, Sensors(rate_hz=200), seed=4)
+    both = (made.left, made.right)
+    legs = [np.array([leg.force_n, leg.moment_nm, leg.angle_rad]) for leg in both]
+    if has_knee:
+        for side, leg in zip(("left", "right"), legs, strict=True):
+            leg[2] = knee_of(made, side)
+    rows = rows_of(np.column_stack([made.t_s, *np.concatenate(legs)]))
+    harness = IntakeHarness(mass_kg=mass_kg)
+    harness.send(rows[: 45 * 200])
+    before = harness.strides()
+    harness.feed.resume()  # a connection that was lost, not a person
+    harness.send(rows[45 * 200 : 55 * 200])
+    waiting = harness.strides()
+    harness.feed.pause()
+    harness.feed.resume()
+    harness.send(rows[55 * 200 :])
+    after = harness.strides()
+
+    early = [s for s in before if s.time_s < made.t_s[0] + 28]
+    assert not any(reason.startswith("doubt") for s in early for reason in s.reasons)
+    assert len(waiting) > 12
+    if doubt is None:
+        assert all(not s.reasons for s in waiting)
+    else:
+        assert all(s.reasons for s in waiting)
+        assert (doubt,) in [s.reasons for s in waiting]
+    assert not any(reason.startswith("doubt") for s in after for reason in s.reasons)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from rehab.studies.allocation import blocks, lists, minimization
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups, williams_orders
-from rehab.studies.allocation.draws import Draws
+from rehab.studies.allocation.draws import RULE, Draws
 from rehab.studies.allocation.groups import Allocated, Factor, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
 from rehab.studies.arms import ArmRule, Condition, check_arms, check_channels
@@ -52,6 +53,14 @@ def test_draws_are_those_of_the_written_rule():
 
     word = int.from_bytes(sha256(b"8:seedseed|6:blocks|0").digest()[:8], "big")
     assert Draws("seedseed", "blocks").below(1000) == word % 1000
+    examples = re.findall(r'"(8:seedseed[^"]*)" (?:gives )?([0-9a-f]{16})', " ".join(RULE.split()))
+    assert len(examples) == 3
+    for hashed, first in examples:
+        assert sha256(hashed.encode()).hexdigest()[:16] == first
+    local = Draws(
+        "seedseed", "blocks", "m\u00e4\u00dfig"
+    )  # lengths are of characters, not of bytes
+    assert local.below(1 << 60) == int(examples[2][1], 16) % (1 << 60)
 
 
 @given(SEEDS, st.lists(st.integers(), max_size=20))

@@ -138,7 +138,7 @@ def test_a_sessions_type_stays_that_of_its_arm(world, kind):
     study = running_study(world, "positive", "negative")
     session = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
     other = "negative" if session.valence == "positive" else "positive"
-    with pytest.raises(InvalidSetting, match="can be changed to one of"):
+    with pytest.raises(InvalidSetting, match="belongs to a study"):
         SessionFold(session.to_plan()).change(Change(kind, other))
 
 
@@ -263,7 +263,7 @@ def test_an_assessor_cannot_set_up_a_session_and_so_learn_of_it(world):
     assert next_visit(enrollment).session is None
 
 
-def test_a_researcher_looks_early_only_with_the_mark(world):
+def test_a_researcher_sees_no_session_before_the_end_also_with_the_mark(world):
     study = running_study(world)
     enrollment = enrolled(study, new_patient(world))
     session = walked(enrollment)
@@ -271,7 +271,8 @@ def test_a_researcher_looks_early_only_with_the_mark(world):
     assert session not in TrainingSession.objects.visible_to(researcher)
     assert not Allocation.objects.visible_to(researcher).filter(enrollment=enrollment).exists()
     give_mark(study, researcher, Task.INTERIM, None, NOW)
-    assert session in TrainingSession.objects.visible_to(researcher)
+    assert session not in TrainingSession.objects.visible_to(researcher)
+    assert not Allocation.objects.visible_to(researcher).filter(enrollment=enrollment).exists()
     take_mark(study.marks.get(user=researcher), None, NOW)
     assert session not in TrainingSession.objects.visible_to(researcher)
     close(study, None, NOW)

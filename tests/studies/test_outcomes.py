@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from rehab.studies.analysis.comparison import compare
 from rehab.studies.analysis.curves import CurvePlace, average
-from rehab.studies.analysis.outcomes import OF_STRIDES, channel_changes, describe_phases
+from rehab.studies.analysis.outcomes import OF_STRIDES, OUTCOMES
 from rehab.studies.analysis.participants import (
     ParticipantVisit,
     curves_by_arm,
@@ -18,6 +18,8 @@ from rehab.studies.analysis.participants import (
     flow,
     make_participant,
 )
+from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
+from rehab.studies.analysis.walk_figures import History
 from rehab.studies.analysis.walks import read_walk
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
@@ -56,12 +58,14 @@ def walk_of(
 
 
 def outcome(slug, walk, before=None):
-    return OF_STRIDES[slug].compute(walk, before)
+    """Return an outcome of a walk: of the first one, or after another one."""
+    return OF_STRIDES[slug].compute(walk, History(before, (before or walk).baseline))
 
 
-def test_changes_are_in_percent_of_the_baseline_of_the_same_session():
+def test_changes_are_in_percent_of_the_first_baseline():
     walk = walk_of(2.0, 2.5, 2.2, 2.1)
     assert walk.baseline == pytest.approx(2.0)
+    assert outcome("training_change", walk) == pytest.approx(25)
     assert outcome("early_change", walk) == pytest.approx(25)
     assert outcome("late_change", walk) == pytest.approx(25)
     assert outcome("catch_change", walk) == pytest.approx(10)
@@ -87,10 +91,10 @@ def test_the_real_value_and_what_was_shown_are_told_apart():
 
 def test_success_comes_with_the_first_window_of_enough_hits():
     assert outcome("strides_to_success", walk_of(2.0, 3.0, 2, 2)) == 20
-    assert outcome("strides_to_success", walk_of(2.0, 1.0, 2, 2)) is None
+    assert outcome("strides_to_success", walk_of(2.0, 1.0, 2, 2)) == 100  # all that were walked
     half = walk_of(2.0, 2.23, 2, 2)  # every second stride hits: 90 % of 2.33 and of 2.13
     assert half.hit[half.with_feedback].mean() == pytest.approx(0.5)
-    assert outcome("strides_to_success", half) is None
+    assert outcome("strides_to_success", half) == 100
 
 
 def test_spread_about_the_mean_about_the_trend_and_from_stride_to_stride():
@@ -109,13 +113,39 @@ def test_invalid_strides_count_as_such_and_nowhere_else():
     assert outcome("late_change", faulty) == outcome("late_change", clean)
 
 
+def test_what_a_visit_carries_to_the_next_is_measured():
+    first, second = walk_of(2, 2.6, 2.2, 2.2), walk_of(2.4, 2.6, 2.4, 2.4)
+    assert outcome("baseline_change", first) is None
+    assert outcome("baseline_change", second, first) == pytest.approx(20)
+    assert outcome("washout_change", second, first) == pytest.approx(20)  # not 0, of its own
+    assert outcome("late_change", second, first) == pytest.approx(30)
+
+
+def test_a_follow_up_is_compared_with_the_first_baseline():
+    first = walk_of(2, 2.6, 2.2, 2.2)
+    rows: list[Any] = [(0, float(n), 2.3, 1.0, None, None, None, True, {}) for n in range(50)]
+    later = read_walk(PHASES[:1], rows, higher_is_better=True)
+    assert outcome("follow_up_change", later, first) == pytest.approx(15)
+    assert outcome("follow_up_change", first) is None
+    assert outcome("late_change", later, first) is None
+
+
+def test_what_was_kept_is_a_difference_that_exists_whoever_gained():
+    for trained, kept in ((3.0, 2.5), (2.01, 2.0), (1.6, 1.8)):
+        walk = walk_of(2.0, trained, 2.0, kept)
+        lost = 100 * (kept - trained) / 2
+        assert outcome("washout_loss", walk) == pytest.approx(lost)
+        after = walk_of(2.0, kept, 2.0, 2.0)
+        assert outcome("between_visits", after, walk) == pytest.approx(lost)
+    assert "retention_in_washout" not in OUTCOMES  # a share of the gain
+
+
 def test_what_two_sessions_tell_needs_the_one_before():
     first, second = walk_of(2, 3, 2, 2), walk_of(2, 2.5, 2, 2)
-    assert outcome("kept_between_visits", second) is None
-    assert outcome("kept_between_visits", second, first) == pytest.approx(50)
+    assert outcome("between_visits", second) is None
     assert outcome("savings", second, first) == 0
-    nothing_gained = walk_of(2, 2.02, 2, 2)
-    assert outcome("kept_between_visits", second, nothing_gained) is None
+    never = walk_of(2, 1.0, 2, 2)
+    assert outcome("savings", never, first) == -80  # of 100 strides none succeeded
 
 
 def test_a_session_without_enough_baseline_has_no_changes():
@@ -123,46 +153,6 @@ def test_a_session_without_enough_baseline_has_no_changes():
     assert walk.baseline is None
     assert outcome("late_change", walk) is None
     assert outcome("variation", walk) is not None
-
-
-def test_differences_of_two_groups_are_those_of_welch():
-    a, b = {"1": 3.0, "2": 5.5, "3": 4.0, "4": 9.0}, {"5": 1.0, "6": 2.0, "7": 2.5}
-    [found] = compare({"A": a, "B": b}, paired=False)
-    known = stats.ttest_ind(list(b.values()), list(a.values()), equal_var=False)
-    low, high = known.confidence_interval(0.95)
-    assert (found.group, found.reference, found.participants) == ("B", "A", (3, 4))
-    assert (found.difference.low, found.difference.high) == pytest.approx((low, high))
-    assert found.effect.estimate < 0
-
-
-def test_paired_differences_are_of_those_who_walked_both():
-    a, b = {"1": 3.0, "2": 5.0, "3": 4.0, "4": 9.0}, {"1": 4.0, "2": 7.0, "3": 5.5, "9": 100.0}
-    [found] = compare({"A": a, "B": b}, paired=True)
-    known = stats.ttest_1samp([1.0, 2.0, 1.5], 0).confidence_interval(0.95)
-    assert found.participants == (3, 3)
-    assert found.difference.estimate == pytest.approx(1.5)
-    assert (found.difference.low, found.difference.high) == pytest.approx((known.low, known.high))
-
-
-@pytest.mark.parametrize(
-    "groups", [{"A": {"1": 2.0}, "B": {"2": 3.0}}, {"A": {"1": 2.0, "2": 2.5}, "B": {"3": 3.0}}]
-)
-def test_two_people_give_no_interval(groups):
-    [found] = compare(groups, paired=False)
-    assert found.difference.low is None
-    assert found.effect is None
-
-
-def test_equal_figures_give_no_effect_size_and_no_warning():
-    same = {str(number): 2.0 for number in range(4)}
-    [found] = compare(
-        {"A": same, "B": {f"b{key}": value for key, value in same.items()}}, paired=False
-    )
-    assert (found.difference.low, found.difference.high, found.effect) == (0, 0, None)
-
-
-def test_a_group_without_figures_is_compared_with_nothing():
-    assert compare({"A": {}, "B": {"1": 2.0}}, paired=False) == []
 
 
 def test_places_that_few_reached_are_left_out_of_a_curve():

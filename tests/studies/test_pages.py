@@ -44,7 +44,7 @@ def plan(*valences: str, **changes: Any) -> dict[str, Any]:
         "days_between": 1,
         "washout_days": 7,
         "goal_percent": 100,
-        "primary_outcome": "retention_in_washout",
+        "primary_outcome": "washout_change",
         "secondary_outcomes": ["hit_rate"],
         "method": "blocks",
         "block_sizes": "2, 4",
@@ -193,7 +193,7 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     assert version.digest in told
     assert study.commitment in told
     assert SEED not in told
-    for words in ("negative", "severity: mild, severe", "Retention in washout", "Baseline"):
+    for words in ("negative", "severity: mild, severe", "Change in washout", "Baseline"):
         assert words in told
     lines = " ".join(re.findall(r"\((.*?)\) Tj", told))
     for words in ("goal at 110 %", "without the robot", "then a rest of 90 s", "Push, please."):
@@ -226,7 +226,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     pt = client_of(world)
     url = reverse("enroll", args=[study.pk])
     assert "required" in text_of(pt.post(url, {"patient": patient.pk}))
-    sent = pt.post(url, {"patient": patient.pk, "keep_data": "yes"})
+    sent = pt.post(url, {"patient": patient.pk, "keep_data": "yes", "takes_part": "yes"})
     enrollment = Enrollment.everywhere.get(patient=patient)
     assert sent["Location"] == reverse("participant", args=[enrollment.pk])
     page = text_of(pt.get(sent["Location"]))
@@ -236,7 +236,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     session = TrainingSession.everywhere.exclude(pk=world.session.pk)
     assert start_visit(pt, enrollment).url == reverse("monitor", args=[session.get().pk])
     assert "One study a patient" in text_of(
-        pt.post(url, {"patient": patient.pk, "keep_data": "no"})
+        pt.post(url, {"patient": patient.pk, "keep_data": "no", "takes_part": "yes"})
     )
     assert refusals(caplog) == [f"Refused to account {world.people[Role.PT].pk}: {url}"]
 

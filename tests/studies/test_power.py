@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from io import StringIO
 
 import pytest
 from django.core.management import CommandError, call_command
 from django.urls import reverse
 
+from rehab.management.commands import studypower
 from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import Protocol
 from rehab.studies.models import Arm
@@ -21,7 +25,7 @@ from tests.support.world import NOW, World, client_of
 pytestmark = pytest.mark.django_db
 SETTINGS = {
     "effects": {"A": 0.0, "B": 30.0},
-    "participants": 8,
+    "participants": 12,
     "sd_percent": 5.0,
     "kept_percent": 25.0,
     "dropout_percent": 0.0,
@@ -137,3 +141,31 @@ def test_the_command_plans_and_goes_on(world):
         call_command("studypower", "NONE", stdout=out)
     with pytest.raises(CommandError, match="no run 0"):
         call_command("studypower", "--run", "0", stdout=out)
+
+
+# --- as a child of the server ---------------------------------------------------------------------
+
+
+def test_a_child_that_is_done_ends_in_order_while_its_server_lives():
+    code = (
+        "import django, time; django.setup()\n"
+        "from rehab.management.commands.studypower import live_with_parent\n"
+        "live_with_parent()\n"
+        "time.sleep(0.2)"  # so that the thread waits for its input
+    )
+    environment = os.environ | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, env=environment
+    ) as child:
+        assert child.wait(60) == 0
+
+
+def test_a_child_whose_study_cannot_be_simulated_notes_it_and_is_not_started_again(
+    world, monkeypatch
+):
+    monkeypatch.setattr(studypower, "live_with_parent", lambda: None)
+    run = plan_run(short_study(world), SETTINGS, 1, None, NOW)
+    Protocol.everywhere.filter(name="short").first().phases.update(strides=None)
+    call_command("studypower", run=run.pk, child=True, stdout=StringIO(), stderr=StringIO())
+    run.refresh_from_db()
+    assert "phase without an end" in run.trouble

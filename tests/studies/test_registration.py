@@ -9,6 +9,7 @@ from django.db import IntegrityError, transaction
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
@@ -17,7 +18,8 @@ from rehab.studies.participants import Allocation
 from rehab.studies.registration.document import describe, digest_of
 from rehab.studies.registration.lifecycle import close, current_version, register, revise, start
 from rehab.studies.registration.sealing import seal, unseal
-from rehab.studies.visits import Place, start_session
+from rehab.studies.unblinding import take_mark
+from rehab.studies.visits import Place, start_session, variety_seed
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World
@@ -250,7 +252,7 @@ def test_what_happened_in_a_study_is_only_added(rows, changes, world):
 def test_a_mark_ends_once(world):
     study = running_study(world)
     StudyMark.everywhere.create(study=study, user=world.people[Role.PT], task="interim")
-    study.marks.update(ended_at=NOW)
+    take_mark(study.marks.get(), None, NOW)
     with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
         study.marks.update(ended_at=None)
 
@@ -284,3 +286,27 @@ def test_what_is_asked_is_registered_and_changed_questions_need_a_new_version(wo
     Questionnaire.everywhere.filter(pk=own.pk).update(items="Hungry? | no | very | 5")
     with pytest.raises(InvalidSetting, match="new version"):
         current_version(study)
+
+
+def test_the_robot_s_variants_follow_from_one_seed_for_all_participants_at_a_visit(world):
+    study = running_study(world)
+    plans = [
+        start_session(enrolled(study, new_patient(world, number)), Place(), None, NOW).plan
+        for number in (1, 2)
+    ]
+    assert plans[0]["variety_seed"] == plans[1]["variety_seed"] == variety_seed(study.pk, 1)
+    assert variety_seed(study.pk, 2) != variety_seed(study.pk, 1)
+
+
+def test_a_follow_up_is_registered_planned_and_walked_without_feedback(world):
+    study = running_study(world, visits=1, follow_up_days=30)
+    assert study.versions.get().document["visits"]["days_to_follow_up"] == 30
+    enrollment = enrolled(study, new_patient(world))
+    first, later = enrollment.visits.all()
+    assert (later.day - first.day).days == 30
+    kinds = []
+    for _visit in (first, later):
+        session = start_session(enrollment, Place(), None, NOW)
+        kinds.append([phase["kind"] for phase in session.plan["phases"]])
+        TrainingSession.everywhere.filter(pk=session.pk).update(state="finished")
+    assert kinds == [["baseline", "training", "washout"], ["baseline"]]

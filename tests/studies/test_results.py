@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from datetime import timedelta
 
 import pytest
@@ -9,11 +10,19 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
+from rehab.exports.research.package import sessions_for
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
+from rehab.sessions.live.headless import (
+    GIVE_WAY_S,
+    Pace,
+    run_session,
+    simulate_strides,
+)
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
+from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Arm, Study
 from rehab.studies.registration.lifecycle import close, register, start
@@ -30,6 +39,7 @@ from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Schedule, ScheduleKind
+from rehab.training.steps import Side
 from tests.support.simulated_studies import figures_of, walk_study
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, client_of
@@ -68,6 +78,21 @@ def test_a_simulated_study_goes_on_where_it_was_broken_off_and_writes_the_same_f
 
 
 @pytest.mark.django_db(transaction=True)
+def test_a_simulated_study_leaves_the_database_to_a_server_between_its_batches():
+    trial = example_trial(4)
+    study = find_or_plan(Clinic.everywhere.create(name="busy"), trial, 5, NOW)
+    rests: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        rests.append(seconds)
+
+    for _done in study_walks(study, trial, 5, NOW, Pace(rest_s=GIVE_WAY_S, sleep=sleep)):
+        pass
+    assert rests == [GIVE_WAY_S] * len(rests)
+    assert len(rests) >= 4  # a session each, at least
+
+
+@pytest.mark.django_db(transaction=True)
 def test_only_who_changed_is_read_again():
     first = walk_study(example_trial(4), 6)
     study = first.study
@@ -93,6 +118,34 @@ def test_only_who_changed_is_read_again():
     SessionMetric.everywhere.filter(session__study_visit__enrollment=others[1]).update(value=0.5)
     [visit] = read().participants[2].visits
     assert visit.outcomes["hit_rate"] == 0.5
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_session_that_ended_early_counts_as_far_as_it_was_walked(world):
+    study = running_study(world)
+    session = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
+    walker = SyntheticWalker(GOOD, 1, Side.LEFT)
+
+    def some_strides(fold):
+        yield from simulate_strides(walker, fold, 150)
+        raise ConnectionAbortedError
+
+    with pytest.raises(ConnectionAbortedError):
+        asyncio.run(run_session(session.pk, some_strides, Pace()))
+    session.refresh_from_db()
+    assert session.state == "aborted"
+    [one] = read_results(study, NOW).participants
+    first = one.visits[0]
+    assert first.attendance == "unfinished"
+    assert first.outcomes["training_change"] == pytest.approx(
+        first.outcomes["improvement_over_baseline"]
+    )
+    assert "washout_change" not in first.outcomes
+    results = read_results(study, NOW)
+    assert sum(row.visits_unfinished for row in results.flow) == 1
+    assert sum(row.completed for row in results.flow) == 0
+    assert "1 session ended early" in FIGURES["flow"](results)
+    assert {row["attendance"] for row in TABLES["phases"](results)} == {"unfinished"}
 
 
 def test_a_name_of_an_arm_is_no_formula_in_a_table():
@@ -124,6 +177,49 @@ def test_before_the_end_only_the_marked_look_and_each_look_is_recorded(world):
         assert client_of(world, role).get(url).status_code == 403
 
 
+@pytest.mark.django_db(transaction=True)
+def test_before_the_end_a_look_shows_aggregates_alone_that_lead_to_no_arm(world):
+    trial = example_trial(8)
+    clinic = world.clinic
+    study = find_or_plan(clinic, trial, 5, NOW)
+    for _done in study_walks(study, trial, 5, NOW):
+        pass
+    reader = world.people[Role.RESEARCHER]
+    give_mark(study, reader, Task.INTERIM, None, NOW)
+    client = client_of(world, Role.RESEARCHER)
+    # Whoever could read a session's type and figures could tell which group is which arm.
+    of_study = {"study_visit__enrollment__study": study}
+    assert not TrainingSession.objects.visible_to(reader).filter(**of_study).exists()
+    assert not sessions_for(reader, study).exists()
+    file = reverse("study-results-file", args=[study.pk])
+    for name in ("outcomes.csv", "phases.csv", "curves.csv", "occurrences.csv"):
+        assert client.get(file, {"file": name}).status_code == 403
+    for name in ("primary.svg", "learning.svg", "exploratory.svg"):
+        assert client.get(file, {"file": name}).status_code == 403
+    codes = set(study.enrollments.values_list("code", flat=True))
+    page = text_of(client.get(reverse("study-results", args=[study.pk])))
+    for name in ("differences.csv", "flow.csv", "conduct.csv", "changes.csv"):
+        page += text_of(client.get(file, {"file": name}))
+    assert not [code for code in codes if code in page]
+    # Two people in a group are no aggregate, and points tell the feedback type.
+    assert all(mean is None for mean in means_of(read_results(study, NOW)))
+    close(study, None, NOW)
+    for name in ("outcomes.csv", "primary.svg"):
+        assert client.get(file, {"file": name}).status_code == 200
+    assert any(means_of(read_results(study, NOW)))
+
+
+def means_of(results):
+    return [one.mean for slug in results.registered for one in results.find(slug).arms]
+
+
+def test_before_the_end_no_figure_is_shown_that_tells_the_feedback_type(world):
+    study = running_study(world, primary_outcome="score", secondary_outcomes=["hit_rate"])
+    assert list(read_results(study, NOW).registered) == ["hit_rate"]
+    close(study, None, NOW)
+    assert list(read_results(study, NOW).registered) == ["score", "hit_rate"]
+
+
 def test_groups_are_numbered_by_the_sealed_seed_until_the_study_is_closed(world):
     sealed = seal(Secret(SEED, (4, 8)))
     study = running_study(world, "positive", "negative", "binary", "explicit", sealed=sealed)
@@ -141,7 +237,7 @@ def test_of_a_closed_study_everybody_sees_names_registered_outcomes_first(world)
     for role in (Role.LEAD, Role.PT, Role.RESEARCHER):
         page = text_of(client_of(world, role).get(reverse("study-results", args=[study.pk])))
         assert "feedback positive" in page
-        assert page.index("Retention in washout") < page.index("Late change")
+        assert page.index("Change in washout") < page.index("Late change")
     assert study.events.filter(kind="looked").count() == 0
     client = client_of(world, Role.LEAD)
     for name in ("outcomes.csv", "learning.svg"):

@@ -7,7 +7,13 @@ from typing import Any
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.participants import (
+    Allocation,
+    Enrollment,
+    Screening,
+    StudyEvent,
+    StudyVisit,
+)
 from rehab.studies.power_runs import PowerRun
 from tests.support.clock import START
 from tests.support.marks import mark
@@ -63,6 +69,9 @@ def close_study(name: str, patient: Patient, session: TrainingSession, by: User)
         keep_data=True,
     )
     Allocation.everywhere.create(enrollment=enrollment, group="A")
+    Screening.everywhere.create(
+        study=study, patient=patient, unmet=[mark(name, Screening)], declined=True
+    )
     StudyVisit.everywhere.create(
         enrollment=enrollment,
         number=1,

@@ -1,4 +1,4 @@
-"""Two servers' database, Redis, network, disk and clocks, each of which can be broken.
+"""Two servers' database, network, disk and clocks, each of which can be broken.
 
 Mounting a small disk needs root, a clock of the database that jumps libfaketime (Debian: faketime).
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.support.cable import Cable, run_cables
-from tests.support.hosted import Restarts, run_postgres, run_redis
+from tests.support.hosted import Restarts, run_postgres
 from tests.support.pair import Pair
 
 DISK_MB = 256
@@ -72,7 +72,7 @@ class FaultySet:
     restarts
         By program: kills it and starts it again.
     cables
-        Of each server: to the database, and to Redis.
+        Of each server: to the database.
     disk
         The database's, where one may mount it.
     clocks
@@ -88,7 +88,7 @@ class FaultySet:
 
 @contextmanager
 def run_faulty_set(folder: Path) -> Iterator[FaultySet]:
-    """Run the database and Redis, and name two servers, each with cables and a clock of its own."""
+    """Run the database, and name two servers, each with cables and a clock of its own."""
     restarts: Restarts = {}
     cables: list[list[Cable]] = []
     with ExitStack() as stack:
@@ -99,10 +99,9 @@ def run_faulty_set(folder: Path) -> Iterator[FaultySet]:
         database = stack.enter_context(
             run_postgres(restarts, disk=disk, variables=clocks[2].variables)
         )
-        redis = stack.enter_context(run_redis(restarts))
-        pair = Pair(folder, database, redis)
+        pair = Pair(folder, database)
         for place in range(2):
-            urls = {"GARRY_DATABASE_URL": database, "GARRY_REDIS_URL": redis}
+            urls = {"GARRY_DATABASE_URL": database}
             pair.own_environments[place], its_cables = stack.enter_context(run_cables(urls))
             cables.append(its_cables)
             pair.programs[place] = clocks[place].program

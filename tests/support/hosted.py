@@ -39,7 +39,6 @@ def find_missing() -> str:
     programs = {
         "nginx-light": find_nginx(),
         "postgresql": find_initdb(),
-        "redis-server": shutil.which("redis-server"),
     }
     lacking = [package for package, program in programs.items() if program is None]
     return f"apt-get install {' '.join(lacking)}" if lacking else ""
@@ -158,37 +157,6 @@ def _run_postgres(
     finally:
         server.send_signal(signal.SIGINT)  # it waits for no client
         server.wait(30)
-
-
-@contextmanager
-def run_redis(restarts: Restarts | None = None) -> Iterator[str]:
-    """Run a Redis of our own until the block ends; yield its address."""
-    port = free_port()
-    at = ["--bind", "127.0.0.1", "--port", str(port), "--save", "", "--appendonly", "no"]
-    with tempfile.TemporaryDirectory(prefix="garry-redis-") as folder:
-
-        def start() -> subprocess.Popen[bytes]:
-            command = ["redis-server", *at, "--dir", folder]
-            return subprocess.Popen(command, stdout=subprocess.DEVNULL, cwd=folder)
-
-        server = start()
-
-        def restart() -> None:
-            nonlocal server
-            server.kill()
-            server.wait(10)
-            time.sleep(1.5)
-            server = start()
-            wait_for_port(port)
-
-        if restarts is not None:
-            restarts["redis"] = restart
-        try:
-            wait_for_port(port)
-            yield f"redis://127.0.0.1:{port}/0"
-        finally:
-            server.kill()
-            server.wait(10)
 
 
 def _wait_for_postgres(bin_folder: Path, port: int) -> None:

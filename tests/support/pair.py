@@ -1,4 +1,4 @@
-"""Two real servers on one PostgreSQL and one Redis, and those who dial in to either."""
+"""Two real servers on one PostgreSQL, and those who dial in to either."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from typing import Any, Self
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from rehab.sessions.live.database.lease import Server, find_place
 from tests.support.servers import ROOT, clean_environment, free_port, run_python
 
 Message = dict[str, Any]
@@ -106,7 +107,7 @@ class Dialed:
 class Pair:
     """Servers 0 and 1, and their database's rows."""
 
-    def __init__(self, folder: Path, database: str, redis: str, count: int = 2) -> None:
+    def __init__(self, folder: Path, database: str, count: int = 2) -> None:
         self.ports = [free_port() for _ in range(count)]
         self.folder, self.log = folder, folder / "log"
         self.environment = clean_environment(folder, self.ports[0]) | {
@@ -116,21 +117,29 @@ class Pair:
             "GARRY_ALLOWED_HOSTS": "localhost,127.0.0.1",
             "GARRY_METRICS_TOKEN": "a token",
             "GARRY_DATABASE_URL": database,
-            "GARRY_REDIS_URL": redis,
         }
         self.own_environments: list[dict[str, str]] = [{} for _ in range(count)]
         self.programs: list[tuple[str, ...]] = [("manage.py",)] * count
         self.processes: list[subprocess.Popen[bytes] | None] = [None] * count
         self._open: list[Dialed] = []
+        self.named = ""  # the server that the last answer sent us to
 
     async def __aenter__(self) -> Self:
         """Make the tables and start both servers."""
+        await asyncio.to_thread(self.begin_all)
+        return self
+
+    def begin_all(self) -> None:
+        """Make the tables, start both servers, and wait until both are ready."""
         self.run_python("manage.py", "migrate", "--verbosity", "0")
         self.run_python("manage.py", "collectstatic", "--no-input", "--verbosity", "0")
         for place in range(len(self.ports)):
             self.begin(place)
-        await asyncio.gather(*(self.until_ready(place) for place in range(len(self.ports))))
-        return self
+        until_s = time.monotonic() + 60
+        for place in range(len(self.ports)):
+            while self._request(place, "/readyz")[0] != 200:
+                assert time.monotonic() < until_s, self.log.read_text()
+                time.sleep(0.1)
 
     async def hang_up_all(self) -> None:
         """Close all connections that were dialed."""
@@ -140,6 +149,10 @@ class Pair:
     async def __aexit__(self, *_: object) -> None:
         """Stop both."""
         await self.hang_up_all()
+        self.kill_all()
+
+    def kill_all(self) -> None:
+        """Kill both, also one that hangs."""
         for process in self.processes:
             if process is not None and process.poll() is None:
                 process.send_signal(signal.SIGCONT)
@@ -192,16 +205,23 @@ class Pair:
             with urllib.request.urlopen(request, timeout=20) as answer:  # noqa: S310 (our own)
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as answer:
+            self.named = answer.headers.get("GARRY-Server", "")
             return answer.code, answer.read().decode()
         except OSError:
             return 0, ""
 
-    def seed(self, count: int) -> list[Message]:
-        """Make running sessions, each at a station of its own."""
-        rows: list[Message] = json.loads(
-            self.run_python("-m", "tests.support.live_seed", str(count))
-        )
+    def seed(self, count: int, *how: str) -> list[Message]:
+        """Make sessions, each in a clinic of its own."""
+        arguments = ("-m", "tests.support.live_seed", str(count), "apart", *how)
+        rows: list[Message] = json.loads(self.run_python(*arguments))
         return rows
+
+    def place_of(self, row: Message) -> int:
+        """Return the server that a session's clinic belongs to while nobody has it."""
+        servers = [Server("", f"127.0.0.1:{port}", True) for port in self.ports]
+        place = find_place(row["clinic"], servers)
+        assert place is not None
+        return servers.index(place)
 
     async def dial(self, place: int, path: str, **headers: str) -> Dialed:
         """Dial in to a server."""

@@ -99,7 +99,7 @@ class FeelingBase(RealBase):
     def __init__(self, monotonic):
         super().__init__(monotonic)
         self.sensors, self.shown, self.is_held = SensorState(), [], False
-        self.lit, self.played = [], []
+        self.lit, self.played, self.answered = [], [], []
 
     def read(self):
         there = super().read()
@@ -115,3 +115,6 @@ class FeelingBase(RealBase):
 
     def play(self, note):
         self.played.append(note)
+
+    def answer(self, answer):
+        self.answered.append(answer)

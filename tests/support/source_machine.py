@@ -40,6 +40,7 @@ from tests.support.callers import (
 )
 from tests.support.folds import fold_log
 from tests.support.power_switch import PowerSwitch
+from tests.support.world import set_owner
 
 PHASES = (make_phase("training", strides=5), make_phase("catch", strides=3), make_phase("training"))
 VALUES = st.sampled_from([None, 2.0, 3.0, 4.5, 99.0])
@@ -292,7 +293,7 @@ class Sources(RuleBasedStateMachine):
         while self.sent > kept:
             assert isinstance(self.log.pop(), Measurement)
         ended = f"{socket.gethostname()}|{os.getpid()}|0"  # a process that is no more
-        await TrainingSession.everywhere.filter(pk=self.session.pk).aupdate(owner=ended)
+        await sync_to_async(set_owner)(self.session.clinic_id, ended)
         assert await runtimes.current().recover() == (self.state == "running")
         if self.state == "running":
             self.log.append(Change(ChangeKind.PAUSE, PauseReason.RESTART))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from typing import Any
 
 from rehab.people.consent.models import Purpose
@@ -18,6 +19,7 @@ from rehab.training.measures import A2
 from tests.support.world import NOW, World
 
 SEED = "the seed of tests"
+STROKE = date(2020, 1, 1)  # years before `NOW`
 
 
 def draft_study(world: World, *valences: str, **settings: Any) -> Study:
@@ -29,7 +31,7 @@ def draft_study(world: World, *valences: str, **settings: Any) -> Study:
         "participants": 20,
         "months_since_stroke": 6,
         "visits": 2,
-        "primary_outcome": "retention_in_washout",
+        "primary_outcome": "washout_change",
         "sealed": seal(Secret(SEED, (2, 4))),
     }
     study = Study.everywhere.create(clinic=world.clinic, **defaults | settings)
@@ -60,7 +62,11 @@ def running_study(world: World, *valences: str, **settings: Any) -> Study:
 def new_patient(world: World, number: int = 1, *, consents: bool = True) -> Patient:
     """Return a patient of the world's clinic who is in no study yet."""
     patient = Patient.everywhere.create(
-        clinic=world.clinic, code=f"n{number}", nickname=f"Newcomer {number}", paretic_side="left"
+        clinic=world.clinic,
+        code=f"n{number}",
+        nickname=f"Newcomer {number}",
+        paretic_side="left",
+        stroke_month=STROKE,
     )
     if consents:
         record_consent(patient, Purpose.RESEARCH, None, NOW)

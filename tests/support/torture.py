@@ -32,7 +32,7 @@ PASSING = {"elsewhere", "not_stored", "server_error"}  # errors after which one 
 
 
 class Elsewhere(Exception):
-    """Another server has the session: its address."""
+    """Another server has the clinic: its address."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Walk:
     acknowledged: int = 0
     seen: list[int] = field(default_factory=list)
     stopping: bool = False
-    server: str = ""  # of several: the one that has the session, as another one said
+    server: str = ""  # of several: the one that has the clinic, as another one said
 
     @property
     def has_seen_all(self) -> bool:
@@ -74,7 +74,7 @@ class Walk:
         return bool(self.seen) and self.seen[-1] >= self.made
 
     def dial(self, path: str, token: str) -> connect:
-        chosen = {"GARRY-Server": self.server} if self.server and "source" in path else {}
+        chosen = {"GARRY-Server": self.server} if self.server else {}
         return self.entrance.dial(path, Authorization=f"Bearer {token}", **chosen)
 
     async def send(self) -> None:
@@ -145,6 +145,7 @@ class Walk:
                 async with self.dial(f"{path}?after={after}", self.row["tablet"]) as socket:
                     async for text in socket:
                         message = json.loads(text)
+                        self.server = message.get("server", self.server)
                         for step in message.get("steps", []) if "frame" in message else []:
                             self.seen.append(step["number"])
                         for event in message.get("events", []):

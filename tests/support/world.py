@@ -37,6 +37,7 @@ from rehab.sessions.live.session.aggregate import Row, SessionAggregate
 from rehab.sessions.live.session.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
@@ -44,7 +45,13 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, Protocol
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.stations.tablets import COOKIE
 from rehab.studies.models import StudyMark, StudyVersion
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.participants import (
+    Allocation,
+    Enrollment,
+    Screening,
+    StudyEvent,
+    StudyVisit,
+)
 from rehab.studies.power_runs import PowerRun
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
@@ -149,18 +156,14 @@ def agreeing(patient: Patient) -> Patient:
 
 def store(aggregate: SessionAggregate, rows: list[Row]) -> None:
     """Commit rows of a session here and now, without the live path's threads."""
-    commit(
-        [
-            Job(
-                aggregate,
-                aggregate.session.pk,
-                aggregate.session.epoch,
-                rows,
-                aggregate.summary(),
-                lambda _: None,
-            )
-        ]
-    )
+    session = aggregate.session
+    epoch = ClinicOwner.everywhere.get_or_create(pk=session.clinic_id)[0].epoch
+    commit([Job(aggregate, session.pk, epoch, rows, aggregate.summary(), lambda _: None)])
+
+
+def set_owner(clinic_id: int, owner: str) -> None:
+    """Let a process have a clinic: one that died, or one that runs elsewhere."""
+    ClinicOwner.everywhere.update_or_create(pk=clinic_id, defaults={"owner": owner})
 
 
 def seal_nothing(clinic: Clinic) -> LogSeal:
@@ -291,6 +294,7 @@ def build_world(name: str) -> World:
             by=people[Role.PT],
             at=NOW,
         ),
+        ClinicOwner.everywhere.get_or_create(pk=clinic.pk)[0],
         RobotIncident.everywhere.create(
             session=session, at=NOW, reason=mark(name, RobotIncident), recording=pack(RECORDED)
         ),
@@ -330,6 +334,7 @@ def build_world(name: str) -> World:
         StudyMark.everywhere.get(study=study),
         Enrollment.everywhere.get(study=study),
         Allocation.everywhere.get(enrollment__study=study),
+        Screening.everywhere.get(study=study),
         StudyVisit.everywhere.get(enrollment__study=study),
         PowerRun.everywhere.get(study=study),
         StudyEvent.everywhere.get(study=study),

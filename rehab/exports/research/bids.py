@@ -26,6 +26,12 @@ MISSING = "n/a"
 # The channels: latency and leg, then columns of the table of steps.
 STORED = [column for column in STEPS.columns if column.is_channel]
 CHANNEL_COUNT = 2 + len(STORED)
+OF_STUDIES = {
+    "study": "Short name of the study, or of several with blanks between.",
+    "participant": "Code in the study.",
+    "group": "What was allocated: an arm, or arms in the order of the periods; n/a until the study "
+    "is closed.",
+}
 read_stored = attrgetter(*(column.name for column in STORED))
 
 
@@ -37,7 +43,7 @@ def subject_of(pseudonym: str) -> str:
 class MotionSink:
     """Rows of ``STEPS`` as one run of motion data, with its sidecars; no files without strides."""
 
-    def __init__(self, folder: Path, pseudonym: str, session: int, unit: str) -> None:
+    def __init__(self, folder: Path, pseudonym: str, session: str, unit: str) -> None:
         self.subject, self._unit = subject_of(pseudonym), unit
         place = folder / self.subject / f"ses-{session}" / "motion"
         place.mkdir(parents=True)
@@ -143,7 +149,7 @@ def dataset_files(
     about = {
         column.name: {"Description": f"At the first session: {column.meaning}"}
         for column in PARTICIPANT
-    }
+    } | {name: {"Description": meaning} for name, meaning in OF_STUDIES.items()}
     yield "participants.json", _json(about)
     lines = ["\t".join(["participant_id", *about])]
     for row in participants:

@@ -23,6 +23,7 @@ from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.research.session_files import ABOUT, write_part
 from rehab.exports.research.sinks import has_parquet
+from rehab.exports.research.study_files import groups_of, studies_of, study_files
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.people.models import User
 from rehab.sessions.models import TrainingSession
@@ -162,6 +163,8 @@ class Package:
         A session that the user may not see any more, or whose patient was erased, is left out.
         """
         allowed = self._readable()
+        studies = studies_of(self.user, self.study)
+        groups = groups_of(self.user, studies)
         people: dict[str, dict[str, Any]] = {}
         parts = []
         for key in self.keys:
@@ -170,11 +173,14 @@ class Package:
             if key in allowed and known.get("pseudonym") == allowed[key]:
                 parts.append(self._part(key))
                 if known["participant_id"]:
-                    people.setdefault(known["participant_id"], known)
+                    about_study = groups.get(known["pseudonym"], {})
+                    people.setdefault(known["participant_id"], known | about_study)
         yield "README.txt", [self._readme(len(parts))]
         yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
         for table in TABLES:
             yield table.file, _concatenate(table.header, [part / table.file for part in parts])
+        for study in studies:
+            yield from study_files(self.user, study, self.made_at, shift_dates=self.shift_dates)
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
             yield f"bids/{name}", [text]
         for part in parts:
@@ -203,6 +209,9 @@ class Package:
             f"{dates}\n{parquet}\n"
             "recordings/: sessions to play again in GARRY. bids/: BIDS motion. fhir/: FHIR R4B.\n"
             "study_visits.csv has the allocation of closed studies; of others it is sealed.\n"
+            "studies/: a folder for each study: the protocol with all versions, everybody who was "
+            "ever allocated, what each outcome means; of closed ones the results' tables, the "
+            "seed, and verify_allocation.py, which allocates again.\n"
             "Sessions of people who left a study and wanted their data removed are not here.\n\n"
             f"{README_TEXT % {'version': RULES_VERSION}}"
         )

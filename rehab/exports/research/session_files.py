@@ -20,6 +20,7 @@ from rehab.exports.tables import EVENTS, INCIDENTS, TABLES
 from rehab.people.models import User
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
+from rehab.studies.participants import StudyVisit
 
 STRIDE_TABLES = (STEPS, FEEDBACK)  # also as Parquet
 ABOUT = "about.json"  # what the whole export needs to know of a part
@@ -42,7 +43,7 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
     selection = Selection(user, sessions, named=False)
     for name in ("parquet", "bids", "recordings", "fhir"):
         (aside / name).mkdir()
-    motion = MotionSink(aside / "bids", pseudonym, session.pk, session.measure.unit)
+    motion = MotionSink(aside / "bids", pseudonym, _label(session), session.measure.unit)
     recording = RecordingSink(
         _of(aside / "recordings", session, "csv"),
         _extras(user, session),
@@ -69,6 +70,15 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
     row = next(SESSIONS.read(selection))
     about |= {column.name: getattr(row, column.name) for column in PARTICIPANT}
     (aside / ABOUT).write_text(json.dumps(about), "utf-8")
+
+
+def _label(session: TrainingSession) -> str:
+    """Return a session as BIDS labels it: by the study's visit, else by its key."""
+    visit = StudyVisit.everywhere.filter(session=session).select_related("enrollment__study")
+    if (found := visit.first()) is None:
+        return str(session.pk)
+    label = f"{found.enrollment.study.code}visit{found.number:02}"
+    return label if found.attempt == 1 else f"{label}attempt{found.attempt}"
 
 
 def _of(folder: Path, session: TrainingSession, ending: str) -> Path:

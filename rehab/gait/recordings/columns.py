@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 
 from rehab.gait.strides import GaitInputError
 
 # A leg's channels as they are called on the command line, in the order of ``LegSamples``.
 CHANNELS = ("force", "moment", "angle", "forward", "position")
 REQUIRED = CHANNELS[:3]
+# Instead of moment and angle: what they are computed from (``ankle``), in its order.
+MARKED = (
+    *("force", "forward", "cop"),
+    *("ankle_forward", "ankle_up", "knee_forward", "knee_up", "toe_forward", "toe_up"),
+)
+ALL_CHANNELS = tuple(dict.fromkeys((*CHANNELS, *MARKED)))
 SIDES = ("left", "right")
+FILTERED_HZ = (4.0, 50.0)  # cut-offs of labs' filters that can be put back
 # A column of a stored recording that is 1 where people walk over plates in a floor.
 OVERGROUND = "overground"
 
 
+def find_required(names: Collection[str]) -> tuple[str, ...]:
+    """Return the channels that a leg needs to be measured, given which there are."""
+    there = set(names)
+    is_marked = there & set(MARKED[2:]) and not there >= set(REQUIRED)
+    return MARKED if is_marked else REQUIRED
+
+
 @dataclass(frozen=True, slots=True)
 class SignalColumn:
-    """A column by name, and what takes its numbers to SI units, our signs and the force's time.
+    """A column by name, with what converts its numbers to SI units and our signs, and its delay.
 
     Attributes
     ----------
@@ -57,10 +72,41 @@ class ColumnMap:
         legs = {}
         for side, leg in self.legs.items():
             there = {channel: column for channel, column in leg.items() if column.name in header}
-            if there.keys() >= set(REQUIRED):
+            if there.keys() >= set(find_required(there)):
                 legs[side] = there
         frame = self.frame if self.frame is not None and self.frame.name in header else None
         return ColumnMap(self.time, legs, frame) if legs and self.time.name in header else None
+
+
+def put_back_filtered(columns: ColumnMap, cutoff_hz: float) -> ColumnMap:
+    """Return the map with moments and angles put back by what a causal low-pass delays them.
+
+    Such a filter (Butterworth, second order) delays slow signals by √2 / (2π × cut-off). With that
+    taken out, A2 is −4 to +2 % off at 6 Hz, −2 to +1 % at 8 Hz and less above (moore2013 and
+    synthetic walkers of 0.8 to 5 W/kg; tests/gait/test_filtered.py).
+
+    Raises
+    ------
+    GaitInputError
+        For a cut-off [Hz] that no lab filters with.
+    """
+    low, high = FILTERED_HZ
+    if not low <= cutoff_hz <= high:
+        raise GaitInputError(
+            f"Signals filtered with {cutoff_hz:g} Hz cannot be used. Give the cut-off of the lab's "
+            f"low-pass, {low:g} to {high:g} Hz."
+        )
+    delay_s = math.sqrt(2) / (2 * math.pi * cutoff_hz)
+    legs = {
+        side: {
+            channel: replace(column, delay_s=column.delay_s + delay_s)
+            if channel in {"moment", "angle"}
+            else column
+            for channel, column in leg.items()
+        }
+        for side, leg in columns.legs.items()
+    }
+    return replace(columns, legs=legs)
 
 
 def _moore_leg(side: str) -> dict[str, SignalColumn]:
@@ -74,10 +120,13 @@ def _moore_leg(side: str) -> dict[str, SignalColumn]:
 
 
 def _own_leg(side: str) -> dict[str, SignalColumn]:
-    names = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
+    names = (
+        *("force_n", "moment_nm", "angle_rad", "forward_n", "position_m"),
+        *(f"{channel}_m" for channel in MARKED[2:]),
+    )
     return {
         channel: SignalColumn(f"{side}_{name}")
-        for channel, name in zip(CHANNELS, names, strict=True)
+        for channel, name in zip(ALL_CHANNELS, names, strict=True)
     }
 
 
@@ -118,18 +167,18 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
             time = read_column(text)
         elif channel == "frame" and text:
             frame = SignalColumn(text)
-        elif side in SIDES and what in CHANNELS and text:
+        elif side in SIDES and what in ALL_CHANNELS and text:
             legs.setdefault(side, {})[what] = read_column(text)
         else:
             raise GaitInputError(
                 f"'{pair}' maps no column. Write time=COLUMN and SIDE.CHANNEL=COLUMN with SIDE "
-                f"{' or '.join(SIDES)} and CHANNEL one of {', '.join(CHANNELS)}; frame=COLUMN if "
-                "the device counts its samples."
+                f"{' or '.join(SIDES)} and CHANNEL one of {', '.join(ALL_CHANNELS)}; "
+                "frame=COLUMN if the device counts its samples."
             )
     if time is None or not legs:
         raise GaitInputError("Map the time and at least one leg: time=t left.force=Fz …")
     for side, leg in legs.items():
-        missing = [channel for channel in REQUIRED if channel not in leg]
+        missing = [channel for channel in find_required(leg) if channel not in leg]
         if missing:
             raise GaitInputError(
                 f"The {side} leg has no {' and no '.join(missing)}. Map "

@@ -15,25 +15,27 @@ OWN = 0.8  # of a plate's contacts: then all that it reads is that leg's
 
 
 def assign_plates(
-    up_n: Floats, corners_mm: Floats, ankles_mm: dict[str, Floats]
+    loads: Floats, corners_mm: Floats, ankles_mm: dict[str, Floats]
 ) -> tuple[dict[str, Floats], int]:
-    """Return each leg's vertical force [N], shape (n,), and how many contacts are of neither leg.
+    """Return each leg's loads, shape (rows, n), and how many contacts are of neither leg.
 
     A contact belongs to the leg whose ankle is over the plate, and lower if both are. A plate on
     which only one leg steps is that leg's whole, with what it reads in swing.
 
     Parameters
     ----------
-    up_n
-        Vertical force of each plate, upward positive [N], shape (plates, n).
+    loads
+        What each plate bears, shape (plates, rows, n): its vertical force, upward positive [N], and
+        whatever else of it adds up.
     corners_mm
         The plates' corners in the plane of the floor [mm], shape (plates, 4, 2).
     ankles_mm
         A marker of each ankle by side [mm], shape (3, n) each, the third axis upward.
     """
-    forces = {side: np.zeros(up_n.shape[1]) for side in ankles_mm}
+    borne = {side: np.zeros(loads.shape[1:]) for side in ankles_mm}
     unknown = 0
-    for plate_n, plate_mm in zip(up_n, corners_mm, strict=True):
+    for plate, plate_mm in zip(loads, corners_mm, strict=True):
+        plate_n = plate[0]
         loaded = np.concatenate(([False], plate_n > LOADED_N, [False]))
         edges = np.flatnonzero(loaded[1:] != loaded[:-1]).reshape(-1, 2).tolist()
         steps = [(a, b) for a, b in edges if plate_n[a:b].max() > STEP_N]
@@ -41,12 +43,12 @@ def assign_plates(
         unknown += owners.count(None)
         most = max(ankles_mm, key=owners.count)
         if owners.count(most) > 0 and owners.count(most) >= OWN * len(owners):
-            forces[most] += plate_n
+            borne[most] += plate
             continue
         for (first, stop), owner in zip(steps, owners, strict=True):
             if owner is not None:
-                forces[owner][first:stop] += plate_n[first:stop]
-    return forces, unknown
+                borne[owner][:, first:stop] += plate[:, first:stop]
+    return borne, unknown
 
 
 def _find_owner(

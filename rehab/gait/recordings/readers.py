@@ -12,19 +12,25 @@ from typing import NamedTuple
 import numpy as np
 
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
-from rehab.gait.recordings.columns import OVERGROUND, ColumnMap, find_layout, read_column_map
+from rehab.gait.recordings.columns import (
+    OVERGROUND,
+    ColumnMap,
+    find_layout,
+    put_back_filtered,
+    read_column_map,
+)
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
 
-# What parsers raise for files that are not what they say.
+# What parsers raise for files whose content does not match their ending.
 DAMAGED = (
     ArithmeticError, AttributeError, EOFError, gzip.BadGzipFile, LookupError, MemoryError,
     RuntimeError, TypeError, ValueError, csv.Error, zlib.error,
 )  # fmt: skip
-LARGEST = 1e30  # of what a sensor sends; beyond, it is damaged
+LARGEST = 1e30  # of a sensor's values; a larger one is damage
 BYTES_MAX = 512 * 1024 * 1024
 
 READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
@@ -59,9 +65,9 @@ class RecordedSignals(NamedTuple):
 def read_any_table(*paths: Path) -> Table:
     """Return the columns of a walk's files by name, shape (n,) each, at the fastest one's rate.
 
-    Kinds are told by their endings: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
-    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Times are in a column that is called time, in
-    seconds, by which several files are joined.
+    The kind follows from the ending: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
+    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Several files are joined by their times, in a
+    column ``time`` [s].
 
     Raises
     ------
@@ -93,7 +99,9 @@ def read_any_table(*paths: Path) -> Table:
     return table
 
 
-def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSignals:
+def read_signals(
+    *paths: Path, pairs: Sequence[str] | None = None, filtered_hz: float | None = None
+) -> RecordedSignals:
     """Return the signals of a recording.
 
     Parameters
@@ -102,6 +110,8 @@ def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSi
         The file, or those of one walk. A cell that is not a number is a missing sample: NaN.
     pairs
         Which column is which channel, as for ``read_column_map``; None to decide by the header.
+    filtered_hz
+        Cut-off of the causal low-pass that moments and angles have been through, if any.
 
     Raises
     ------
@@ -112,6 +122,8 @@ def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSi
     """
     path, table = paths[0], read_any_table(*paths)
     columns = read_column_map(pairs) if pairs else find_layout(list(table))
+    if filtered_hz is not None:
+        columns = put_back_filtered(columns, filtered_hz)
     require_columns(path, table, columns)
     names = [column.name for column in columns.columns]
     frame = None if columns.frame is None else columns.frame.name  # an empty one is ignored
@@ -128,7 +140,17 @@ def says_overground(table: Mapping[str, Floats]) -> bool:
 
 
 def require_columns(path: Path, table: Mapping[str, Floats], columns: ColumnMap) -> None:
-    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map."""
+    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map.
+
+    Parameters
+    ----------
+    path
+        The file, which the message names.
+    table
+        Its columns by name.
+    columns
+        The map.
+    """
     missing = [column.name for column in columns.columns if column.name not in table]
     if missing:
         raise GaitInputError(

@@ -14,6 +14,7 @@ from rehab.gait.offline import make_detector
 from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
 from rehab.gait.selfcheck.cures import CURES
 from rehab.gait.selfcheck.lag import find_deceleration_peak
+from rehab.gait.selfcheck.shapes import find_likeness, find_stances, make_profile
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
@@ -25,6 +26,12 @@ OFTEN = 0.2  # of the strides; a fault of fewer is the walker's, not the set-up'
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
 USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
 OWN_TOLERANCE_S = 0.003  # against the same person's earlier check
+# Beyond, A2 is off by more than a tenth if it is the mass that is wrong, and not a handrail.
+CERTAIN_LOAD = (0.9, 1.1)
+# By how much more like a knee's than like an ankle's an angle's curve over a stride is. Ankles of
+# the five people of ``stances.plausibility`` are less so, by 0.03 and more; knees of two of them
+# are, by 0.14 and more. (Hips are not told: an ankle that brakes late is as like one.)
+KNEE_LEAD = 0.08
 USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (docs/reference/gait.md#usual-values)
 USUAL_A2 = (0.3, 7.0)  # W/kg (docs/reference/gait.md#usual-values)
 
@@ -39,11 +46,15 @@ class Finding:
         What it is, for programs, and the cure, for people.
     side
         None where it concerns both legs.
+    doubt
+        The reason by which valid strides do not count until a person has looked, as none of them
+        shows what is wrong; empty where strides may count.
     """
 
     code: str
     message: str
     side: str | None = None
+    doubt: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +73,7 @@ class SignalCheck:
         Median force of both plates by body weight; None with one leg.
     lag_s
         By how much the angles come later than in an earlier check of this person [s] (mean of the
-        legs), to 3 ms; None without one. Nothing else tells a lag: people differ by more.
+        legs), to 3 ms; None without one. Without one, a lag cannot be found: people differ by more.
     deceleration_s
         When each ankle brakes hardest after terminal contact [s] (``find_deceleration_peak``), by
         side. Store that of a session whose synchronization was measured, for later checks.
@@ -86,6 +97,7 @@ def check_signals(
     mass_kg: float,
     own_deceleration_s: dict[str, float] | None = None,
     strides: list[Stride] | None = None,
+    is_overground: bool = False,
 ) -> SignalCheck:
     """Return the check of signs, units, weight and force–kinematics lag of half a minute or more.
 
@@ -99,6 +111,8 @@ def check_signals(
         ``deceleration_s`` of an earlier check of this person, by side.
     strides
         Those of the signals, where they are measured already.
+    is_overground
+        As in ``DetectorSettings``; a few steps over plates weigh nobody.
 
     Raises
     ------
@@ -109,7 +123,9 @@ def check_signals(
     legs = {"left": left, "right": right}
     given = {side: LegSamples(*leg) for side, leg in legs.items() if leg is not None}
     if strides is None:
-        strides = make_detector(given, rate_hz, mass_kg).feed_legs(time, given) if given else []
+        settings = {"is_overground": is_overground}
+        detector = make_detector(given, rate_hz, mass_kg, **settings) if given else None
+        strides = detector.feed_legs(time, given) if detector else []
     findings = _check_rate(time, rate_hz)
     decelerations: dict[str, float | None] = {}
     for side, leg in given.items():
@@ -118,10 +134,11 @@ def check_signals(
         found = _check_force(force, own, mass_kg * GRAVITY_M_S2) + _check_strides(own)
         decelerations[side] = find_deceleration_peak(time, leg.angle_rad, own)
         findings += [Finding(code, message, side) for code, message in found]
+        findings += _check_joint(time, force, np.asarray(leg.angle_rad, dtype=np.float64), side)
     ratios = [s.weight_ratio for s in strides if s.weight_ratio is not None]
     ratio = float(np.median(ratios)) if ratios else None
-    findings += _check_weight(ratio, mass_kg)
-    if len(given) == 1:
+    findings += [] if is_overground else _check_weight(ratio, mass_kg)
+    if len(given) == 1 and not is_overground:
         ((side, leg),) = given.items()
         findings += _check_load(
             _compute_mean_load(time, leg, strides) / GRAVITY_M_S2, mass_kg, side
@@ -217,7 +234,20 @@ def _check_weight(ratio: float | None, mass_kg: float) -> list[Finding]:
     message = f"The plates carry {ratio * 100:.0f} % of {mass_kg:g} kg. Check the body mass"
     if ratio < 1:
         message += "; if it is right, a handrail or harness carries the rest, and A2 is lower"
-    return [Finding("weight", message + ".")]
+    is_far = not CERTAIN_LOAD[0] <= ratio <= CERTAIN_LOAD[1]
+    return [Finding("weight", message + ".", doubt="doubt_weight" if is_far else "")]
+
+
+def _check_joint(time: Floats, force: Floats, angle: Floats, side: str) -> list[Finding]:
+    """Check that an angle is an ankle's: a knee's gives valid strides too, and another A2."""
+    profile = make_profile(time, angle, find_stances(time, force))
+    if profile is None:
+        return []
+    like = find_likeness(profile)
+    if abs(like["knee angle"]) < abs(like["angle"]) + KNEE_LEAD:
+        return []
+    message = "The angle moves as a knee's does, not as an ankle's. Check which column it is."
+    return [Finding("angle_other", message, side, "doubt_angle")]
 
 
 def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> float:

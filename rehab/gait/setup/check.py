@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 from rehab.gait.offline import measure_strides
-from rehab.gait.recordings.columns import REQUIRED, ColumnMap, SignalColumn
+from rehab.gait.recordings.columns import FILTERED_HZ, REQUIRED, ColumnMap, SignalColumn
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import find_deceleration_peak
@@ -111,6 +111,7 @@ def check_setup(
         rate_hz=proposal.rate_hz,
         mass_kg=proposal.mass_kg,
         strides=strides,
+        is_overground=proposal.is_overground,
     )
     findings = list(proposal.notes) + [
         f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt
@@ -229,9 +230,17 @@ def _describe_timing(timing: dict[tuple[str, str], float | None]) -> list[str]:
     for (side, channel), at_s in timing.items():
         if channel == "moment" and at_s is not None and abs(at_s) > MOMENT_TOLERANCE_S:
             order = "later" if at_s > 0 else "earlier"
+            cutoff_hz = math.sqrt(2) / (2 * math.pi * abs(at_s))
+            by_filter = (
+                f" Your system may filter moment and angle as they come, with about {cutoff_hz:.0f}"
+                " Hz: let it not, or filter forward and backward. If it must, give its cut-off "
+                f"(--filtered {cutoff_hz:.0f}); A2 is then -4 to +2 % off at 6 Hz."
+                if at_s > 0 and FILTERED_HZ[0] <= cutoff_hz
+                else ""
+            )
             found.append(
                 f"The {side} moment falls {abs(at_s) * 1000:.0f} ms {order} than its force; up to "
                 f"{MOMENT_TOLERANCE_S * 1000:.0f} ms are usual. Look at how the two are "
-                "synchronized: A2 changes by about 1.4 % a millisecond."
+                f"synchronized: A2 changes by about 1.4 % a millisecond.{by_filter}"
             )
     return found

@@ -16,6 +16,7 @@ import numpy as np
 from rehab.gait.recordings.columns import REQUIRED
 from rehab.gait.recordings.readers import says_overground
 from rehab.gait.recordings.table import Table
+from rehab.gait.selfcheck.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
 from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ
 from rehab.gait.setup.find_forces import (
     find_force_unit,
@@ -25,7 +26,6 @@ from rehab.gait.setup.find_forces import (
 )
 from rehab.gait.setup.guess import Guess
 from rehab.gait.setup.names import Label, names_another, read_label, read_unit
-from rehab.gait.setup.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
 from rehab.gait.setup.units import (
     ANGLE_RAD,
     ANGLE_SPREAD,
@@ -42,6 +42,7 @@ from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError
 
 CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next shape
+OWN = "own."  # begins columns that ``recordings.c3d_plates`` computes
 OTHER_PLANE = 0.15  # by how much more alike another plane than the label's has to be
 # Of each channel, the shapes that a column may have instead.
 RIVALS = {"moment": ("force", "forward", "knee angle"), "angle": ("knee angle", "hip angle")}
@@ -219,6 +220,8 @@ def _find_channel(
     named = {
         n: one for n, one in labels.items() if one and (one.channel, one.side) == (channel, side)
     }
+    # What the lab's system computed comes before what plates and markers come to.
+    named = {n: one for n, one in named.items() if not n.startswith(OWN)} or named
     profiles = {}
     for name in named or [n for n, one in labels.items() if not one and not names_another(n)]:
         profile = make_profile(time_s, table[name], stances)

@@ -10,9 +10,7 @@ import numpy as np
 
 from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.recordings.columns import SIDES
-from rehab.gait.settings import MASS_MAX_KG, MASS_MIN_KG
-from rehab.gait.setup.names import Label, names_another
-from rehab.gait.setup.shapes import (
+from rehab.gait.selfcheck.shapes import (
     LIKE,
     NAMED_LIKE,
     Stances,
@@ -20,6 +18,8 @@ from rehab.gait.setup.shapes import (
     find_stances,
     make_profile,
 )
+from rehab.gait.settings import MASS_MAX_KG, MASS_MIN_KG
+from rehab.gait.setup.names import Label, names_another
 from rehab.gait.setup.units import BY_MASS, FORCE_SPREAD, FORCE_UNITS, MASS_USUAL_KG, STANCE_LOAD
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError

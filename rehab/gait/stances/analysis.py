@@ -69,8 +69,8 @@ class Stance:
         Why it is invalid.
     push_off
         At its end.
-    propulsion_n_kg
-        Largest forward force of the second half of stance.
+    propulsion_n_kg, propulsion_impulse_n_s_kg, braking_impulse_n_s_kg
+        As in ``Stride``.
     position_m
         Of the foot at initial contact [m, forward].
     flags
@@ -82,6 +82,8 @@ class Stance:
     reasons: list[RejectionReason]
     push_off: PushOff | None = None
     propulsion_n_kg: float | None = None
+    propulsion_impulse_n_s_kg: float | None = None
+    braking_impulse_n_s_kg: float | None = None
     position_m: float | None = None
     flags: tuple[Flag, ...] = ()
     late_s: float = 0.0
@@ -176,7 +178,7 @@ class StanceAnalyzer:
         return Stance(
             list(dict.fromkeys(reasons)) if reasons else reasons,
             push_off,
-            self._find_propulsion(window),
+            *self._find_propulsion(window, before, end - begin),
             self._find_position(contact),
             tuple(flags),
             clock.late_s,
@@ -249,15 +251,26 @@ class StanceAnalyzer:
             window, before = window[:, cut:], before - cut
         return window, before
 
-    def _find_propulsion(self, window: Floats) -> float | None:
+    def _find_propulsion(
+        self, window: Floats, before: int, count: int
+    ) -> tuple[float | None, float | None, float | None]:
+        """Return the largest forward force, and the impulses that drive and brake, by body mass.
+
+        The stance is ``count`` samples of the window, after ``before`` of swing.
+        """
         if not math.isfinite(window.item(FORWARD, -1)) or not is_finite(window[FORWARD]):
-            return None
+            return None, None, None
         forward = window[FORWARD : FORWARD + 1]
         decimated = decimate(forward, self._decimation)
         if decimated is None:
-            return None
-        smooth = self._forward_filter.smooth(decimated)[0]
-        return find_maximum(smooth[len(smooth) // 2 :]) / self._mass_kg
+            return None, None, None
+        smooth = self._forward_filter.smooth(decimated)[0] / self._mass_kg
+        peak = find_maximum(smooth[len(smooth) // 2 :])
+        after = window.shape[1] - before - count  # decimated samples are aligned to the end
+        stop = len(smooth) - after // self._decimation
+        stance = smooth[max(0, stop - count // self._decimation) : stop]
+        driving = float(np.maximum(stance, 0.0).sum()) / self._even_hz
+        return peak, driving, driving - float(stance.sum()) / self._even_hz
 
     def _find_position(self, contact: Contact) -> float | None:
         index = contact.begin_index

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shlex
-import signal
 import socket
 import sys
 from argparse import ArgumentParser
@@ -23,7 +21,7 @@ from rehab.people.sign_in.first_start import (
     first_password,
     prepare_database,
 )
-from rehab.sessions.live.database.lease import AnotherServer, Lease
+from rehab.sessions.live.database.lease import Lease
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.supervisor import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token
@@ -45,8 +43,8 @@ class Command(BaseCommand):
             type=int,
             default=1,
             metavar="N",
-            help="so many servers, at this port and those after it; hosted, with PostgreSQL and "
-            "Redis. SIGHUP restarts them one after the other.",
+            help="so many servers, at this port and those after it; hosted, on "
+            "PostgreSQL. SIGHUP restarts them one after the other.",
         )
         parser.add_argument(
             "--child",
@@ -142,11 +140,10 @@ def check_sharing(processes: int) -> None:
     """Check that servers can share the database. Raises CommandError, with the cure."""
     if processes < 1:
         raise CommandError("Give --processes 1 or more.")
-    if not (settings.HOSTED and connection.vendor == "postgresql" and settings.REDIS_URL):
+    if not (settings.HOSTED and connection.vendor == "postgresql"):
         raise CommandError(
-            "Several servers share a PostgreSQL database and hear each other by Redis. Set "
-            "GARRY_HOSTED=1, GARRY_DATABASE_URL=postgres://… and GARRY_REDIS_URL=redis://…, or "
-            "serve by one process."
+            "Several servers share a PostgreSQL database. Set GARRY_HOSTED=1 and "
+            "GARRY_DATABASE_URL=postgres://…, or serve by one process."
         )
     if settings.ADDRESS:
         raise CommandError(
@@ -156,16 +153,9 @@ def check_sharing(processes: int) -> None:
 
 
 def take_lease(host: str, port: int) -> Lease:
-    """Return the lease of a hosted server. Raises CommandError where another excludes it."""
-    lease = Lease(
-        settings.ADDRESS or f"{host}:{port}",
-        shares=bool(settings.REDIS_URL),
-        on_excluded=lambda: os.kill(os.getpid(), signal.SIGTERM),
-    )
-    try:
-        lease.acquire()
-    except AnotherServer as problem:
-        raise CommandError(str(problem)) from problem
+    """Return the lease of a hosted server."""
+    lease = Lease(settings.ADDRESS or f"{host}:{port}")
+    lease.acquire()
     return lease
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from django.contrib.auth.hashers import make_password
 from django.core.management import BaseCommand, CommandError
+from django.db import connection
 from django.utils import timezone, translation
 
 from rehab.exports.archive import save_zip
@@ -21,6 +22,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
+from rehab.sessions.live.headless import GIVE_WAY_S, Pace
 from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES, name_pair, write_table
 from rehab.studies.results.results import Results
@@ -68,7 +70,8 @@ class Command(BaseCommand):
             trial = example_trial(options["participants"], options["visits"], population)
             clinic, _is_new = Clinic.everywhere.get_or_create(name=options["clinic"])
             study = find_or_plan(clinic, trial, seed, now)
-            for done in walk_study(study, trial, seed, now):
+            give_way = Pace(rest_s=GIVE_WAY_S if connection.vendor == "sqlite" else 0.0)
+            for done in walk_study(study, trial, seed, now, give_way):
                 self._tell(f"{done} of {trial.participants} participants")
             results = finish_study(study, now)
         except InvalidSetting as problem:
@@ -117,8 +120,8 @@ def write_files(results: Results, folder: Path) -> str:
 
 def describe(results: Results, effects: Any) -> str:
     """Return the primary outcome's differences beside what was put in, as text."""
-    lines = [f"{results.study.code}: {results.study.primary_outcome}, differences in %"]
-    for one in results.find(results.study.primary_outcome).differences:
+    lines = [f"{results.study.code}: {results.primary}, differences in %"]
+    for one in results.find(results.primary).differences:
         true = effects[one.group] - effects[one.reference]
         found = one.difference
         interval = "" if found.low is None else f" [{found.low:6.2f}, {found.high:6.2f}]"

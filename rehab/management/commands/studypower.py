@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import threading
 from argparse import ArgumentParser, ArgumentTypeError
 from typing import Any
@@ -62,6 +61,8 @@ class Command(BaseCommand):
                 self.stderr.write(f"\r{stored.done} of {stored.simulations} studies", ending="")
                 self.stderr.flush()
         except InvalidSetting as problem:
+            if options["child"]:  # the run has noted it; the server would only start it again
+                return
             raise CommandError(str(problem)) from problem
         self.stderr.write("")
         self.stdout.write(f"Run {run.pk} of {run.study.code}: {run.done} studies")
@@ -81,7 +82,8 @@ def live_with_parent() -> None:
         os.nice(10)
 
     def watch() -> None:
-        sys.stdin.buffer.read()
+        while os.read(0, 4096):  # not sys.stdin: Python aborts where a thread holds its lock
+            pass
         os._exit(0)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -42,8 +42,6 @@ UNTRACKED_FIELDS = {
     "rotated_at",
     "token_expires_at",
     "copy_seen_at",
-    "epoch",
-    "owner",
 }
 SECRET_FIELDS = {"password", "pin_hash"}  # that they changed is recorded, never their values
 MASK = "•••"
@@ -125,6 +123,11 @@ class HistoryEntry(SealableModel):
 
     def __str__(self) -> str:
         return f"{self.get_model_name_display()} {self.object_id}: {self.get_kind_display()}"
+
+    @property
+    def is_emptied(self) -> bool:
+        """Whether it has no values."""
+        return not any(self.changes.values())
 
 
 @contextmanager

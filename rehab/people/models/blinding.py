@@ -19,13 +19,18 @@ def hidden_patients(user: User) -> QuerySet[Patient]:
     """Return the patients whose sessions an account must not see until their study is closed.
 
     Points, words and colors betray the feedback type. So an assessor of a study sees no session of
-    its participants, and a researcher only with the mark that allows looks at unfinished studies.
+    its participants, and a researcher none of any running study: the mark that allows looks shows
+    aggregates of groups without names, and a session would tell which group is which.
     Participants who have withdrawn stay hidden. The lookups are those of `rehab.studies.models`.
     """
     if user.role == Role.RESEARCHER:
-        in_study = Patient.everywhere.filter(enrollments__study__state=RUNNING)
-        return in_study.exclude(pk__in=_marked(user, "interim").values("pk"))
-    return _marked(user, "assessor")
+        return Patient.everywhere.filter(enrollments__study__state=RUNNING)
+    return Patient.everywhere.filter(
+        enrollments__study__state=RUNNING,
+        enrollments__study__marks__user=user,
+        enrollments__study__marks__task="assessor",
+        enrollments__study__marks__ended_at=None,
+    )
 
 
 def assessors() -> QuerySet[User]:
@@ -45,13 +50,3 @@ def is_in_running_study(patient: Patient) -> bool:
     Who has withdrawn counts: what the study hides would still reveal the arm to an assessor.
     """
     return patient.enrollments.filter(study__state=RUNNING).exists()
-
-
-def _marked(user: User, task: str) -> QuerySet[Patient]:
-    """Return the participants of running studies in which an account has a mark."""
-    return Patient.everywhere.filter(
-        enrollments__study__state=RUNNING,
-        enrollments__study__marks__user=user,
-        enrollments__study__marks__task=task,
-        enrollments__study__marks__ended_at=None,
-    )

@@ -27,18 +27,23 @@ from rehab.training.summary.summary import summarize_session
 
 # Steps that are queued before waiting for the disk: few commits, constant memory.
 BATCH = 500
+# SQLite lets one write at a time, and whoever waits tries again each 100 ms at the latest
+# (sqlite3.c, sqliteDefaultBusyCallback): so long a rest lets a server beside us have its turn.
+GIVE_WAY_S = 0.12
 
 
 @dataclass(frozen=True)
 class Pace:
     """How fast strides arrive: ``speed`` times true cadence, or as fast as they are stored (None).
 
+    ``rest_s``: how long the database is left to others after each batch, where that is a server's.
     Clock and sleep are parameters, so that tests do not have to wait.
     """
 
     speed: float | None = None
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
+    rest_s: float = 0.0
 
 
 def simulate_strides(
@@ -81,8 +86,15 @@ async def _send_strides(live: LiveSession, strides: Iterator[Measurement], pace:
             await pace.sleep(max(0.0, began + stride.time_s / pace.speed - pace.clock()))
         live.record_step(stride, timezone.now())
         if count % BATCH == 0:
-            await live.wait_until_committed()
+            await _rest(live, pace)
+    await _rest(live, pace)
+
+
+async def _rest(live: LiveSession, pace: Pace) -> None:
+    """Wait until everything is stored, and then leave the database to others."""
     await live.wait_until_committed()
+    if pace.rest_s:
+        await pace.sleep(pace.rest_s)
 
 
 def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[float, float]]:

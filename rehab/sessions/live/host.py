@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from rehab.people.models import User
+from rehab.sessions.live.clinics import OwnedClinics
 from rehab.sessions.live.devices import Devices
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.supervisor import Supervisor
-from rehab.sessions.payloads import Message
 
 
 class Host(Protocol):
-    """What orders, recovery, routines and other servers' requests need (runtime.py)."""
+    """What orders, recovery, routines and the watch over other servers need (runtime.py)."""
 
+    clinics: OwnedClinics
     sessions: dict[int, LiveSession]
     sockets: set[Any]
     draining: bool
@@ -24,10 +24,13 @@ class Host(Protocol):
     supervisor: Supervisor
     writer: Writer
 
+    @property
+    def may_move_robots(self) -> bool: ...
     async def session(self, session_id: int) -> LiveSession: ...
     async def settled_session(self, session_id: int) -> LiveSession: ...
     def drop(self, live: LiveSession, problem: Exception) -> None: ...
     async def close(self, live: LiveSession) -> None: ...
-    def close_pages(self, live: LiveSession) -> None: ...
+    async def close_unused_clinics(self) -> None: ...
+    async def give_up(self, clinic_id: int) -> None: ...
+    def lose(self, clinic_id: int) -> None: ...
     def announce(self, session_id: int, station_id: int | None) -> None: ...
-    def stop_robots(self, live: LiveSession, by: User | None, details: Message) -> None: ...

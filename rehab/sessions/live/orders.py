@@ -1,8 +1,7 @@
-"""What people order of a session: a change, a remark, that its robot stops or may move again.
+"""What people order of a session: a change or a remark, by a page, the API or a command.
 
-All take one way: ``Runtime.order`` carries an order out, or sends it to the server that owns the
-session, which carries it out. Only a page that stops the robot of a session of this process goes
-straight to ``Runtime.stop_robots``: nothing may hold a stop up.
+All take one way: ``Runtime.order``, in the process that the clinic lives in. What a robot is
+ordered goes straight to ``StationRobots``: nothing may hold a stop up.
 """
 
 from __future__ import annotations
@@ -16,14 +15,17 @@ from msgspec import Struct
 
 from rehab.people.models import User
 from rehab.sessions.live.host import Host
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import find_newest_open
 from rehab.sessions.live.supervisor import source_name
 from rehab.sessions.log import Remark
 from rehab.training.changes import ENDED_STATES, Change, NotAllowed, State
 from rehab.training.controls import CONTROLS
 
+MAX_RUNNING = 1_000  # sessions of a clinic: one process serves them all (docs/capacity.md)
 
-class ChangeOrder(Struct, frozen=True, tag="change"):
+
+class ChangeOrder(Struct, frozen=True):
     """Change a session. ``by``: None for a tablet or a command."""
 
     kind: str
@@ -31,7 +33,7 @@ class ChangeOrder(Struct, frozen=True, tag="change"):
     by: User | None
 
 
-class RemarkOrder(Struct, frozen=True, tag="remark"):
+class RemarkOrder(Struct, frozen=True):
     """Log a remark."""
 
     what: Remark
@@ -39,46 +41,29 @@ class RemarkOrder(Struct, frozen=True, tag="remark"):
     by: User
 
 
-class StopOrder(Struct, frozen=True, tag="stop"):
-    """Stop the robot. ``details``: which device ordered it, if it was no person."""
-
-    by: User | None
-    details: dict[str, Any] = {}
-
-
-class ArmOrder(Struct, frozen=True, tag="arm"):
-    """Let the robot move again. Always by a person (robot_permissions.py)."""
-
-    by: User
-
-
-Order = ChangeOrder | RemarkOrder | StopOrder | ArmOrder
+Order = ChangeOrder | RemarkOrder
 
 
 async def carry_out(host: Host, session_id: int, order: Order) -> None:
-    """Carry out an order for a session of this process; all but a stop is committed by then.
+    """Carry out an order for a session; it is committed by then.
 
     Raises InvalidSetting if it is refused, NotStored if it could not be committed, and
-    OwnedElsewhere where the session is another server's.
+    OwnedElsewhere where the clinic lives in another process.
     """
-    match order:
-        case ChangeOrder():
-            await _change(host, session_id, order)
-        case RemarkOrder():
-            live = await host.settled_session(session_id)
-            if live.aggregate.fold.state in ENDED_STATES:
-                raise NotAllowed("The session has ended.")
-            await live.remark(order.what, order.value, order.by, timezone.now())
-        case StopOrder():
-            host.stop_robots(await host.session(session_id), order.by, order.details)
-        case ArmOrder():
-            await host.robots.arm(await host.session(session_id), order.by)
-
-
-async def _change(host: Host, session_id: int, order: ChangeOrder) -> None:
     live = await host.settled_session(session_id)
-    if live.source_clock is not None and CONTROLS[order.kind].leads_to is State.RUNNING:
-        live.source_clock.resume(time.monotonic())
+    if isinstance(order, ChangeOrder):
+        await _change(host, live, order)
+    elif live.aggregate.fold.state in ENDED_STATES:
+        raise NotAllowed("The session has ended.")
+    else:
+        await live.remark(order.what, order.value, order.by, timezone.now())
+
+
+async def _change(host: Host, live: LiveSession, order: ChangeOrder) -> None:
+    if CONTROLS[order.kind].leads_to is State.RUNNING:
+        _check_room(host, live)
+        if live.source_clock is not None:
+            live.source_clock.resume(time.monotonic())
     await live.change(Change(order.kind, order.value), order.by, timezone.now())
     if live.aggregate.fold.state not in ENDED_STATES:
         return
@@ -87,3 +72,13 @@ async def _change(host: Host, session_id: int, order: ChangeOrder) -> None:
         waiting = await sync_to_async(find_newest_open)(live.station_id)
         if waiting is not None:
             host.announce(waiting, live.station_id)
+
+
+def _check_room(host: Host, live: LiveSession) -> None:
+    """Raise NotAllowed where as many sessions of the clinic run as one process serves."""
+    there = (one for one in host.sessions.values() if one.clinic_id == live.clinic_id)
+    if sum(one.is_running for one in there) >= MAX_RUNNING:
+        raise NotAllowed(
+            "{limit} sessions of this clinic run already. End one of them first.",
+            limit=MAX_RUNNING,
+        )

@@ -85,8 +85,8 @@ def move_database_log() -> None:
 async def end_tasks(tasks: Collection[asyncio.Task[Any]]) -> None:
     """Cancel tasks, again and again until all have ended; their errors are dropped.
 
-    A task may lose a cancellation: ``asyncio.wait_for`` of Python 3.11, by which redis-py sends,
-    does where what it waits for is done in the same turn of the event loop.
+    A task may lose a cancellation: ``asyncio.wait_for`` of Python 3.11 does where what it waits for
+    is done in the same turn of the event loop.
     """
     while pending := [task for task in tasks if not task.done()]:
         for task in pending:

@@ -17,7 +17,6 @@ from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
-from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.instruments import LATE_S
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
@@ -40,9 +39,8 @@ ROBOT_HEARTBEATS = [to_text({"type": "heartbeat", "watched": one}) for one in (F
 class Routines:
     """One task each: robots stop without heartbeats, so none may wait for the disk."""
 
-    def __init__(self, host: Host, servers: Servers | None) -> None:
+    def __init__(self, host: Host) -> None:
         self._host = host
-        self._servers = servers
         self._loop = asyncio.get_running_loop()
         self._beat = 0
         self._part = 0
@@ -76,7 +74,12 @@ class Routines:
                 log.exception("A periodic task (every %.2f s) failed", beats * ROBOT_HEARTBEAT_S)
 
     async def _send_robot_heartbeats(self) -> None:
-        """Send heartbeats to a part of the robots: to all of them within an interval."""
+        """Send heartbeats to a part of the robots: to all of them within an interval.
+
+        None where another server may have taken the clinics: then robots stand still.
+        """
+        if not self._host.may_move_robots:
+            return
         self._part = (self._part + 1) % PARTS
         for live in self._host.sessions.values():
             if live.id % PARTS == self._part and live.robot is not None:
@@ -95,8 +98,7 @@ class Routines:
     async def _send_page_heartbeats(self) -> None:
         """Send heartbeats to the pages of some sessions: of all of them within an interval."""
         self._beat = (self._beat + 1) % SWEEP
-        followed = () if self._servers is None else self._servers.followed.sessions.values()
-        for live in (*self._host.sessions.values(), *followed):
+        for live in self._host.sessions.values():
             if live.id % SWEEP != self._beat or not live.feed.subscribers:
                 continue
             presence = live.presence(timezone.now())
@@ -114,6 +116,7 @@ class Routines:
             if self._host.sessions.get(live.id) is live and live.is_idle and not live.recently_used:
                 await self._host.close(live)
             live.recently_used = False  # who gets it now has until the next sweep to subscribe
+        await self._host.close_unused_clinics()
 
     async def _checkpoint_log(self) -> None:
         await self._loop.run_in_executor(None, move_database_log)

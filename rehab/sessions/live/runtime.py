@@ -6,30 +6,28 @@ import asyncio
 import contextvars
 import logging
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from asgiref.sync import sync_to_async
 from django.conf import settings
 from django.db import DatabaseError
 
-from rehab.people.models import User
 from rehab.sessions.live.audit_queue import AuditQueue
+from rehab.sessions.live.clinics import OwnedClinics
 from rehab.sessions.live.database import lease, owners
-from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
 from rehab.sessions.live.orders import Order, carry_out
 from rehab.sessions.live.recovery import Recovery
 from rehab.sessions.live.routines import Routines
-from rehab.sessions.live.servers.servers import Servers
+from rehab.sessions.live.servers import Servers
+from rehab.sessions.live.session.commits import Fenced
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import Loader
 from rehab.sessions.live.station_robots import StationRobots
-from rehab.sessions.live.supervisor import Supervisor, local_address, run_source
-from rehab.sessions.payloads import Message
-from rehab.training.changes import OPEN_STATES, State
+from rehab.sessions.live.supervisor import Supervisor, local_address, run_source, source_name
 from robot.wire.close_codes import CloseCode
 
 log = logging.getLogger(__name__)
@@ -59,13 +57,18 @@ class Runtime:
         self.supervisor = Supervisor(settings.DATA_DIR / "children.json")
         # Where child processes connect.
         self.address = local_address(settings.HOST, settings.PORT)
-        self._loader = Loader()
+        self.clinics = OwnedClinics(self.recovery.load)
+        self._loader = Loader(self.clinics.own)
         self._opening: dict[int, asyncio.Task[None]] = {}
-        self._held: set[int] = set()  # sessions that this process may be the owner of
         own = lease.held()
         # The other servers on the database, where there may be any.
-        self.servers = Servers(self, self.recovery, own) if own is not None and own.shares else None
-        self.routines = Routines(self, self.servers)
+        self.servers = Servers(self, self.recovery, own) if own is not None else None
+        self.routines = Routines(self)
+
+    @property
+    def may_move_robots(self) -> bool:
+        """Whether no other server may have taken the clinics."""
+        return self.servers is None or self.servers.may_move_robots
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
@@ -104,56 +107,30 @@ class Runtime:
             if self.sessions.get(session_id) is live:
                 return live
 
-    async def viewed_session(self, session_id: int) -> LiveSession:
-        """Return a live session for a page: one that another server owns is followed.
-
-        Raises what ``session`` does.
-        """
-        if self.servers is not None and session_id in self.servers.followed.sessions:
-            return await self.servers.followed.follow(session_id)
-        try:
-            return await self.session(session_id)
-        except OwnedElsewhere:
-            if self.servers is None:
-                raise
-        return await self.servers.followed.follow(session_id)
-
-    def find(self, session_id: int) -> LiveSession | None:
-        """Return a session if it is in memory: this process's own, or one that it follows."""
-        followed = {} if self.servers is None else self.servers.followed.sessions
-        return self.sessions.get(session_id) or followed.get(session_id)
-
-    async def session_for_device(self, session_id: int, slot: str) -> LiveSession:
-        """Return a live session for a source or robot, asking another owner to give it up.
-
-        Raises what ``session`` does.
-        """
-        try:
-            return await self.settled_session(session_id)
-        except OwnedElsewhere as problem:
-            owner = problem.owner
-            if self.servers is None or not await self.servers.ask_for(owner, session_id, slot):
-                raise
-        return await self.settled_session(session_id)
-
     async def _open(self, session_id: int) -> None:
-        self._held.add(session_id)
         loaded = await self._loader.load(session_id)
-        aggregate, stopped = loaded.aggregate, loaded.robot_stopped
-        live = LiveSession(aggregate, self.writer, loaded.recent, self.drop, robot_stopped=stopped)
-        await self.recovery.pause_orphaned(live, loaded.owned_before)
+        live = LiveSession(
+            loaded.aggregate,
+            loaded.epoch,
+            self.writer,
+            loaded.recent,
+            self.drop,
+            robot_stopped=loaded.robot_stopped,
+        )
+        await self.recovery.pause_orphaned(live)
         self.robots.restore_stops(live)
         self.sessions[session_id] = live
-        if self.servers is not None:
-            self.servers.followed.leave(session_id)  # it was another's
-        if live.aggregate.fold.state in OPEN_STATES and not self.draining:
-            await run_source(self.supervisor, aggregate.session, self.address)
+        if live.is_open and not self.draining:
+            await run_source(self.supervisor, live.aggregate.session, self.address)
 
     def drop(self, live: LiveSession, problem: Exception) -> None:
         """Drop a session that could not be written: its fold is ahead of its log.
 
-        A stop of the robot stays in force.
+        A stop of the robot stays in force. Where another process has the clinic, all of it is lost.
         """
+        if isinstance(problem, Fenced) and self.clinics.epochs.get(live.clinic_id) == live.epoch:
+            self.lose(live.clinic_id)
+            return
         self.robots.pass_stop_on(live)
         if self.sessions.get(live.id) is live:
             log.error("Session %s is rebuilt from its log: %s", live.id, problem)
@@ -161,67 +138,87 @@ class Runtime:
         for peer in (live.source, live.robot):
             if peer is not None:
                 peer.evict(CloseCode.NOT_STORED, "not_stored", describe_failure(problem))
-        self.close_pages(live)
-
-    def close_pages(self, live: LiveSession) -> None:
-        """Close a session's sockets: their clients connect again, and find who has it now."""
         for socket in list(self.sockets):
             if getattr(socket, "live", None) is live:
                 socket.close_soon(CloseCode.RESTARTING)
 
+    def lose(self, clinic_id: int) -> None:
+        """Drop a clinic that another process has taken: its clients connect again, and find it."""
+        self.clinics.forget(clinic_id)
+        for live in self._sessions_of(clinic_id):
+            self.drop(live, Fenced("Another process has taken the clinic over."))
+            self.recovery.forget(live.id)
+            self._run(self.supervisor.stop(source_name(live.id)))
+        for socket in list(self.sockets):
+            if socket.clinic_id == clinic_id:
+                socket.close_soon(CloseCode.RESTARTING)
+
+    async def give_up(self, clinic_id: int) -> None:
+        """Release a clinic without an open session, so that it moves to where it belongs."""
+        lives = self._sessions_of(clinic_id)
+        if any(live.is_open for live in lives):
+            return
+        for live in lives:
+            del self.sessions[live.id]  # from here on it is closed to everyone
+        there = [socket for socket in self.sockets if socket.clinic_id == clinic_id]
+        await self.clinics.release(
+            clinic_id,
+            _finish(*(self.supervisor.stop(source_name(live.id)) for live in lives)),
+            _finish(*(socket.close_now(CloseCode.RESTARTING) for socket in there)),
+            _finish(*(live.wait_until_committed() for live in lives)),
+        )
+
+    def _sessions_of(self, clinic_id: int) -> list[LiveSession]:
+        return [live for live in self.sessions.values() if live.clinic_id == clinic_id]
+
+    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+        task = self.loop.create_task(work, context=contextvars.Context())
+        self.requests.add(task)
+        task.add_done_callback(self.requests.discard)
+
     async def order(self, session_id: int, order: Order) -> None:
-        """Carry out an order, here or where the session is; committed when this returns.
+        """Carry out an order; it is committed when this returns.
 
-        Raises InvalidSetting if it is refused and NotStored if it could not be committed.
+        Raises InvalidSetting if it is refused, NotStored if it could not be committed, and
+        OwnedElsewhere where the clinic lives in another process.
         """
-        try:
-            await carry_out(self, session_id, order)
-        except OwnedElsewhere as problem:
-            if self.servers is None:
-                raise
-            await self.servers.order(problem.owner, session_id, order)
-
-    def stop_robots(self, live: LiveSession, by: User | None, details: Message) -> None:
-        """Stop the robot of a session of this process, and of the others there, on any server.
-
-        ``details``: which device stopped it, if it was no person.
-        """
-        self.robots.stop(live, by, details, again=self.servers is not None)
-        if self.servers is not None and live.station_id is not None:
-            self.servers.announce_stop(live.station_id, by, details)
+        await carry_out(self, session_id, order)
 
     def announce(self, session_id: int, station_id: int | None) -> None:
-        """Notify a station's devices, at any server, of a session that has opened."""
-        if station_id is None:
-            return
-        self.devices.announce(session_id, station_id)
-        if self.servers is not None:
-            self.servers.announce(session_id, station_id)
+        """Notify a station's devices of a session that has opened."""
+        if station_id is not None:
+            self.devices.announce(session_id, station_id)
 
     async def recover(self) -> int:
         """Pause the sessions whose process died while they ran; return how many.
 
-        Sessions that a process handed on when it was stopped go on as they are.
+        Sessions of clinics that a process released when it was stopped go on as they are.
         """
         paused = await self.recovery.recover()
         self.is_ready = True
+        if (own := lease.held()) is not None:
+            own.is_ready = True
         return paused
 
     async def close(self, live: LiveSession) -> None:
         """Unload a session that is not in use; it can be rebuilt from its log."""
-        if live.aggregate.fold.state is State.RUNNING:
+        if live.is_running:
             return  # its source may reconnect
         self.sessions.pop(live.id, None)
-        self._held.discard(live.id)  # at once: it may open again before it is released
-        try:
-            await sync_to_async(owners.release)(live.id, live.aggregate.session.epoch)
-        except DatabaseError:
-            self._held.add(live.id)
-            log.exception("Session %s could not be released", live.id)  # go on with the others
+        await sync_to_async(owners.note_ends)([live.id])
+
+    async def close_unused_clinics(self) -> None:
+        """Release the clinics of which nobody is here."""
+        used = {live.clinic_id for live in self.sessions.values()}
+        used |= {socket.clinic_id for socket in self.sockets}
+        for clinic_id in self.clinics.find_unused() - used:
+            await self.clinics.release(clinic_id)
 
     async def drain(self) -> None:
         """Close every socket so that clients reconnect, commit everything, stop."""
         self.draining = True
+        if (own := lease.held()) is not None:
+            own.is_ready = False
         await self.supervisor.stop_all()
         await self.routines.stop()
         closing = [socket.close_now(CloseCode.RESTARTING) for socket in list(self.sockets)]
@@ -230,13 +227,15 @@ class Runtime:
         await _finish(*self.requests)
         await self.loop.run_in_executor(None, self.writer.close)
         await asyncio.sleep(0)  # the writer's last reports
-        self.sessions.clear()
-        try:
-            await sync_to_async(owners.release_all)(self._held)
-        except DatabaseError:
-            log.exception("Sessions could not be released; they come back paused")
         if self.servers is not None:
             await self.servers.close()
+        left = list(self.sessions)
+        self.sessions.clear()
+        try:
+            await sync_to_async(owners.note_ends)(left)
+            await self.clinics.release_all()
+        except DatabaseError:
+            log.exception("Clinics could not be released; their sessions come back paused")
 
 
 async def _finish(*work: Awaitable[Any]) -> None:

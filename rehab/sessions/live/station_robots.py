@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Mapping
+from collections.abc import Mapping
 
 from django.utils import timezone
 
@@ -27,44 +27,13 @@ class StationRobots:
         # At locations whose sessions were all dropped.
         self._unlogged_stops: dict[str, RobotStop] = {}
 
-    def stop(
-        self, live: LiveSession, by: User | None, details: Message, *, again: bool = False
-    ) -> None:
+    def stop(self, live: LiveSession, by: User | None, details: Message) -> None:
         """Stop the robot of a session, and of the others at its station.
 
-        ``details``: which device stopped it, if it was no person. ``again``: where the robot is
-        stopped already, the stop is stored all the same if another server has armed it meanwhile.
+        ``details``: which device stopped it, if it was no person.
         """
-        live.robot_orders.stop(by, timezone.now(), details, again=again)
-        for session in self._others_at_location_of(live):
+        for session in (live, *self._others_at_location_of(live)):
             session.robot_orders.stop(by, timezone.now(), details)
-
-    def stop_at(self, station_id: int, by: User | None, details: Message) -> None:
-        """Stop the robot of a station, as another server asks."""
-        for session in list(self._sessions.values()):
-            if session.station_id == station_id:
-                session.robot_orders.stop(by, timezone.now(), details)
-
-    async def stop_as_stored(
-        self, find_stopped: Callable[[Collection[int]], Awaitable[Collection[int]]]
-    ) -> None:
-        """Stop the robots whose stop was stored by another server, and did not arrive here.
-
-        What is armed, or was while the database was read, is left as it is.
-        """
-        armed = [
-            (live, live.station_id, arming)
-            for live in self._sessions.values()
-            if live.station_id is not None
-            and (arming := live.robot_orders.logged_arming) is not None
-        ]
-        if not armed:
-            return
-        stopped = await find_stopped({station_id for _, station_id, _ in armed})
-        for live, station_id, arming in armed:
-            orders, is_here = live.robot_orders, self._sessions.get(live.id) is live
-            if is_here and station_id in stopped and orders.logged_arming == arming:
-                orders.stop(None, timezone.now(), {})
 
     async def arm(self, live: LiveSession, by: User) -> None:
         """Let the robot of a session move again, once that is committed."""

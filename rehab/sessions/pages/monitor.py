@@ -58,6 +58,7 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     context = {
         "chart_marks": chart_marks(),
         "session": session,
+        "locked": session.to_plan().locked,
         "remarks": [
             {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
             for what, icon in ICONS.items()

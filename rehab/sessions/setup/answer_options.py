@@ -12,10 +12,11 @@ from rehab.sessions.setup.option import (
 )
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.changes import ChangeKind
-from rehab.training.robot_cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
+from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import INTERVAL_MAX, Schedule, ScheduleKind
 from robot.wire.cue_limits import (
     COUNT_MAX,
+    DEFAULT_THRESHOLD,
     REST_MAX_S,
     WINDOW_MAX_S,
     WINDOW_MIN_S,
@@ -105,7 +106,7 @@ ANSWER_OPTIONS = (
         label=_("Robot acts from, % of the goal"),
         help="Percent of the goal.",
         kind=int,
-        default=round(100 * DEFAULT_ACTIVATION_THRESHOLD),
+        default=round(100 * DEFAULT_THRESHOLD),
         least=1,
         most=200,
         unit="%",

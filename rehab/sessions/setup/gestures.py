@@ -17,10 +17,18 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gestures import KNOWN_NAMES
+from robot.motion.gestures import GESTURES, KNOWN_NAMES, ORIGINALS
+from robot.motion.pools import POOLS, VARIANTS
+from robot.wire.cue_limits import VARIED
 
 # Choices beside gestures, whose names have no parentheses.
 DEFAULT_GESTURE, NO_GESTURE = "(usual)", "(nothing)"
+# For programs; the variants of a pool are joy_1, joy_2, …
+GESTURE_NAMES = (
+    f"{DEFAULT_GESTURE}, {NO_GESTURE}, {VARIED}, one composed in the clinic, a pool "
+    f"({', '.join(POOLS)}), one of its variants ({next(iter(VARIANTS))}, …), or one of: "
+    f"{', '.join((*GESTURES, *ORIGINALS))}."
+)
 
 
 def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:

@@ -10,7 +10,11 @@ from django.utils.translation import gettext_lazy as _
 from rehab.feedback.translation import valence_choices
 from rehab.people.models import User
 from rehab.sessions.formatting import format_source
-from rehab.sessions.setup.gestures import DEFAULT_GESTURE, robot_gesture_choices
+from rehab.sessions.setup.gestures import (
+    DEFAULT_GESTURE,
+    GESTURE_NAMES,
+    robot_gesture_choices,
+)
 from rehab.sessions.setup.option import (
     MINUTES,
     PERCENT,
@@ -142,7 +146,7 @@ MAIN_OPTIONS = (
     Option(
         name="robot_above",
         label=_("After strong steps"),
-        help="Gesture after a window above the threshold.",
+        help=f"Gesture after a window above the threshold: {GESTURE_NAMES}",
         choices=_list_gestures,
         default=DEFAULT_GESTURE,
         is_required=True,
@@ -152,7 +156,7 @@ MAIN_OPTIONS = (
     Option(
         name="robot_below",
         label=_("After weak steps"),
-        help="Gesture after a window below it.",
+        help=f"Gesture after a window below it: {GESTURE_NAMES}",
         choices=_list_gestures,
         default=DEFAULT_GESTURE,
         is_required=True,

@@ -99,7 +99,12 @@ def add_part(file: Path, part: bytes, at: int) -> None:
         for other in file.parent.glob(f"{person}-*"):
             if int(other.stem.partition("-")[2]) >= int(place):
                 other.unlink(missing_ok=True)
-    with file.open("ab") as opened:
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW  # never through a link
+    try:
+        descriptor = os.open(file, flags, 0o600)
+    except OSError:
+        raise UploadRefused from None
+    with os.fdopen(descriptor, "ab") as opened:
         opened.write(part)
 
 

@@ -30,6 +30,8 @@ class LiveFeed:
         The leg that the session trains, None before there was a session.
     excluded
         How many strides belonged to no session.
+    resumed
+        How many times a person has let the session go on after a pause.
     refused
         How many were not kept because as many waited as can be kept.
     on_change
@@ -44,7 +46,7 @@ class LiveFeed:
         self.goal: float | None = None
         self.valence = "positive"
         self.trained_side: Side | None = None
-        self.excluded = self.refused = 0
+        self.excluded = self.refused = self.resumed = 0
         self.on_change: Callable[[], None] = lambda: None
         self._monotonic = monotonic
         self._waiting: deque[Measurement] = deque()
@@ -85,6 +87,7 @@ class LiveFeed:
 
     def resume(self) -> None:
         """Note that the session runs."""
+        self.resumed += self._has_started and not self._is_running
         self._has_started = self._is_running = True
 
     def pause(self) -> None:

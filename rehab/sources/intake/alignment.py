@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rehab.gait.recordings.columns import REQUIRED
+from rehab.gait.recordings.columns import find_required
 
 Floats = NDArray[np.float64]
-Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.CHANNELS
+Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.ALL_CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
 FRAME: Channel = ("", "frame")  # the device's count of samples, of no leg
@@ -82,7 +82,7 @@ class Alignment:
                 self._append(channel, t_s[sent], column[sent])
                 self._heard_s[channel] = now_s
         for side in {side for side, _ in self._tracks.keys() - {FRAME}}:
-            for name in REQUIRED:
+            for name in find_required([name for own, name in self._tracks if own == side]):
                 self._tracks.setdefault((side, name), (np.empty(0), np.empty(0)))
                 self._heard_s.setdefault((side, name), now_s)
         return self._collect(now_s)
@@ -156,4 +156,5 @@ def _interpolate(at_s: Floats, times: Floats, known: Floats) -> Floats:
 @lru_cache(maxsize=64)
 def _is_whole(channels: tuple[Channel, ...]) -> bool:
     sides = {side for side, _ in set(channels) - {FRAME}}
-    return all((side, name) in channels for side in sides for name in REQUIRED)
+    legs = {side: [name for own, name in channels if own == side] for side in sides}
+    return all(set(names) >= set(find_required(names)) for names in legs.values())

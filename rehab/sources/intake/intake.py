@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rehab.gait import Stride
+from rehab.gait.recordings.ankle import compute_ankle
+from rehab.gait.recordings.columns import MARKED, SIDES, find_required
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
@@ -87,6 +90,8 @@ class Intake:
         self._number = 0
         self._warned_s: dict[str, float] = {}
         self._reported_reasons: set[str] = set()
+        self._doubts: tuple[str, ...] = ()  # why valid strides do not count
+        self._doubted_at = 0  # how many times the session had been resumed then
 
     @property
     def side(self) -> Side:
@@ -180,7 +185,15 @@ class Intake:
         for stride in strides:
             named = to_measurement(stride, self._number + 1, self.side)
             if named is not None:
-                self._put(named, is_timed=False)
+                reasons = named.reasons or self._standing_doubts
+                self._put(replace(named, reasons=reasons), is_timed=False)
+
+    @property
+    def _standing_doubts(self) -> tuple[str, ...]:
+        """What a person has not answered yet: by going on after a pause the signals are right."""
+        if self._feed.resumed > self._doubted_at:
+            self._doubts = ()
+        return self._doubts
 
     def _put_worn(self, strides: Iterable[Sided]) -> None:
         for stride in strides:
@@ -269,6 +282,9 @@ class Intake:
         return VALUE in there or bool(known & there)
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
+        for side in SIDES:
+            if (side, "cop") in values:
+                _add_ankle(values, side)
         if self._recorder is not None:
             self._recorder.write(t_s, values)
         if self._pipeline is None:
@@ -288,7 +304,10 @@ class Intake:
                 is_overground=self._settings.is_overground,
             )
         self._put_strides(self._pipeline.add(t_s, values))
-        for finding in self._pipeline.check():
+        findings = self._pipeline.check()
+        if doubts := tuple(sorted({one.doubt for one in findings if one.doubt})):
+            self._doubts, self._doubted_at = doubts, self._feed.resumed
+        for finding in findings:
             where = f" ({finding.side} leg)" if finding.side else ""
             self._notify(f"Check of the first half minute{where}: {finding.message}")
 
@@ -299,3 +318,10 @@ class Intake:
                 self._warned_s.clear()
             self._warned_s[kind] = now_s
             self._notify(text)
+
+
+def _add_ankle(values: dict[Channel, Floats], side: str) -> None:
+    """Add a leg's moment and angle to its channels, of plates and markers that are whole."""
+    leg = {name: channel for (own, name), channel in values.items() if own == side}
+    if find_required(leg) == MARKED and leg.keys() >= set(MARKED):
+        values[side, "moment"], values[side, "angle"] = compute_ankle(leg)

@@ -14,7 +14,9 @@ from robot.wire.limits import MAX_REASONS
 EXTRA = (
     *("initial_contact_s", "stance_s", "swing_s", "stride_s", "step_s"),
     *("first_double_support_s", "second_double_support_s"),
-    *("step_length_m", "step_symmetry", "propulsion_n_kg"),
+    *("double_support_s", "step_length_m", "step_symmetry"),
+    *("stance_ratio", "swing_ratio", "step_time_ratio", "step_length_ratio"),
+    *("propulsion_n_kg", "propulsion_impulse_n_s_kg", "braking_impulse_n_s_kg", "propulsion_share"),
     *("force_peak_n_kg", "moment_peak_nm_kg", "a2_moment_nm_kg", "a2_velocity_rad_s"),
     "a2_sd_w_kg",
     *("weight_ratio", "offset_n"),

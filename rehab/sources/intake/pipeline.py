@@ -93,7 +93,12 @@ class SignalPipeline:
         }
         legs = [_leg(whole, side, t_s) if side in self._sides else None for side in SIDES]
         return check_signals(
-            t_s, legs[0], legs[1], rate_hz=self.rate_hz, mass_kg=self.mass_kg
+            t_s,
+            legs[0],
+            legs[1],
+            rate_hz=self.rate_hz,
+            mass_kg=self.mass_kg,
+            is_overground=bool(self._how["is_overground"]),
         ).findings
 
     def _keep_for_check(self, t_s: Floats, values: dict[Channel, Floats]) -> None:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Self
 
 from rehab.gait.recordings.columns import (
-    CHANNELS,
+    ALL_CHANNELS,
     SIDES,
     SIGNAL_LAYOUTS,
     ColumnMap,
     SignalColumn,
+    put_back_filtered,
     read_column,
     read_column_map,
 )
@@ -88,12 +89,15 @@ class IntakeSettings:
                 f"{options.keep} is there already, and recordings are never written over. "
                 "Give --keep another name."
             )
-        columns = getattr(options, "columns", None)
+        pairs, filtered_hz = (getattr(options, one, None) for one in ("columns", "filtered"))
+        columns = read_column_map(pairs) if pairs else cls().columns
+        if filtered_hz is not None:
+            columns = put_back_filtered(columns, filtered_hz)
         return cls(
             mass_kg=mass_kg,
             rate_hz=options.rate,
             look_ahead_s=look_ahead_s,
-            columns=read_column_map(columns) if columns else cls().columns,
+            columns=columns,
             side=Side(options.side) if options.side else None,
             keep=options.keep,
             is_overground=getattr(options, "overground", False),
@@ -134,8 +138,14 @@ def add_signal_arguments(parser: ArgumentParser) -> None:
         "--columns",
         nargs="+",
         metavar="CHANNEL=COLUMN",
-        help="time=… and {left,right}.{" + ",".join(CHANNELS) + "}=…; COLUMN*FACTOR changes unit "
-        "or sign (default: time_s, left_force_n, left_moment_nm, left_angle_rad, right_…)",
+        help="time=… and {left,right}.{" + ",".join(ALL_CHANNELS) + "}=…; COLUMN*FACTOR changes "
+        "unit or sign (default: time_s, left_force_n, left_moment_nm, left_angle_rad, right_…)",
+    )
+    signals.add_argument(
+        "--filtered",
+        type=float,
+        metavar="HZ",
+        help="moment and angle come through a causal low-pass of this cut-off: take its delay out",
     )
     signals.add_argument(
         "--overground", action="store_true", help="over plates in a floor, a step or two at a time"

@@ -31,9 +31,10 @@ def measure_file(
     and GaitInputError for signals that nothing can be measured from.
     """
     try:
-        t_s, legs, frames, says_overground = read_signals(path, pairs=columns)
+        t_s, legs, frames, says_so = read_signals(path, pairs=columns)
     except OSError as problem:
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
+    is_overground = is_overground or says_so
     rate_hz = estimate_rate(t_s) if rate_hz is None else rate_hz
     mass_kg = read_mass(path) if mass_kg is None else mass_kg
     found = measure_strides(
@@ -42,7 +43,7 @@ def measure_file(
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         look_ahead_s=look_ahead_s,
-        is_overground=is_overground or says_overground,
+        is_overground=is_overground,
         frame=frames,
     )
     check = check_signals(
@@ -52,6 +53,7 @@ def measure_file(
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         strides=found,
+        is_overground=is_overground,
     )
     strides: list[Measurement] = []
     for stride in found:

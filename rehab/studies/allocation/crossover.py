@@ -34,16 +34,20 @@ def crossover_groups(arms: Sequence[str]) -> tuple[Group, ...]:
 
 @dataclass(frozen=True, slots=True)
 class PlannedVisit:
-    """A visit that a study plans: its number from 1, its period from 0, the day."""
+    """A visit that a study plans: its number from 1, its period from 0, the day.
+
+    ``follow_up``: whether it only measures what is left, without feedback.
+    """
 
     number: int
     period: int
     day: date
+    follow_up: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class VisitPlan:
-    """When participants come: in each period so many visits, so many days apart.
+    """When participants come.
 
     Attributes
     ----------
@@ -54,6 +58,8 @@ class VisitPlan:
     washout_days
         From the last visit of a period to the first of the next, so that the one arm's effect has
         passed when the next begins.
+    follow_up_days
+        From the last visit to a follow-up; None where there is none.
 
     Raises
     ------
@@ -64,6 +70,7 @@ class VisitPlan:
     visits: int = 1
     days_between: int = 1
     washout_days: int = 7
+    follow_up_days: int | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.visits <= MAX_VISITS:
@@ -72,9 +79,21 @@ class VisitPlan:
             raise InvalidSetting(
                 "Between two visits lie 1 to {most} days; so does the washout.", most=MAX_GAP_DAYS
             )
+        if self.follow_up_days is not None and not 1 <= self.follow_up_days <= MAX_GAP_DAYS:
+            raise InvalidSetting(
+                "The follow-up comes 1 to {most} days after the last visit.", most=MAX_GAP_DAYS
+            )
 
     def plan(self, periods: int, first_day: date) -> tuple[PlannedVisit, ...]:
-        """Return the visits of a participant, from the first day on."""
+        """Return the visits of a participant.
+
+        Parameters
+        ----------
+        periods
+            How many: one for each arm of the participant's group.
+        first_day
+            The day of the first visit.
+        """
         planned: list[PlannedVisit] = []
         day = first_day
         for period in range(periods):
@@ -83,4 +102,7 @@ class VisitPlan:
                     gap = self.days_between if visit else self.washout_days
                     day += timedelta(days=gap)
                 planned.append(PlannedVisit(len(planned) + 1, period, day))
+        if self.follow_up_days is not None:
+            day += timedelta(days=self.follow_up_days)
+            planned.append(PlannedVisit(len(planned) + 1, periods - 1, day, follow_up=True))
         return tuple(planned)

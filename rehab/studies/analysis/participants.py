@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
-from rehab.studies.analysis.comparison import Difference, Interval, compare, mean_of
+from rehab.studies.analysis.comparison import (
+    MIN_PARTICIPANTS,
+    Difference,
+    Interval,
+    Observation,
+    compare,
+)
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
-from rehab.studies.analysis.outcomes import channel_changes, compute_outcomes, describe_phases
+from rehab.studies.analysis.outcomes import compute_outcomes
+from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
+from rehab.studies.analysis.walk_figures import History
 from rehab.studies.analysis.walks import Walk
 
 CHANNEL = "channel:"  # begins the slug of a further channel's change: never registered
+
+
+class Attendance(StrEnum):
+    """What became of a planned visit."""
+
+    FINISHED = "finished"
+    UNFINISHED = "unfinished"  # ended early: it counts as far as it was walked
+    EXCLUDED = "excluded"  # by a correction, with its reason
+    MISSED = "missed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,21 +39,27 @@ class ParticipantVisit:
 
     Attributes
     ----------
-    number, arm
-        Of the visit, from 1; the arm's code.
+    number, arm, period
+        Of the visit, from 1; the arm's code; of a crossover, from 0.
     is_due
         Whether its day is past, or it was walked.
+    attendance
+        What became of it.
     outcomes
         By slug; empty where it was not walked or does not count.
-    phases
-        Figures of each phase, as `describe_phases` returns them.
+    phases, planned
+        Figures of each phase that was walked, as `describe_phases` returns them; how many phases
+        the session had.
     """
 
     number: int
     arm: str
     is_due: bool = True
+    period: int = 0
+    attendance: Attendance = Attendance.MISSED
     outcomes: dict[str, float] = field(default_factory=dict)
     phases: tuple[dict[str, Any], ...] = ()
+    planned: int = 0
 
     @property
     def is_walked(self) -> bool:
@@ -44,13 +69,27 @@ class ParticipantVisit:
 
 @dataclass(frozen=True, slots=True)
 class Participant:
-    """One participant: code, visits in their order, whether they count, a curve for each arm."""
+    """One participant.
+
+    Attributes
+    ----------
+    code, visits
+        By which results name the participant; the planned visits in their order.
+    has_left, is_analyzed
+        Whether the participant withdrew; whether the sessions count in the results.
+    curves
+        A curve for each arm.
+    baseline, measure
+        Mean of the first session's baseline, None of too few valid strides; what it is a mean of.
+    """
 
     code: str
     visits: tuple[ParticipantVisit, ...]
     has_left: bool = False
     is_analyzed: bool = True
     curves: dict[str, Curve] = field(default_factory=dict)
+    baseline: float | None = None
+    measure: str = ""
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -59,20 +98,26 @@ class Participant:
 
     def outcome(self, slug: str, arm: str) -> float | None:
         """Return the mean of an outcome over the visits in an arm; None where no one has it."""
-        found = [
-            visit.outcomes[slug]
-            for visit in self.visits
-            if visit.arm == arm and slug in visit.outcomes
-        ]
-        return sum(found) / len(found) if found and self.is_analyzed else None
+        found = [one.value for one in self.observe(slug) if one.arm == arm]
+        return sum(found) / len(found) if found else None
+
+    def observe(self, slug: str) -> Iterator[Observation]:
+        """Yield an outcome of each visit that counts and has it."""
+        for visit in self.visits if self.is_analyzed else ():
+            if slug in visit.outcomes:
+                value = visit.outcomes[slug]
+                place = visit.arm, visit.number
+                yield Observation(self.code, *place, value, self.baseline, visit.period)
 
 
 @dataclass(frozen=True, slots=True)
 class AnalyzedSession:
-    """A session that counts: its strides, and the metrics that it stores of itself."""
+    """A session that counts: its strides, its metrics, what was measured, how it ended."""
 
     walk: Walk
     metrics: dict[str, float]
+    measure: str = ""
+    is_finished: bool = True
 
 
 def make_participant(
@@ -95,20 +140,32 @@ def make_participant(
     """
     visits: list[ParticipantVisit] = []
     walks: dict[str, list[Walk | None]] = {}
+    first: AnalyzedSession | None = None
     before: Walk | None = None
     for visit, walked in planned:
         walks.setdefault(visit.arm, []).append(None if walked is None else walked.walk)
         if walked is None:
             visits.append(visit)
             continue
+        first = first or walked
         channels = channel_changes(walked.walk)
-        outcomes = compute_outcomes(walked.walk, before, walked.metrics)
+        history = History(before, first.walk.baseline)
+        outcomes = compute_outcomes(walked.walk, history, walked.metrics)
         outcomes |= {f"{CHANNEL}{name}": value for name, value in channels.items()}
-        phases = tuple(describe_phases(walked.walk))
-        visits.append(ParticipantVisit(visit.number, visit.arm, True, outcomes, phases))
+        visits.append(
+            replace(
+                visit,
+                is_due=True,
+                attendance=Attendance.FINISHED if walked.is_finished else Attendance.UNFINISHED,
+                outcomes=outcomes,
+                phases=tuple(describe_phases(walked.walk)),
+                planned=len(walked.walk.phases),
+            )
+        )
         before = walked.walk
     curves = {arm: curve_of(of_arm) for arm, of_arm in walks.items()}
-    return Participant(code, tuple(visits), has_left, is_analyzed, curves)
+    baseline, measure = (first.walk.baseline, first.measure) if first else (None, "")
+    return Participant(code, tuple(visits), has_left, is_analyzed, curves, baseline, measure)
 
 
 def by_arm(
@@ -125,7 +182,7 @@ def by_arm(
 
 @dataclass(frozen=True, slots=True)
 class ArmFigure:
-    """An outcome in one arm: how many have it and how many lack it, and its mean."""
+    """An outcome in one arm: how many have it and how many lack it, and the model's mean."""
 
     arm: str
     participants: int
@@ -141,6 +198,15 @@ class OutcomeResult:
     arms: tuple[ArmFigure, ...]
     differences: tuple[Difference, ...]
 
+    def without_few(self) -> OutcomeResult:
+        """Return the same without figures of fewer people than an interval needs."""
+        arms = tuple(
+            one if one.participants >= MIN_PARTICIPANTS else replace(one, mean=None)
+            for one in self.arms
+        )
+        kept = (one for one in self.differences if min(one.participants) >= MIN_PARTICIPANTS)
+        return OutcomeResult(self.slug, arms, tuple(kept))
+
 
 def find(
     participants: Sequence[Participant], arms: Sequence[str], slug: str, *, crossover: bool
@@ -154,16 +220,24 @@ def find(
     slug
         Of the outcome, or `CHANNEL` and a channel's name.
     crossover
-        Whether everybody walks every arm, so that differences are paired.
+        Whether everybody walks every arm, so that differences are within people.
     """
-    groups = by_arm(participants, arms, slug)
+    observed = observations(participants, slug)
+    compared = compare(observed, arms, crossover=crossover)
     figures = []
     for arm in arms:
         meant = sum(one.is_analyzed and arm in one.arms for one in participants)
-        values = list(groups[arm].values())
-        mean = mean_of(values) if values else None
-        figures.append(ArmFigure(arm, len(values), meant - len(values), mean))
-    return OutcomeResult(slug, tuple(figures), tuple(compare(groups, paired=crossover)))
+        have_it = len({one.participant for one in observed if one.arm == arm})
+        figures.append(ArmFigure(arm, have_it, meant - have_it, compared.means.get(arm)))
+    return OutcomeResult(slug, tuple(figures), compared.differences)
+
+
+def observations(participants: Sequence[Participant], slug: str) -> list[Observation]:
+    """Return an outcome of all visits; without baselines where arms measure different things."""
+    found = [one for participant in participants for one in participant.observe(slug)]
+    if len({one.measure for one in participants if one.baseline is not None}) > 1:
+        return [replace(one, baseline=None) for one in found]
+    return found
 
 
 def curves_by_arm(
@@ -191,6 +265,8 @@ class ArmFlow:
     analyzed: int
     visits_planned: int
     visits_walked: int
+    visits_unfinished: int
+    visits_excluded: int
 
 
 def flow(
@@ -206,14 +282,19 @@ def flow(
 def _flow_of(participants: Sequence[Participant], arm: str, primary: str) -> ArmFlow:
     mine = [one for one in participants if arm in one.arms]
     visits = [[visit for visit in one.visits if visit.arm == arm] for one in mine]
+    became = Counter(visit.attendance for of_one in visits for visit in of_one)
     return ArmFlow(
         arm,
         allocated=len(mine),
         began=sum(any(visit.is_walked for visit in of_one) for of_one in visits),
-        completed=sum(all(visit.is_walked for visit in of_one) for of_one in visits),
+        completed=sum(
+            all(visit.attendance is Attendance.FINISHED for visit in of_one) for of_one in visits
+        ),
         left=sum(one.has_left for one in mine),
         removed=sum(not one.is_analyzed for one in mine),
         analyzed=sum(one.outcome(primary, arm) is not None for one in mine),
         visits_planned=sum(visit.is_due for of_one in visits for visit in of_one),
         visits_walked=sum(visit.is_walked for of_one in visits for visit in of_one),
+        visits_unfinished=became[Attendance.UNFINISHED],
+        visits_excluded=became[Attendance.EXCLUDED],
     )

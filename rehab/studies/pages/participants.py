@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
@@ -20,6 +21,7 @@ from rehab.studies.forms import EnrollmentForm, PlaceForm
 from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participants import Enrollment
+from rehab.studies.screening import find_unmet, turn_away
 from rehab.studies.unblinding import reveal_arms
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
@@ -27,7 +29,7 @@ from rehab.training.measures import InvalidSetting
 
 
 def get_enrollment(user: User, enrollment_id: int) -> Enrollment:
-    """Return a participant whom a user may see. Raises Http404 for any other."""
+    """Return the enrollment of key ``enrollment_id``. Raises Http404 if ``user`` may not see it."""
     rows = Enrollment.objects.visible_to(user).select_related("study__clinic", "patient__clinic")
     return get_object_or_404(rows, pk=enrollment_id)
 
@@ -35,15 +37,21 @@ def get_enrollment(user: User, enrollment_id: int) -> Enrollment:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
-    """Take a patient into a running study."""
-    user = user_of(request)
+    """Assess a patient for a running study: enroll them, or note why not."""
+    user, now = user_of(request), timezone.now()
     study = get_study(user, study_id)
     form = EnrollmentForm(request.POST or None, study=study, by=user)
     if request.method == "POST" and form.is_valid():
         patient, keep_data = form.cleaned_data["patient"], form.cleaned_data["keep_data"]
+        declined = not form.cleaned_data["takes_part"]
         try:
+            unmet = find_unmet(study, patient, form.met, now)
+            if unmet or declined:
+                turn_away(study, patient, unmet, declined=declined, by=user, now=now)
+                messages.success(request, _("Noted in the screening log: not enrolled."))
+                return redirect("study", study_id=study.pk)
             enrollment = enroll(
-                study, patient, form.levels, keep_data=keep_data, by=user, now=timezone.now()
+                study, patient, form.levels, keep_data=keep_data, by=user, now=now, met=form.met
             )
         except InvalidSetting as problem:
             form.add_error(None, refuse(request, problem))
@@ -55,7 +63,7 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_participant(request: HttpRequest, enrollment_id: int) -> HttpResponse:
-    """Show a participant's visits, and what can be done. Only revealing it shows the arm."""
+    """Show a participant's visits, and what can be done. The arm stays hidden until revealed."""
     enrollment = get_enrollment(user_of(request), enrollment_id)
     return render_participant(request, enrollment)
 
@@ -63,7 +71,18 @@ def show_participant(request: HttpRequest, enrollment_id: int) -> HttpResponse:
 def render_participant(
     request: HttpRequest, enrollment: Enrollment, status: int = 200, **more: Any
 ) -> HttpResponse:
-    """Return the page, with a form as it was sent or the arms that were revealed."""
+    """Return a participant's page.
+
+    Parameters
+    ----------
+    enrollment
+        The participant.
+    status
+        The response's HTTP status.
+    more
+        What else the template shows: a form as it was sent, why something was refused, the arms
+        that were revealed.
+    """
     user = user_of(request)
     first_station(enrollment.patient.clinic)
     blind = is_assessor(enrollment.study, user)

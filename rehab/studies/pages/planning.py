@@ -1,10 +1,8 @@
-"""Pages that list, plan, register and close studies, and say who is what in them."""
+"""Pages that list, plan, register and close studies, and give accounts marks in them."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -28,36 +26,37 @@ from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
-from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState, has_mark
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.registration.lifecycle import close, register, revise, start
+from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
+from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import write_pdf
-from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.results import may_look
 from rehab.studies.unblinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 
-# What moves a study on, by the name of its button.
+# What each button of a study's state does, by its name.
 StudyAction = Callable[[Study, User, datetime], Any]
 STEPS: dict[str, StudyAction] = {"register": register, "start": start, "close": close}
 
 
 def get_study(user: User, study_id: int) -> Study:
-    """Return a study that a user may see. Raises Http404 for any other."""
+    """Return the study of key ``study_id``. Raises Http404 if ``user`` may not see it."""
     return get_object_or_404(Study.objects.visible_to(user).select_related("clinic"), pk=study_id)
 
 
 def is_assessor(study: Study, user: User) -> bool:
-    """Return whether the arms are hidden from a user now."""
+    """Return whether the arms of a study are hidden from ``user`` now."""
     return study.state != StudyState.CLOSED and has_mark(study, user, Task.ASSESSOR)
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 @require_safe
 def list_studies(request: HttpRequest) -> HttpResponse:
-    """List the clinic's studies; drafts are a lead's."""
+    """List the clinic's studies; only leads see drafts."""
     user = user_of(request)
     studies = Study.objects.visible_to(user).annotate(count=Count("enrollments"))
     if user.role != Role.LEAD:
@@ -110,7 +109,7 @@ def show_study(request: HttpRequest, study_id: int) -> HttpResponse:
 
 
 def study_context(study: Study, user: User) -> dict[str, Any]:
-    """Return what a user sees of a study."""
+    """Return what the page of a study shows ``user``; from an assessor, the arms are hidden."""
     blind, is_lead = is_assessor(study, user), user.role == Role.LEAD
     by_name, events = may_see_names(user.role), StudyEvent.objects.visible_to(user)
     return {
@@ -123,6 +122,8 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),
+        "primary": dict(OUTCOMES)[first_primary(study)],
+        "changes": outcome_changes(study),
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
@@ -188,7 +189,15 @@ def change_marks(request: HttpRequest, study_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 @require_GET
 def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpResponse:
-    """Return the registered study with all its versions, as JSON or as a document on paper."""
+    """Return the registered study with all its versions, as a file.
+
+    Parameters
+    ----------
+    study_id
+        Key of the study.
+    kind
+        ``json``, or ``pdf`` for a document to print.
+    """
     user = user_of(request)
     study = get_study(user, study_id)
     if is_assessor(study, user) or study.is_draft:
@@ -199,29 +208,8 @@ def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpRes
     return response
 
 
-def write_json(study: Study) -> str:
-    """Return a registered study with all its versions; of a closed one also the seed."""
-    protocol: dict[str, Any] = {
-        "registered_at": study.registered_at,
-        "closed_at": study.closed_at,
-        "versions": [
-            {
-                "number": version.number,
-                "at": version.at,
-                "reason": version.reason,
-                "sha256": version.digest,
-                "study": version.document,
-            }
-            for version in study.versions.all()
-        ],
-    }
-    if study.state == StudyState.CLOSED and study.sealed:
-        protocol["allocation_secret"] = asdict(unseal(study.sealed))
-    return json.dumps(protocol, indent=2, ensure_ascii=False, default=datetime.isoformat) + "\n"
-
-
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:
-    """Do something, or say why it cannot be done."""
+    """Do something, or show why it cannot be done."""
     try:
         act()
     except InvalidSetting as problem:

@@ -1,4 +1,4 @@
-"""A study's results: figures and tables, for who may look."""
+"""A study's results: figures and tables, for those who may see them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import format_number
 from rehab.studies.analysis.comparison import Interval
-from rehab.studies.models import Study, StudyState
+from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
 from rehab.studies.results.drawing import (
     FIGURES,
     TABLES,
+    is_shown,
     name_pair,
     outcome_label,
     outcome_unit,
@@ -50,11 +51,18 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
     results = read_results(study, now)
     context = {
         "study": study,
-        "interim": study.state != StudyState.CLOSED,
-        "figures": {name: _inline(draw(results)) for name, draw in FIGURES.items()},
+        "interim": results.is_interim,
+        "changes": results.changes,
+        "arms": results.arms.values(),
+        "conduct": results.conduct,
+        "figures": {
+            name: _inline(draw(results))
+            for name, draw in FIGURES.items()
+            if is_shown(results, name)
+        },
         "registered": [_describe(results, slug) for slug in results.registered],
         "exploratory": [_describe(results, slug) for slug in results.exploratory],
-        "tables": list(TABLES),
+        "tables": [name for name in TABLES if is_shown(results, name)],
     }
     return render(request, "studies/results.html", context)
 
@@ -66,10 +74,11 @@ def _inline(svg: str) -> str:
 def _describe(results: Results, slug: str) -> dict[str, Any]:
     """Return an outcome as the page's table has it."""
     found, unit = results.find(slug), outcome_unit(slug)
+    registered = results.registered.get(slug)
     return {
         "label": outcome_label(slug),
         "unit": unit,
-        "primary": slug == results.study.primary_outcome,
+        "status": registered.status_text if registered else "",
         "arms": [
             {
                 "label": results.arms[one.arm],
@@ -111,9 +120,11 @@ def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
     if name not in known.get(kind, []):
         raise Http404
     now = timezone.now()
+    results = read_results(study, now)
+    if not is_shown(results, name):
+        raise PermissionDenied
     note_look(study, user, now)
     audit_log.record(Act.EXPORT, user, about=f"{study.code} {name}.{kind}", now=now)
-    results = read_results(study, now)
     if kind == "svg":
         response = HttpResponse(FIGURES[name](results), content_type="image/svg+xml")
     else:

@@ -1,7 +1,7 @@
 """The document of a study that is registered: all that decides what participants walk.
 
-What was added to GARRY later stands in it only where a study uses it, so that studies that were
-registered before keep their digest.
+What was added to GARRY later is in it only where a study uses it, so that the digest of studies
+registered before does not change.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def describe(study: Study) -> dict[str, Any]:
     """Return the study as it is registered. Raises InvalidSetting for one that could not be run."""
     scheme = study.scheme()
     plan = study.visit_plan
-    document = {
+    document: dict[str, Any] = {
         "code": study.code,
         "title": study.title,
         "clinic": study.clinic.name,
@@ -50,6 +50,12 @@ def describe(study: Study) -> dict[str, Any]:
         "secondary_outcomes": study.secondary_outcomes,
         "scoring_rules_version": RULES_VERSION,
     }
+    if plan.follow_up_days is not None:
+        document["visits"]["days_to_follow_up"] = plan.follow_up_days
+        for arm in study.arms.all():
+            arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}
+    document |= {name: asked for name, asked in criteria.items() if asked}
     stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
     return stored
 

@@ -14,8 +14,10 @@ from reportlab.lib.units import mm
 from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, Table, TableStyle
 
 from rehab.sessions.formatting import format_schedule
+from rehab.studies.allocation.draws import RULE
 from rehab.studies.allocation.scheme import Method
 from rehab.studies.models import METHODS, OUTCOMES, Study, StudyVersion
+from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.training.schedules import Schedule, ScheduleKind
 
 MARGIN = 20 * mm
@@ -43,8 +45,13 @@ def write_pdf(study: Study) -> bytes:
         pageCompression=0,
     )
     parts: list[Flowable] = []
+    if changes := outcome_changes(study):
+        parts.append(_text(gettext("Outcomes were changed after the registration"), "Heading1"))
+        parts += [_text(change) for change in changes]
     for version in study.versions.order_by("-number"):
         parts += _version_parts(version)
+    parts.append(_text(gettext("How to allocate again from the seed"), "Heading2"))
+    parts += [_text(line) for line in RULE.splitlines()]
     document.build(parts)
     return target.getvalue()
 
@@ -54,7 +61,7 @@ def _text(words: object, style: str = "BodyText") -> Paragraph:
 
 
 def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
-    """Yield what stands on paper of one version."""
+    """Yield the parts of the document for one version."""
     document = version.document
     yield _text(f"{document['code']}: {document['title']}", "Title")
     made = gettext("Version %(number)d of %(moment)s UTC, %(clinic)s")
@@ -158,6 +165,8 @@ def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("What"), gettext("Planned")),
         (gettext("Participants"), document["participants"]),
         (gettext("Months since the stroke, at least"), months),
+        (gettext("Criteria of inclusion"), "\n".join(document.get("inclusion", ()))),
+        (gettext("Criteria of exclusion"), "\n".join(document.get("exclusion", ()))),
         (gettext("Design"), document["design"]),
         (gettext("Allocation"), METHODS[Method(allocation["method"])]),
         (gettext("Groups"), ", ".join("-".join(row["arms"]) for row in allocation["groups"])),
@@ -165,6 +174,7 @@ def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Visits in each period"), visits["in_each_period"]),
         (gettext("Days between visits"), visits["days_between"]),
         (gettext("Days between periods"), visits["days_between_periods"]),
+        (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
         (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
         (gettext("Secondary outcomes (others are exploratory)"), secondary),

@@ -17,11 +17,15 @@ from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
 from rehab.studies.results.results import (
     Results,
+    change_rows,
+    conduct_rows,
     curve_rows,
     difference_rows,
     flow_rows,
+    occurrence_rows,
     outcome_rows,
     phase_rows,
+    screening_rows,
 )
 
 LONG = 18  # letters of a name of which two fit on a line
@@ -64,7 +68,7 @@ def _phases(results: Results) -> list[PhaseLabel]:
 
 def draw_primary(results: Results) -> str:
     """Return every participant's primary outcome, by arm."""
-    slug = results.study.primary_outcome
+    slug = results.primary
     label, unit = outcome_label(slug), outcome_unit(slug)
     values = by_arm(results.participants, list(results.arms), slug)
     axis = f"{label} ({unit})" if unit else label
@@ -85,12 +89,12 @@ def draw_exploratory(results: Results) -> str:
 def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
     rows = []
     for slug in slugs:
-        primary = slug == results.study.primary_outcome
-        label = outcome_label(slug)
-        heading = gettext("%(outcome)s (primary)") % {"outcome": label} if primary else label
-        rows.append(ForestRow(heading))
+        label, registered = outcome_label(slug), results.registered.get(slug)
+        status = registered.status_text if registered else ""
+        rows.append(ForestRow(f"{label} ({status})" if status else label))
+        is_first = slug == results.primary
         rows += [
-            ForestRow(name_pair(results, one.group, one.reference), one, strong=primary)
+            ForestRow(name_pair(results, one.group, one.reference), one, strong=is_first)
             for one in results.find(slug).differences
         ]
     return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its interval (95 %)"))
@@ -109,6 +113,16 @@ def draw_consort(results: Results) -> str:
     columns = []
     for one in results.flow:
         left = [gettext("%(count)d left the study") % {"count": one.left}] if one.left else []
+        if one.visits_unfinished:
+            early = one.visits_unfinished
+            words = ngettext(
+                "%(count)d session ended early", "%(count)d sessions ended early", early
+            )
+            left.append(words % {"count": early})
+        if one.visits_excluded:
+            excluded = one.visits_excluded
+            words = ngettext("%(count)d session excluded", "%(count)d sessions excluded", excluded)
+            left.append(words % {"count": excluded})
         if one.removed:
             left.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
         visits = {"walked": one.visits_walked, "planned": one.visits_planned}
@@ -126,9 +140,17 @@ def draw_consort(results: Results) -> str:
                 Box(_n(gettext("analyzed"), one.analyzed)),
             ]
         )
-    total = len(results.participants)
-    taken = ngettext("%(count)d participant allocated", "%(count)d participants allocated", total)
-    return draw_flow(Box(taken % {"count": total}), columns, gettext("Flow of participants"))
+    assessed = results.assessed
+    away = [
+        _n(gettext("not eligible"), assessed.not_eligible),
+        _n(gettext("declined"), assessed.declined),
+    ]
+    lines = (
+        *(away if assessed.turned_away else ()),
+        _n(gettext("allocated"), len(results.participants)),
+    )
+    first = Box(_n(gettext("assessed for eligibility"), assessed.people), lines)
+    return draw_flow(first, columns, gettext("Flow of participants"))
 
 
 def _n(words: str, count: int) -> str:
@@ -148,7 +170,20 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "differences": difference_rows,
     "curves": curve_rows,
     "flow": flow_rows,
+    "screening": screening_rows,
+    "changes": change_rows,
+    "conduct": conduct_rows,
+    "occurrences": occurrence_rows,
 }
+
+
+# What is shown before the end: the rest shows single people, or what tells an arm.
+INTERIM = frozenset({"registered", "differences", "flow", "screening", "changes", "conduct"})
+
+
+def is_shown(results: Results, name: str) -> bool:
+    """Return whether a figure or table is shown now."""
+    return not results.is_interim or name in INTERIM
 
 
 def write_table(rows: Iterable[dict[str, Any]]) -> str:

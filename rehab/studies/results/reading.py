@@ -18,9 +18,11 @@ from django.db.models import Count, Sum
 
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.replay import fold_log
 from rehab.studies.analysis.curves import Point
 from rehab.studies.analysis.participants import (
     AnalyzedSession,
+    Attendance,
     OutcomeResult,
     Participant,
     ParticipantVisit,
@@ -31,8 +33,10 @@ from rehab.studies.analysis.participants import (
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyVisit
-from rehab.training.changes import State
+from rehab.training.changes import ENDED_STATES, State
+from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
+from rehab.training.summary.metrics import compute_metrics
 
 CACHED_STUDIES = 8
 UNREAD = ("session__plan", "session__checkpoint", "session__legacy_row")  # large, and seldom needed
@@ -152,7 +156,13 @@ def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Part
     group = enrollment.allocation.group.split("-")
     planned = [
         (
-            ParticipantVisit(visit.number, group[visit.period], _is_due(visit, until)),
+            ParticipantVisit(
+                visit.number,
+                group[visit.period],
+                _is_due(visit, until),
+                visit.period,
+                Attendance.EXCLUDED if _is_excluded(enrollment, visit) else Attendance.MISSED,
+            ),
             _walked(enrollment, visit),
         )
         for visit in visits
@@ -171,24 +181,35 @@ def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
     return list({visit.number: visit for visit in visits.order_by("number", "attempt")}.values())
 
 
-def _walked(enrollment: Enrollment, visit: StudyVisit) -> AnalyzedSession | None:
-    """Return what a visit gave; None of one that does not count, or was corrected away."""
+def _is_excluded(enrollment: Enrollment, visit: StudyVisit) -> bool:
+    """Return whether a correction took a visit's session away from the participant."""
     session = visit.session
-    if session is None or session.state != State.FINISHED or session.excluded:
+    return session is not None and (session.excluded or session.patient_id != enrollment.patient_id)
+
+
+def _walked(enrollment: Enrollment, visit: StudyVisit) -> AnalyzedSession | None:
+    """Return what a visit gave, also one that ended early; None of one that does not count."""
+    session = visit.session
+    if session is None or session.state not in ENDED_STATES or not enrollment.is_analyzed:
         return None
-    if session.patient_id != enrollment.patient_id or not enrollment.is_analyzed:
-        return None
-    return read_walked(session)
+    return None if _is_excluded(enrollment, visit) else read_walked(session)
 
 
 def read_walked(session: TrainingSession) -> AnalyzedSession:
-    """Return a finished session's strides and metrics."""
+    """Return the strides and metrics of a session that has ended.
+
+    One that ended early stores no metrics: they are computed from its log, as far as it was walked.
+    """
     plan = SessionPlan.from_json(session.plan)
-    metrics = dict(session.metrics.values_list("slug", "value"))
+    is_finished = session.state == State.FINISHED
+    if is_finished:
+        metrics = dict(session.metrics.values_list("slug", "value"))
+    else:
+        metrics = compute_metrics(fold_log(SessionFold(plan), session))
     rows = Step.everywhere.filter(session=session, side=session.trained_side).order_by("number")
     walk = read_walk(
         plan.phases,
         rows.values_list(*COLUMNS).iterator(),
         higher_is_better=plan.measure.higher_is_better,
     )
-    return AnalyzedSession(walk, metrics)
+    return AnalyzedSession(walk, metrics, plan.measure.slug, is_finished)

@@ -27,8 +27,19 @@ from rehab.studies.analysis.participants import (
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.lifecycle import note
+from rehab.studies.registration.outcome_changes import (
+    OutcomeChange,
+    RegisteredOutcome,
+    outcome_changes,
+    registered_outcomes,
+)
 from rehab.studies.registration.sealing import unseal
+from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences, unwalked
 from rehab.studies.results.reading import Analysis, analyze
+from rehab.studies.screening import Assessed, count_assessed
+
+# Of these the feedback type decides: who sees them of a group knows its arm.
+TELL_THE_TYPE = frozenset({"score", "points_per_100_steps"})
 
 
 def may_look(study: Study, user: User) -> bool:
@@ -56,17 +67,28 @@ def note_look(study: Study, user: User, now: datetime) -> None:
 class Results:
     """What a study found, as far as it was walked.
 
+    Before the study is closed, aggregates alone, and none that tells which group is which arm: no
+    outcome that the feedback type decides, no exploratory one, nothing of fewer than three people.
+
     Attributes
     ----------
     study, analysis
         The study, and what was computed of everybody who was ever taken in.
     arms
         The arms' codes with the labels that are shown, in the order in which they are shown.
+    outcomes, changes
+        The registered outcomes, the first primary one first; every change of them.
+    occurrences, assessed
+        Harms and deviations; the numbers of the screening log.
     """
 
     study: Study
     analysis: Analysis
     arms: dict[str, str]
+    outcomes: tuple[RegisteredOutcome, ...]
+    changes: tuple[OutcomeChange, ...]
+    occurrences: tuple[Occurrence, ...]
+    assessed: Assessed
 
     @property
     def participants(self) -> tuple[Participant, ...]:
@@ -74,21 +96,35 @@ class Results:
         return self.analysis.participants
 
     @property
-    def registered(self) -> tuple[str, ...]:
-        """Slugs of the registered outcomes, the primary one first."""
-        others = (slug for slug in self.study.secondary_outcomes if slug in OUTCOMES)
-        return tuple(dict.fromkeys((self.study.primary_outcome, *others)))
+    def is_interim(self) -> bool:
+        """Whether the study is not closed."""
+        return self.study.state != StudyState.CLOSED
+
+    @property
+    def primary(self) -> str:
+        """Slug of the primary outcome that was registered first."""
+        return self.outcomes[0].slug
+
+    @cached_property
+    def registered(self) -> dict[str, RegisteredOutcome]:
+        """The registered outcomes by their slugs, the primary one first."""
+        hidden = TELL_THE_TYPE if self.is_interim else frozenset()
+        known = (one for one in self.outcomes if one.slug in OUTCOMES)
+        return {one.slug: one for one in known if one.slug not in hidden}
 
     @cached_property
     def exploratory(self) -> tuple[str, ...]:
         """Slugs of all other outcomes that anybody has."""
+        if self.is_interim:
+            return ()
         found = {slug for one in self.participants for v in one.visits for slug in v.outcomes}
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
         return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
 
     def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
-        return self.analysis.find(slug)
+        found = self.analysis.find(slug)
+        return found.without_few() if self.is_interim else found
 
     @property
     def curves(self) -> dict[str, list[Point]]:
@@ -96,9 +132,15 @@ class Results:
         return self.analysis.curves
 
     @cached_property
+    def conduct(self) -> tuple[ConductRow, ...]:
+        """How often each harm and deviation happened, by arm; before the end harms alone."""
+        rows = count(self.occurrences, self.arms)
+        return tuple(row for row in rows if row.kind == "harm" or not self.is_interim)
+
+    @cached_property
     def flow(self) -> tuple[ArmFlow, ...]:
         """How many were allocated to each arm, and what became of them."""
-        return flow(self.participants, list(self.arms), self.study.primary_outcome)
+        return flow(self.participants, list(self.arms), self.primary)
 
 
 def label_arms(study: Study) -> dict[str, str]:
@@ -123,7 +165,16 @@ def read_results(study: Study, now: datetime) -> Results:
     is_closed = study.state == StudyState.CLOSED  # then whatever was planned was due
     until = date.max if is_closed else clinic_time(now, study.clinic).date()
     arms = label_arms(study)
-    return Results(study, analyze(study, tuple(arms), until), arms)
+    analysis = analyze(study, tuple(arms), until)
+    return Results(
+        study,
+        analysis,
+        arms,
+        registered_outcomes(study),
+        outcome_changes(study),
+        (*read_occurrences(study), *unwalked(analysis.participants)),
+        count_assessed(study),
+    )
 
 
 def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
@@ -131,21 +182,26 @@ def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]
     for one in results.participants:
         for visit in one.visits if one.is_analyzed else ():
             group = results.arms[visit.arm]
-            yield visit, {"participant": one.code, "group": group, "visit": visit.number}
+            place = {"participant": one.code, "group": group, "visit": visit.number}
+            yield visit, place | {"attendance": visit.attendance.value}
 
 
 def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
     """Yield one row for each participant, visit and outcome: missing ones are empty."""
     for visit, whose in _visits(results):
         for slug in (*results.registered, *results.exploratory):
-            status, value = _status(results, slug), visit.outcomes.get(slug)
-            yield whose | {"outcome": slug, "status": status, "value": value}
+            about = {"outcome": slug, **_status(results, slug)}
+            yield whose | about | {"value": visit.outcomes.get(slug)}
 
 
-def _status(results: Results, slug: str) -> str:
-    if slug == results.study.primary_outcome:
-        return "primary"
-    return "secondary" if slug in results.registered else "exploratory"
+def _status(results: Results, slug: str) -> dict[str, Any]:
+    """Return the columns that say as what an outcome was registered, and in which versions."""
+    one = results.registered.get(slug)
+    return {
+        "status": "exploratory" if one is None else one.status,
+        "since_version": one and one.since,
+        "dropped_in_version": one and one.dropped_in,
+    }
 
 
 def phase_rows(results: Results) -> Iterator[dict[str, Any]]:
@@ -160,7 +216,7 @@ def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
         for found in results.find(slug).differences:
             yield {
                 "outcome": slug,
-                "status": _status(results, slug),
+                **_status(results, slug),
                 "group": results.arms[found.group],
                 "reference": results.arms[found.reference],
                 "participants": found.participants[0],
@@ -193,5 +249,41 @@ def curve_rows(results: Results) -> Iterator[dict[str, Any]]:
 
 def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
     """Return one row for each group of the flow of participants."""
-    rows = [asdict(one) for one in results.flow]
+    rows = [asdict(one) | {"primary_outcome": results.primary} for one in results.flow]
     return [{"group": results.arms[row.pop("arm")]} | row for row in rows]
+
+
+def screening_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each number of the screening log, and for each criterion not met."""
+    assessed = results.assessed
+    for name in ("people", "not_eligible", "declined"):
+        yield {"what": name, "criterion": "", "people": getattr(assessed, name)}
+    for criterion, people in assessed.reasons.most_common():
+        yield {"what": "criterion not met", "criterion": criterion, "people": people}
+
+
+def change_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each version that changed outcomes."""
+    for one in results.changes:
+        row = asdict(one)
+        yield row | {name: " ".join(row[name]) for name in ("added", "removed")}
+
+
+def conduct_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each group and kind of harm or deviation."""
+    for row in results.conduct:
+        for arm, (events, people) in row.counts.items():
+            about = {"group": results.arms[arm], "kind": row.kind, "what": row.what}
+            yield about | {"events": events, "participants": people}
+
+
+def occurrence_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each harm and deviation."""
+    for one in results.occurrences:
+        place = {"participant": one.participant, "group": results.arms[one.arm]}
+        yield place | {
+            "visit": one.visit,
+            "kind": one.kind,
+            "what": one.what,
+            "value": one.value,
+        }

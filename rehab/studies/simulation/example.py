@@ -13,7 +13,7 @@ from rehab.training.steps import Side
 from rehab.training.valences import find_valence
 
 OUTCOME = "improvement_over_baseline"
-SECONDARY = ("late_change", "washout_change", "hit_rate", "kept_between_visits")
+SECONDARY = ("late_change", "washout_change", "hit_rate", "between_visits")
 BLOCK_SIZES = (4, 8)
 # Arm, feedback type, and what the arm truly adds [% of the baseline]. Simulated, not measured.
 ARMS = (
@@ -34,7 +34,20 @@ PHASES: tuple[Phase, ...] = (
 def example_trial(
     participants: int = 60, visits: int = 1, population: Population | None = None
 ) -> Trial:
-    """Return the study. Raises InvalidSetting for numbers that cannot be."""
+    """Return the study, allocated to four arms of equal weight.
+
+    Parameters
+    ----------
+    participants, visits
+        How many people, and visits of each.
+    population
+        How people differ; None for the usual ``Population``.
+
+    Raises
+    ------
+    InvalidSetting
+        For numbers out of bounds.
+    """
     plans = {
         code: SessionPlan(
             measure=A2,

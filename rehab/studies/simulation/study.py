@@ -33,8 +33,21 @@ PROTOCOL = "Simulated study"
 def find_or_plan(clinic: Clinic, trial: Trial, seed: int, now: datetime) -> Study:
     """Return the simulated study of a seed, planned, registered and started where it is new.
 
-    Raises InvalidSetting for a seed out of bounds, and where the clinic has simulated another study
-    from it.
+    Parameters
+    ----------
+    clinic
+        Where it is stored.
+    trial
+        What is simulated.
+    seed
+        0 to ``SEED_MAX``; part of the study's code, which is unique in a clinic.
+    now
+        The time of its registration and start.
+
+    Raises
+    ------
+    InvalidSetting
+        For a seed out of bounds, and where the clinic has simulated another study from it.
     """
     if not 0 <= seed <= SEED_MAX:
         raise InvalidSetting("A seed is a whole number from 0 to {most}.", most=SEED_MAX)
@@ -99,14 +112,26 @@ def _find_protocol(clinic: Clinic) -> Protocol:
     return protocol
 
 
-def walk_study(study: Study, trial: Trial, seed: int, now: datetime) -> Iterator[int]:
+def walk_study(
+    study: Study, trial: Trial, seed: int, now: datetime, pace: Pace | None = None
+) -> Iterator[int]:
     """Enroll and walk the participants who are missing, and yield how many are done.
 
-    What was walked before stays: a study that was broken off goes on.
+    Sessions of an interrupted run are not repeated: it is continued.
+
+    Parameters
+    ----------
+    study, trial, seed
+        The study that ``find_or_plan`` returned for this trial and seed.
+    now
+        The time of enrollments and withdrawals.
+    pace
+        As fast as strides are stored unless given.
     """
     for number, (person, _group) in enumerate(trial.allocate(seed), start=1):
         if study.state == StudyState.RUNNING:
-            _walk_all(_find_or_enroll(study, number, now), trial, person, now)
+            enrollment = _find_or_enroll(study, number, now)
+            _walk_all(enrollment, trial, person, now, pace or Pace())
         yield number
 
 
@@ -123,7 +148,9 @@ def _find_or_enroll(study: Study, number: int, now: datetime) -> Enrollment:
     return enroll(study, patient, (), keep_data=True, by=None, now=now)
 
 
-def _walk_all(enrollment: Enrollment, trial: Trial, person: Person, now: datetime) -> None:
+def _walk_all(
+    enrollment: Enrollment, trial: Trial, person: Person, now: datetime, pace: Pace
+) -> None:
     while enrollment.withdrawn_at is None and (visit := next_visit(enrollment)) is not None:
         if 0 < person.leaves_before <= visit.number:
             withdraw(enrollment, None, now)
@@ -133,11 +160,11 @@ def _walk_all(enrollment: Enrollment, trial: Trial, person: Person, now: datetim
             return
         session = start_session(enrollment, PLACE, None, now)
         walker = person.at_visit(visit.number, trial.effects[arm.code], trial.population.kept)
-        asyncio.run(run_session(session.pk, partial(walk_through, walker), Pace()))
+        asyncio.run(run_session(session.pk, partial(walk_through, walker), pace))
 
 
 def finish_study(study: Study, now: datetime) -> Results:
-    """Close a study that was walked, and return its results."""
+    """Close a study whose participants have walked at ``now``, and return its results."""
     if study.state == StudyState.RUNNING:
         close(study, None, now)
     return read_results(study, now)

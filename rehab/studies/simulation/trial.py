@@ -16,8 +16,8 @@ from rehab.studies.analysis.participants import (
     AnalyzedSession,
     Participant,
     ParticipantVisit,
-    by_arm,
     make_participant,
+    observations,
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.simulation.walkers import ENDLESS, Person, Population, draw_person, walk_through
@@ -40,7 +40,7 @@ class Trial:
     Attributes
     ----------
     plans
-        What each arm's sessions are scored with, by the arm's code.
+        The plan of each arm's sessions, by the arm's code.
     effects
         What each arm truly adds to training [% of the baseline].
     groups
@@ -91,7 +91,7 @@ class Trial:
         return Scheme(self.groups, Method.BLOCKS)
 
     def secret(self, seed: int) -> Secret:
-        """Return what a seed's participants are allocated by."""
+        """Return the secret by which a seed's participants are allocated."""
         share = sum(group.weight for group in self.groups)
         return Secret(f"simulated {seed:012}", self.block_sizes or (share,))
 
@@ -112,7 +112,15 @@ def walkable(plan: SessionPlan) -> SessionPlan:
 
 
 def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> AnalyzedSession:
-    """Return one session, scored by the rules alone."""
+    """Return one session, scored by the rules alone.
+
+    Parameters
+    ----------
+    plan
+        What it is scored with.
+    walker
+        Who walks it; the strides depend on phase and goal.
+    """
     fold = SessionFold(plan)
     fold.change(Change(ChangeKind.START))
     steps = [fold.step(stride) for stride in walk_through(walker, fold)]
@@ -120,12 +128,14 @@ def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> AnalyzedSession:
     rows = (of_columns(step) for step in steps if step.side is plan.trained_side)
     better = plan.measure.higher_is_better
     return AnalyzedSession(
-        read_walk(plan.phases, rows, higher_is_better=better), compute_metrics(fold)
+        read_walk(plan.phases, rows, higher_is_better=better),
+        compute_metrics(fold),
+        plan.measure.slug,
     )
 
 
 def simulate(trial: Trial, seed: int) -> list[Participant]:
-    """Return a study's participants with all that they walked. The same seed gives the same."""
+    """Return the participants of ``trial`` with their sessions. A seed always gives the same."""
     visit_plan = VisitPlan(trial.visits)
     participants = []
     for number, (person, group) in enumerate(trial.allocate(seed), start=1):
@@ -139,7 +149,7 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
                 kept = trial.population.kept
                 walker = person.at_visit(visit.number, trial.effects[arm], kept)
                 walked = walk_by_fold(trial.plans[arm], walker)
-            planned.append((ParticipantVisit(visit.number, arm), walked))
+            planned.append((ParticipantVisit(visit.number, arm, period=visit.period), walked))
         participants.append(
             make_participant(f"{number:03}", planned, has_left=person.leaves_before > 0)
         )
@@ -148,10 +158,17 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
 
 def differences(
     trial: Trial, participants: Sequence[Participant], slug: str = ""
-) -> list[Difference]:
+) -> tuple[Difference, ...]:
     """Return the differences between all pairs of arms in an outcome.
 
-    ``slug``: the outcome's; of the primary one where it is empty.
+    Parameters
+    ----------
+    trial
+        The study.
+    participants
+        Those that ``simulate`` returned.
+    slug
+        The outcome's; empty for the primary one.
     """
-    groups = by_arm(participants, list(trial.plans), slug or trial.outcome)
-    return compare(groups, paired=trial.is_crossover)
+    observed = observations(participants, slug or trial.outcome)
+    return compare(observed, list(trial.plans), crossover=trial.is_crossover).differences

@@ -103,7 +103,7 @@ class ControlledSession(Protocol):
         """Note that walking stopped, and why."""
 
     def resume(self) -> None:
-        """Forget why the session was paused."""
+        """Clear why the session was paused."""
 
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback."""
@@ -139,8 +139,8 @@ class ChartMark:
 class Control:
     """One thing that can be changed of a session.
 
-    A control without ``apply`` and ``current`` is a setting: the session keeps its value in
-    ``settings``, from ``initial`` on.
+    A control without ``apply`` and ``current`` is a setting: the session has its value in
+    ``settings``, at first ``initial``.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class Control:
     allowed_in, leads_to
         The states it may come in; the state it leads to, None where the state stays.
     value, check
-        What its value is. ``check`` returns the value that is kept, or raises InvalidSetting.
+        What its value is. ``check`` returns the value to store, or raises InvalidSetting.
     initial
         A setting's value at the beginning of a plan.
     apply, current
@@ -171,6 +171,8 @@ class Control:
         The part of a mapping that reviews and marks show.
     mark
         How charts point it out; None where they do not.
+    when_locked
+        The values that it may still get where the plan is locked; None where that locks nothing.
     """
 
     kind: str
@@ -196,6 +198,19 @@ class Control:
     joint: str = ": "
     shown_part: str = ""
     mark: ChartMark | None = None
+    when_locked: frozenset[float] | None = None
+
+    def check_lock(self, plan: SessionPlan, value: ChangeValue) -> None:
+        """Raise NotAllowed where a locked plan fixes what the change would alter."""
+        if not plan.locked or self.when_locked is None:
+            return
+        if not isinstance(value, int | float) or value not in self.when_locked:
+            raise NotAllowed(
+                "This session belongs to a study, which fixes the {what}. For safety you can "
+                "always pause or end the session, stop the robot or switch it off: the study's "
+                "results tell it.",
+                what=Marked(self.log_label),
+            )
 
     def next_state(self, state: State) -> State:
         """Return the state after the change.
@@ -215,7 +230,7 @@ class Control:
         return self.leads_to or state
 
     def put_into_force(self, session: ControlledSession, value: ChangeValue) -> None:
-        """Check a value and apply it. Raises InvalidSetting; the session is then as it was."""
+        """Check a value and apply it to a session. Raises InvalidSetting, changing nothing."""
         if self.value is ValueKind.NUMBER:
             value = self._check_number(value)
         checked = value if self.check is None else self.check(value)
@@ -239,7 +254,7 @@ class Control:
         return session.settings.get(self.kind)
 
     def value_for_log(self, session: ControlledSession) -> float | str | None:
-        """Return the value in force as the log keeps it: a number or a name."""
+        """Return the value in force as the log stores it: a number or a name."""
         value = self.value_in_force(session)
         if isinstance(value, str):
             return str(value)

@@ -88,6 +88,8 @@ _PAUSE_REASONS: Choices = {
     PauseReason.REST.value: gettext_noop("for a rest"),
 }
 
+_NOTHING: frozenset[float] = frozenset()
+
 CONTROLS: dict[str, Control] = {
     control.kind: control
     for control in (
@@ -169,6 +171,7 @@ CONTROLS: dict[str, Control] = {
             choices=_ADAPTATIONS,
             shows_old=True,
             mark=ChartMark("F", gettext_noop("goal follows"), ValueFormat.CHOICE, _ADAPTATIONS),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.GAIN,
@@ -183,6 +186,7 @@ CONTROLS: dict[str, Control] = {
             value_format=ValueFormat.NUMBER,
             shows_old=True,
             mark=ChartMark("G", gettext_noop("gain"), ValueFormat.NUMBER),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.PHASE,
@@ -210,6 +214,7 @@ CONTROLS: dict[str, Control] = {
             value_format=ValueFormat.PERCENT,
             shows_old=True,
             mark=ChartMark("A", gettext_noop("robot acts from"), ValueFormat.PERCENT),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.ROBOT_INTENSITY,
@@ -224,6 +229,7 @@ CONTROLS: dict[str, Control] = {
             choices=_LEVELS,
             shows_old=True,
             mark=ChartMark("R", gettext_noop("robot"), ValueFormat.CHOICE, _LEVELS),
+            when_locked=frozenset({0}),  # off, for safety
         ),
         Control(
             kind=ChangeKind.VALENCE,  # of the next phase with feedback
@@ -236,6 +242,7 @@ CONTROLS: dict[str, Control] = {
             value_format=ValueFormat.CHOICE,
             choices=_TYPES,
             mark=ChartMark("N", gettext_noop("next type"), ValueFormat.CHOICE, _TYPES),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.VALENCE_NOW,  # from the next step on; a switch sends more (`course.py`)
@@ -247,6 +254,7 @@ CONTROLS: dict[str, Control] = {
             payloads={Audience.MONITOR: Payload.TYPES},
             value_format=ValueFormat.CHOICE,
             choices=_TYPES,
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.FEEDBACK_TEXT,  # for the clinic, or for one session
@@ -260,6 +268,7 @@ CONTROLS: dict[str, Control] = {
             choices=_TYPES,
             shown_part="valence",
             mark=ChartMark("E", gettext_noop("words edited")),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.WORDS_SHOWN,
@@ -272,6 +281,7 @@ CONTROLS: dict[str, Control] = {
             value_format=ValueFormat.CHOICE,
             choices=_SWITCH,
             mark=ChartMark("W", gettext_noop("words"), ValueFormat.CHOICE, _SWITCH),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.CHART_STYLE,

@@ -84,7 +84,7 @@ class Tally:
             self.streak = 0
 
     def merge(self, other: Tally) -> None:
-        """Add the sums of another tally; streaks do not reach across."""
+        """Add the sums of another tally; no streak continues from one to the other."""
         if self.valid and other.valid:  # Chan, Golub & LeVeque 1983
             apart = other.value_sum / other.valid - self.value_sum / self.valid
             share = self.valid * other.valid / (self.valid + other.valid)

@@ -3,6 +3,7 @@
 
 import { _, fill } from "garry/shared/language";
 import { soundAlarm } from "garry/monitor/alarm_tone";
+import { doubtCure } from "garry/shared/labels";
 import { SILENT_S } from "garry/monitor/state";
 
 const FIRST_STRIDE_S = 10; // a walk needs longer to begin
@@ -56,6 +57,7 @@ export function createAlarms({ state }, robot) {
     return new Map([
       storage,
       ["source", session.state === "running" ? describeSource(session) : ""],
+      ["signals", doubtCure(state.lastStride?.reasons ?? [])],
       ["tablet", describeTablet(session)],
       ["robot", describeRobot(session)],
     ]);

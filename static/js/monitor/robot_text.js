@@ -7,6 +7,7 @@ import { percent } from "garry/shared/format";
 const REASONS = {
   no_gesture: _("no gesture for that"),
   off: _("the robot is off"),
+  only_informs: _("this feedback only informs"),
   late: _("the steps came late"),
   performing: _("still moving"),
   resting: _("resting"),

@@ -59,6 +59,8 @@ const REASONS = {
   angle_out_of_step: _("the angle is out of step"),
   power_reversed: _("the power’s sign is turned"),
   no_push_off: _("no push-off"),
+  doubt_weight: _("the plates do not carry the body mass"),
+  doubt_angle: _("the angle is not an ankle’s"),
 };
 
 // What to do about the signals' clock: late, lost, drifting (rehab/gait/selfcheck/cures.py).
@@ -70,6 +72,16 @@ const CURES = {
   flag_late: _("Late, and put back: close other programs on the lab’s computer."),
   moment_out_of_step: _("Out of time or drifting: let one clock stamp all channels."),
   angle_out_of_step: _("Out of time or drifting: let one clock stamp all channels."),
+};
+
+// Why no stride counts until a person has looked: the cure (rehab/gait/selfcheck/checks.py).
+const DOUBTS = {
+  doubt_weight: _(
+    "The plates do not carry the body mass that was given. Check it, and handrail and harness. If it is right, pause and go on: strides then count.",
+  ),
+  doubt_angle: _(
+    "The angle moves as a knee’s does. Check the columns at the source. If they are right, pause and go on: strides then count.",
+  ),
 };
 
 // What ends a page's connection or refuses an order, by its code; others come with a text of their own.
@@ -86,4 +98,5 @@ export const phaseName = (name) => PHASES[name] ?? name;
 export const severityName = (severity) => SEVERITIES[severity] ?? REMARKS.fall_severity;
 export const remarkName = (kind) => REMARKS[kind] ?? kind.replaceAll("_", " ");
 export const clockCures = (names) => [...new Set(names.map((name) => CURES[name]).filter(Boolean))];
+export const doubtCure = (reasons) => DOUBTS[reasons.find((reason) => reason in DOUBTS)] ?? "";
 export const reasonName = (reason) => REASONS[reason] ?? reason.replaceAll("_", " ");

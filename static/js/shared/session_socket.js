@@ -88,11 +88,21 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         settle(message.id);
         break;
       case "error":
+        if (message.server) goTo(message.server);
         if (message.code === "robot_unheard") onEvent?.({ kind: message.code, order: message.order });
         closeReason = refusal(message);
         if (message.id) settle(message.id, new Error(closeReason));
     }
     if (message.frame) confirm(message.frame, message.type === "steps");
+  }
+
+  // Another server has the clinic: the proxy chooses it by the cookie, from now on also for pages.
+  function goTo(server) {
+    const cookie = `${wire.server_cookie}=${server}`;
+    if (document.cookie.split("; ").includes(cookie)) return; // it was asked already: not at once again
+    const secure = location.protocol === "https:" ? "; secure" : "";
+    document.cookie = `${cookie}; path=/; samesite=strict${secure}`;
+    retryPause = FIRST_PAUSE_MS;
   }
 
   function caughtUp() {

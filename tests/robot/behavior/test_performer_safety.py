@@ -7,7 +7,7 @@ import pytest
 from robot.bases import Indication, SensorState
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
-from robot.motion.pose import HOME
+from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL
 from tests.support.extent import EVERYTHING
 from tests.support.robot_stage import CUE, WELCOME, FeelingBase, Stage
@@ -229,3 +229,40 @@ def test_a_bump_of_50_ms_in_a_hang_of_0_2_s_is_never_lost(reader):
         stage.robot.tick(stage.now_s)
         assert stage.robot.body.safety.latch == "bump"
         assert not stage.robot.body.player.is_busy
+
+
+@pytest.mark.parametrize("welcome", [{"session": 8}, {"state": "paused"}, {"session": None}])
+def test_a_gesture_ends_with_the_session_that_ordered_it(stage, welcome):
+    stage.perform()
+    stage.hear(**WELCOME | welcome)
+    stage.wait(1)
+    assert stage.ended == ["replaced"]
+    assert stage.base.read().twist.is_still
+
+
+def test_the_same_sessions_welcome_lets_a_gesture_end(stage):
+    stage.perform()
+    stage.hear(**WELCOME)
+    stage.wait(5)
+    assert stage.ended == ["done"]
+
+
+class WeakBase(FeelingBase):
+    """A base that turns and drives a tenth as far as it is told, and says that it goes as told."""
+
+    def read(self):
+        there = super().read()
+        pose = Pose(there.pose.x_m / 10, there.pose.y_m / 10, there.pose.heading_rad / 10)
+        return replace(there, pose=pose)
+
+
+def test_a_base_that_does_not_get_there_in_time_waits_for_a_person():
+    stage = Stage(WeakBase)
+    stage.hear(**WELCOME)
+    stage.hear(type="arm")
+    stage.walk(*[1.0] * 12)
+    assert stage.ended == ["out_of_time"]
+    assert stage.state == ("stopped", "stalled")
+    stage.hear(type="arm")
+    stage.wait(1)
+    assert stage.state[0] != "stopped"

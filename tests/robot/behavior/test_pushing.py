@@ -9,6 +9,7 @@ from robot.motion.limits import TICK_S
 from robot.motion.pools import VARIANTS
 from robot.motion.twist import Twist
 from tests.support.robot_stage import CUE, WELCOME, Stage
+from tests.support.variants import cases
 
 pytestmark = pytest.mark.matrix
 
@@ -58,7 +59,7 @@ def test_pushing_is_short_and_its_work_is_bounded(gesture, intensity, dead_time_
     assert stage.base.work_j <= 1.7  # MISSED_M, with the most that motors can push
 
 
-@pytest.mark.parametrize("gesture", VARIANTS)
+@pytest.mark.parametrize("gesture", cases(VARIANTS))
 def test_pushing_against_a_variant_is_as_short(gesture):
     for intensity, after_s in ((1.0, 0.6), (0.5, 0.3)):
         stage = push(gesture, intensity, 0.2, after_s)
@@ -67,7 +68,7 @@ def test_pushing_against_a_variant_is_as_short(gesture):
         assert stage.base.work_j <= 1.7
 
 
-@pytest.mark.parametrize("gesture", VARIANTS)
+@pytest.mark.parametrize("gesture", cases(VARIANTS))
 def test_free_to_go_no_variant_stalls(gesture):
     assert push(gesture, 1.0, 0.2, 99.0).ended == push(gesture, 0.5, 0.2, 99.0).ended == ["done"]
 

@@ -71,12 +71,20 @@ def test_the_pool_follows_from_the_walking(walked, pools):
     assert [choice.pool for choice in answers(3, walked)] == pools.split()
 
 
-def session(number):
-    """Return ten minutes of good and weak walking by turns."""
+def session(number, times=17, **cue):
+    """Return good and weak walking by turns, of ten minutes."""
     stage = Stage()
-    stage.hear(**WELCOME | {"cue": VARIED_CUE, "session": number})
-    stage.walk(*([1.0, 1.2, 1.05, 0.95, 1.1] * 4 + [0.4, 0.8, 0.6, 0.85, 0.7] * 3) * 17)
+    stage.hear(**WELCOME | {"cue": VARIED_CUE | cue, "session": number})
+    stage.walk(*([1.0, 1.2, 1.05, 0.95, 1.1] * 4 + [0.4, 0.8, 0.6, 0.85, 0.7] * 3) * times)
     return stage
+
+
+def test_participants_of_a_study_see_the_same_answers():
+    third, seventh, other = session(3, 2, seed=5001), session(7, 2, seed=5001), session(8, 2)
+    assert third.of("decision") == seventh.of("decision")
+    assert {one["seed"] for one in third.of("decision")} == {5001}
+    names = [one["gesture"] for one in third.of("decision")]
+    assert names != [one["gesture"] for one in other.of("decision")]
 
 
 @pytest.mark.wide

@@ -9,7 +9,6 @@ from robot.motion.base_response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.delay_meter import DelayMeter
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
-from robot.motion.pools import VARIANTS
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
 from tests.support.gesture_runs import play_in_a_row
@@ -84,16 +83,6 @@ def test_a_late_base_ends_at_home_though_nobody_has_measured_it(gesture, dead_ti
         assert played.away_m < 0.02
         assert played.turned_deg < 2
         assert played.took_s <= 4.5
-
-
-@pytest.mark.parametrize("name", VARIANTS)
-def test_so_does_each_variant(name):
-    for faults in (Imperfections(0.25, 0.06, left_scale=0.98, drift_deg_min=3.0), Imperfections()):
-        for played in play_in_a_row(VARIANTS[name], faults, times=2):
-            assert played.outcome == "done"
-            assert played.away_m < 0.02
-            assert played.turned_deg < 2
-            assert played.took_s <= 4.5
 
 
 def test_one_that_plans_from_where_it_is_would_fail(monkeypatch):

@@ -18,6 +18,7 @@ from robot.motion.pools import POOLS
 from robot.motion.preview import ANNOUNCED_S, preview
 from robot.motion.score import MAX_ENTRIES, NEUTRAL, Color, Light, Melody, Note, Score, read_score
 from tests.support.json_values import ANYTHING
+from tests.support.variants import cases
 
 ABOVE = ("joy", "streak_3", "streak_5", "streak_10", "comeback")
 
@@ -48,10 +49,12 @@ def test_explicit_feedback_stays_still():
     assert (cue.above, cue.below) == (None, None)
 
 
-@pytest.mark.parametrize("gesture", BUILT_IN.values(), ids=lambda gesture: gesture.name)
-def test_a_score_is_over_before_its_motion_and_tells_that_it_begins(gesture):
+@pytest.mark.parametrize("name", cases(BUILT_IN))
+def test_a_score_is_over_before_its_motion_and_tells_that_it_begins(name):
+    gesture = BUILT_IN[name]
     ends_s = ANNOUNCED_S + dry_run(gesture).took_s
-    for entry in (*gesture.score.lights, *gesture.score.notes):
+    entries: tuple[Light | Note, ...] = (*gesture.score.lights, *gesture.score.notes)
+    for entry in entries:
         assert 0 <= entry.at_s <= ends_s
     assert gesture.score.lights[0].at_s == gesture.score.notes[0].at_s == 0
     assert gesture.score.quiet == Score(gesture.score.lights)

@@ -1,9 +1,11 @@
 """Diagnosis the port of a Kobuki, and `python -m robot doctor` on it."""
 
 import sys
+import threading
 
 import pytest
 
+from robot import doctor
 from robot.__main__ import main
 from robot.port import usb
 from robot.port.usb import Usb, check_port, find_port
@@ -100,6 +102,7 @@ def test_the_doctor_listens_to_a_base(capsys):
         main(["doctor", "--port", kobuki.url])
         told = capsys.readouterr().out
         assert "ok  It tells" in told
+        assert "A pause of 20 ms took up to" in told
         assert "ok  Firmware 1.2.0." in told
         assert "ok  Battery 16.0 V." in told
         kobuki.bumper, kobuki.battery, kobuki.version = 1, 134, (2, 0, 0)
@@ -124,3 +127,23 @@ def test_the_doctor_and_a_port_that_is_taken_or_not_there(capsys, tmp_path):
     with FakeKobuki() as kobuki, owning(kobuki):
         assert main(["doctor", "--port", kobuki.url]) == 1
     assert "Another program has it" in capsys.readouterr().out
+
+
+@POSIX
+@pytest.mark.server
+@pytest.mark.parametrize(
+    ("after_s", "told"),
+    [(0.3, "ok  A watchdog took its power"), (1.4, "ok  The emergency stop"), (9.0, "!!  Nothing")],
+)
+def test_the_doctor_tries_the_hardware_cut(capsys, monkeypatch, after_s, told):
+    monkeypatch.setattr(doctor, "WATCHDOG_S", 1.2)
+    monkeypatch.setattr(doctor, "PRESS_S", 1.5)
+    with FakeKobuki() as kobuki:
+        timer = threading.Timer(after_s, lambda: setattr(kobuki, "is_mute", True))
+        timer.start()
+        status = main(["doctor", "--cut", "--port", kobuki.url])
+        timer.cancel()
+        assert not any(speed for _, speed, _ in kobuki.orders)
+    said = capsys.readouterr().out
+    assert told in said
+    assert status == (1 if "!!" in told else 0)

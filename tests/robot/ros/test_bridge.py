@@ -221,6 +221,7 @@ def test_what_the_original_s_nodes_hear(ros):
         wait_until(lambda: ("/garry/feedback_type", {"data": "Binary"}) in heard)
         wait_until(lambda: ("/garry/good_step", {"data": False}) in heard)
         heard.clear()
+        originals.allow(True)
         originals.publish_decision(True, 5.0)
         originals.handle_message({"type": "step", "shown": 0.93, "goal": 1.1})
         wait_until(lambda: len(heard) >= 2)

@@ -18,10 +18,12 @@ HOLDS_S = load_watchdog().HOLDS_S
 class Run:
     """A watchdog on a clock, and what it published, with when."""
 
+    kind = "Watchdog"
+
     def __init__(self):
         self.now_s = 10.0
         self.sent: list[tuple[float, dict[str, Any]]] = []
-        self.watchdog = load_watchdog().Watchdog(
+        self.watchdog = getattr(load_watchdog(), self.kind)(
             lambda message: self.sent.append((round(self.now_s, 2), message)),
             lambda: STAND,
             is_still_message,
@@ -146,3 +148,88 @@ def test_it_shows_nothing_where_it_has_no_lights(watched):
     watched.wait(0.1)
     assert not watched.base.abilities.announces
     assert not watched.bridge.log
+
+
+# --- the gate of the original's nodes -------------------------------------------------------------
+
+GATE = load_watchdog()
+LEFT = twist_message(0.0, 1.8)
+
+
+class GateRun(Run):
+    """A gate on a clock, what GARRY says of late, and what it published."""
+
+    kind = "Gate"
+
+    def wait(self, span_s, message=None, may_act=None):
+        """Let time pass; a message comes at its beginning, GARRY's word ten times a second."""
+        if message is not None:
+            self.watchdog.receive(message, self.now_s)
+        for tick in range(round(span_s / 0.02)):
+            self.now_s += 0.02
+            if may_act is not None and tick % 5 == 0:
+                self.watchdog.allow(may_act, self.now_s)
+            self.watchdog.check(self.now_s)
+        return self
+
+    def moves(self):
+        return [message for _, message in self.sent if message != STAND]
+
+    def stands_after(self, since_s):
+        """Return how long after a moment it first ordered to stand [s]."""
+        return next(at_s for at_s, message in self.sent if message == STAND and at_s >= since_s) - (
+            since_s
+        )
+
+
+def gate_in_a_gesture():
+    """Return a gate with the first part of a gesture passed on."""
+    run = GateRun().wait(3.0, may_act=True).wait(0.5, LEFT, may_act=True)
+    assert run.moves() == [LEFT]
+    return run
+
+
+def test_the_gate_passes_each_order_once_while_a_robot_may_act():
+    run = gate_in_a_gesture().wait(1.5, may_act=True).wait(2.0, FORWARD, may_act=True)
+    assert run.moves() == [LEFT, FORWARD]
+    assert not [at_s for at_s, message in run.sent if message == STAND and at_s > 13.0]
+
+
+def test_it_begins_closed_and_says_so_to_the_base():
+    run = GateRun().wait(1.0, LEFT)
+    assert run.moves() == []
+    assert {message["angular"]["z"] for _, message in run.sent} == {0.0}
+
+
+@pytest.mark.parametrize(("word", "within_s"), [(False, 0.03), (None, GATE.FRESH_S + 0.03)])
+def test_a_stop_and_silence_close_it(word, within_s):
+    run = gate_in_a_gesture()
+    since_s = run.now_s
+    run.wait(1.0, may_act=word)
+    assert run.stands_after(since_s) <= within_s
+    stands = [at_s for at_s, message in run.sent if message == STAND and at_s >= since_s]
+    assert 20 <= len(stands) / (run.now_s - stands[0]) <= 60  # zero Twists at 20 to 50 Hz
+
+
+def test_the_rest_of_a_gesture_is_dropped_also_once_a_robot_may_act_again():
+    run = gate_in_a_gesture().wait(0.2, may_act=False)
+    for _ in range(3):
+        run.wait(2.0, FORWARD, may_act=True)
+    assert run.moves() == [LEFT]
+    run.wait(1.0, may_act=True).wait(0.5, FORWARD, may_act=True)
+    assert run.moves() == [LEFT, FORWARD]
+
+
+def test_nodes_that_die_in_a_motion_are_stopped():
+    run = gate_in_a_gesture()
+    since_s = run.now_s
+    run.wait(4.0, may_act=True)
+    assert run.stands_after(since_s) <= GATE.SILENT_S
+
+
+def test_after_a_hang_of_its_own_the_gate_is_closed():
+    run = gate_in_a_gesture()
+    run.now_s += 1.0
+    run.watchdog.receive(FORWARD, run.now_s)
+    assert run.moves() == [LEFT]
+    assert run.sent[-1][1] == STAND

@@ -12,7 +12,6 @@ from django.utils import timezone
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import owners
 from rehab.sessions.log import Step
-from rehab.sessions.models import TrainingSession
 from tests.support.callers import (
     Message,
     RobotCaller,
@@ -22,6 +21,7 @@ from tests.support.callers import (
     numbers,
     turns,
 )
+from tests.support.world import set_owner
 
 # --- tokens ---------------------------------------------------------------------------------------
 
@@ -116,7 +116,7 @@ async def test_a_session_of_another_process(place, ready):
     session = await ready(place)
     parent = os.getppid()
     owner = f"{socket.gethostname()}|{parent}|{owners._start_time(parent)}"
-    await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner=owner)
+    await sync_to_async(set_owner)(session.clinic_id, owner)
     for caller in (place.source(), place.robot(), place.tablet(session), place.monitor(session)):
         await caller.dial()
         await caller.say({"type": "hello", "version": 1, "run": "r", "last": 0, "base": "null"})

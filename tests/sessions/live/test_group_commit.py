@@ -22,6 +22,7 @@ from rehab.sessions.live.session.commits import EarlierWriteFailed, Fenced, Job
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.ownership import ClinicOwner
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side
 from tests.support.world import NOW
@@ -51,7 +52,7 @@ class Bench:
             Job(
                 aggregate,
                 session.pk,
-                session.epoch,
+                0,
                 rows,
                 aggregate.summary(),
                 lambda problem: self.done.append((session.pk, problem)),
@@ -75,6 +76,7 @@ def bench(live_path, stall, monkeypatch):
 @pytest.fixture
 async def aggregates(place, ready, bench) -> list[SessionAggregate]:
     aggregates = [SessionAggregate(await ready(place, at_station=False)) for _ in range(3)]
+    await ClinicOwner.everywhere.aget_or_create(pk=place.clinic.pk)
     for aggregate in aggregates:
         bench.submit(aggregate, aggregate.change(Change(ChangeKind.START), None, NOW))
     return aggregates
@@ -202,7 +204,7 @@ async def test_one_report_that_fails_keeps_no_other_from_its_source(bench, aggre
 
     session = aggregates[0].session
     bench.stall.begin()
-    bench.writer.submit(Job(aggregates[0], session.pk, session.epoch, [], None, fail))
+    bench.writer.submit(Job(aggregates[0], session.pk, 0, [], None, fail))
     bench.walk(aggregates[1])
     bench.stall.end()
     await until_done(bench, 4)
@@ -226,11 +228,13 @@ async def test_an_owner_that_failed_is_not_kept_for_ever(bench, aggregates, monk
     assert len(bench.writer._failed) == 0
 
 
-async def test_a_session_that_was_taken_over_is_fenced(bench, aggregates):
-    await until_done(bench, 3)
+async def test_a_clinic_that_was_taken_over_is_fenced(bench, aggregates, elsewhere, ready):
+    lost, kept = SessionAggregate(await ready(elsewhere)), aggregates[1]
+    await ClinicOwner.everywhere.acreate(pk=elsewhere.clinic.pk)
+    bench.submit(lost, lost.change(Change(ChangeKind.START), None, NOW))
+    await until_done(bench, 4)
     bench.done.clear()
-    lost, kept, _ = aggregates
-    await TrainingSession.everywhere.filter(pk=lost.session.pk).aupdate(epoch=7)
+    await ClinicOwner.everywhere.filter(pk=lost.session.clinic_id).aupdate(epoch=7)
     bench.stall.begin()
     for aggregate in (lost, kept, lost):
         bench.walk(aggregate)

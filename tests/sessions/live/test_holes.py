@@ -6,7 +6,7 @@ import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database.owners import release
+from rehab.sessions.live.database.owners import note_ends
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
@@ -88,6 +88,5 @@ async def test_a_logs_end_is_noted_with_changes_and_at_a_stop_and_never_lowered(
     await restart()
     assert await noted() == 3
     await Step.everywhere.filter(session=session, number=3).adelete()
-    stored = await TrainingSession.everywhere.aget(pk=session.pk)
-    await sync_to_async(release)(session.pk, stored.epoch)
+    await sync_to_async(note_ends)([session.pk])
     assert await noted() == 3

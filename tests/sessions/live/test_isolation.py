@@ -2,61 +2,126 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live import servers as servers_module
 from rehab.sessions.live.consumers.isolation_gate import IsolationGate
-from rehab.sessions.live.servers.isolation import Isolation
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.database.lease import Server
+from rehab.sessions.live.servers import Servers, applies, ask_if_ready
+from tests.support.callers import turns
 
-OTHER = {"other"}
+ME, OTHER = Server("me", "me:1", True), Server("other", "other:1", True)
+
+
+@pytest.mark.parametrize(
+    ("answers", "leaves"),
+    [
+        ([True], True),
+        ([False], False),  # the database is gone for all
+        ([None], True),  # who hears nobody is cut off itself
+        ([False, None], False),
+        ([None, True], True),
+    ],
+)
+def test_clients_go_where_the_database_is_or_may_be(answers, leaves):
+    assert applies(answers) == leaves
+
+
+def make_lease() -> Any:
+    state = {"is_current": False, "may_judge": False, "is_ready": False}
+    return SimpleNamespace(id="me", entered=1, servers=[ME, OTHER], **state)
 
 
 class World:
-    """A server's lease, and the time."""
+    """A server, its lease, and what another one answers."""
 
     def __init__(self) -> None:
-        self.now_s = 100.0
-        lease: Any = SimpleNamespace(is_current=False)
-        self.lease = lease
-        self.isolation = Isolation(lease, lambda: self.now_s)
+        self.answer: bool | None = True
+        self.lease = make_lease()
+        self.closed: list[int] = []
+        socket = SimpleNamespace(close_soon=self.closed.append)
+        clinics = SimpleNamespace(epochs={7: 1})
+        self.lost: list[int] = []
+        host: Any = SimpleNamespace(sockets=[socket], clinics=clinics, lose=self.lost.append)
+        recovery: Any = SimpleNamespace()
+        self.servers = Servers(host, recovery, self.lease, ask=lambda _: self.answer)
 
-    def applies(self, others: set[str] = OTHER, *, is_silent: bool = False) -> bool:
-        return self.isolation.applies(others, is_silent=is_silent)
+    async def look(self, times: int = 1) -> bool:
+        for _ in range(times):
+            await self.servers._watch_database()
+        return self.servers.is_isolated
 
 
 @pytest.fixture
-def world() -> World:
-    return World()
+async def world(monkeypatch: pytest.MonkeyPatch) -> World:
+    monkeypatch.setattr(servers_module, "BEAT_S", 1000.0)
+    world = World()
+    await world.servers.close()  # a test has its beats itself
+    return world
 
 
-def test_clients_stay_while_the_database_answers_or_is_gone_for_all(world):
-    assert not world.applies()  # the other one does not say that it has it
-    world.isolation.record("other", is_current=False)
-    assert not world.applies()
-    world.isolation.record("other", is_current=True)
-    assert world.applies()
+async def test_a_server_alone_or_with_its_database_keeps_its_clients(world):
+    world.lease.servers = [ME]
+    assert not await world.look(3)
+    world.lease.servers = [ME, OTHER]
     world.lease.is_current = True
-    assert not world.applies(is_silent=True)
+    assert not await world.look(3)
+    assert not world.closed
 
 
-def test_who_hears_nobody_is_cut_off_itself(world):
-    assert world.applies(is_silent=True)
-    assert not world.applies(set(), is_silent=True)  # one server alone keeps its clients
+async def test_clients_are_sent_away_at_the_second_look_and_once(world):
+    assert not await world.look()  # it may be back in a moment
+    assert await world.look()
+    assert await world.look()
+    assert world.closed == [4012]
+    world.answer = False
+    assert not await world.look()
 
 
-def test_what_another_said_counts_for_three_seconds(world):
-    world.isolation.record("other", is_current=True)
-    world.now_s += 2.9
-    assert world.applies()
-    world.now_s += 0.2
-    assert not world.applies()
-    world.isolation.record("other", is_current=True)
-    world.isolation.record("other", is_current=False)
-    assert not world.applies()
-    assert not world.applies({"a third"})
+async def test_nobody_is_admitted_before_what_others_took_is_dropped(world, monkeypatch):
+    async def find_taken(epochs: dict[int, int]) -> set[int]:
+        return set(epochs)
+
+    monkeypatch.setattr(servers_module, "sync_to_async", lambda function: function)
+    monkeypatch.setattr(owners, "find_taken", find_taken)
+    assert await world.look(2)
+    world.lease.is_current, world.lease.entered = True, 2
+    assert not world.servers.may_move_robots
+    assert await world.look()
+    await world.servers._beat()
+    assert world.lost == [7]
+    assert world.servers.may_move_robots
+    assert not await world.look()
+
+
+@pytest.mark.parametrize(("status", "is_ready"), [(200, True), (503, False)])
+def test_another_server_is_asked_for_its_state(settings, status, is_ready):
+    settings.ALLOWED_HOSTS = [".garry.example"]
+    asked: list[Any] = []
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append((self.path, self.headers["Host"]))
+            self.send_response(status)
+            self.end_headers()
+
+        def log_message(self, *_: Any) -> None:
+            """Say nothing."""
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as other:
+        threading.Thread(target=other.handle_request).start()
+        address = f"127.0.0.1:{other.server_port}"
+        assert ask_if_ready(address) is is_ready
+    assert asked == [("/readyz", "garry.example")]
+    assert ask_if_ready(address) is None
 
 
 async def ask(scope: dict[str, Any]) -> list[dict[str, Any]]:
@@ -92,3 +157,27 @@ async def test_nobody_but_a_watchdog_gets_in(monkeypatch, scope, first):
     assert await ask(scope) == [{"type": "inner"}]
     monkeypatch.setattr(runtimes, "peek", lambda: SimpleNamespace(servers=None))
     assert await ask(scope) == [{"type": "inner"}]
+
+
+async def test_no_robot_hears_a_server_whose_clinics_another_may_have(place, begun, monkeypatch):
+    """It stands still after 0.65 s, whatever it does and whoever drives it."""
+    session = await begun(place)
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
+    runtime = runtimes.current()
+    await runtime.routines.stop()
+    state = SimpleNamespace(may_move_robots=True, close=lambda: asyncio.sleep(0))
+    monkeypatch.setattr(runtime, "servers", state)
+    drive = {"type": "robot", "order": "drive", "ahead": 1, "left": 0}
+
+    async def heard() -> set[str]:
+        await monitor.say(drive)
+        for _ in range(3):
+            await runtime.routines._send_robot_heartbeats()
+        await turns()
+        return {message["type"] for message in await robot.overhear()}
+
+    assert {"drive", "heartbeat"} <= await heard()
+    state.may_move_robots = False
+    assert await heard() == set()
+    await monitor.say({"type": "robot", "order": "stop"})  # a stop always counts
+    await robot.hear("stop")

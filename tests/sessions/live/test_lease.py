@@ -1,9 +1,9 @@
-"""Leases of hosted servers: judged by the database's clock, renewed, excluded, taken over."""
+"""Leases of hosted servers: judged by the database's clock, renewed; whose a clinic is."""
 
 from __future__ import annotations
 
-import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,10 +11,10 @@ import pytest
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
+from rehab.people.models import Clinic
 from rehab.sessions.live.database import lease, owners
-from rehab.sessions.live.database.lease import AnotherServer, Lease
-from rehab.sessions.models import TrainingSession
-from tests.support.callers import build_place, open_session
+from rehab.sessions.live.database.lease import Lease, Server
+from tests.support.world import set_owner
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
 
@@ -25,7 +25,6 @@ def quick(monkeypatch: pytest.MonkeyPatch, settings: Any) -> Iterator[None]:
         pytest.skip("only hosted servers have leases")
     settings.HOSTED = True
     monkeypatch.setattr(lease, "RENEW_S", 0.05)
-    monkeypatch.setattr(lease, "RETRY_S", 0.02)
     monkeypatch.setattr(lease, "LEASE_S", 0.6)
     sql("DELETE FROM rehab_server")
     yield
@@ -42,34 +41,76 @@ def valid_ids() -> set[str]:
     return {server.id for server in lease.valid_servers()}
 
 
-def enter(*, shares: bool, lost: threading.Event | None = None) -> Lease:
-    one = Lease("127.0.0.1:1", shares=shares, on_excluded=(lost or threading.Event()).set)
-    one.acquire(wait_s=0.3)
+def enter(port: int = 1, *, is_ready: bool = False) -> Lease:
+    one = Lease(f"127.0.0.1:{port}")
+    one.is_ready = is_ready
+    one.acquire()
     return one
 
 
-@pytest.mark.parametrize(("first", "second"), [(False, False), (True, False), (False, True)])
-def test_servers_that_cannot_hear_each_other_do_not_share_a_database(first, second):
-    one = enter(shares=first)
-    with pytest.raises(AnotherServer, match="GARRY_REDIS_URL"):
-        enter(shares=second)
-    threading.Timer(0.1, one.release).start()
-    two = Lease("127.0.0.1:2", shares=second, on_excluded=lambda: None)
-    two.acquire(wait_s=10)
-    two.release()
-
-
-def test_servers_with_redis_share_a_database():
-    one, two = enter(shares=True), enter(shares=True)
+def test_a_server_knows_the_others_as_long_as_they_are_there():
+    one, two = enter(1), enter(2)
     assert valid_ids() == {one.id, two.id}
+    assert {server.id for server in two.servers} == {one.id, two.id}
     one.release()
     assert valid_ids() == {two.id}
     two.release()
     assert lease.held() is None
 
 
+def test_others_learn_of_a_server_that_takes_clinics():
+    one = enter()
+    assert [server.ready for server in lease.valid_servers()] == [False]
+    one.is_ready = True
+    time.sleep(0.2)
+    assert [server.ready for server in lease.valid_servers()] == [True]
+    one.release()
+
+
+def make_servers(count: int) -> list[Server]:
+    return [Server(str(number), f"10.0.0.{number}:8000", True) for number in range(count)]
+
+
+def test_clinics_are_spread_and_few_move_where_a_server_comes():
+    before, after = make_servers(4), make_servers(5)
+    places = [(lease.find_place(key, before), lease.find_place(key, after)) for key in range(1000)]
+    assert max(Counter(first for first, _ in places).values()) < 350
+    moved = [second for first, second in places if first != second]
+    assert set(moved) == {after[4]}
+    assert 120 < len(moved) < 280
+    assert lease.find_place(1, [one._replace(ready=False) for one in before]) is None
+
+
+def test_a_clinic_that_nobody_has_is_claimed_by_the_server_that_it_belongs_to(
+    two_servers, monkeypatch
+):
+    other, _ = two_servers
+    clinics = [Clinic.everywhere.create(name=f"clinic {number}").pk for number in range(40)]
+    sql("UPDATE rehab_server SET ready = true, expires_at = clock_timestamp() + interval '9 s'")
+    servers = lease.valid_servers()
+    theirs = [key for key in clinics if lease.find_place(key, servers).id == other.id]
+    mine = [key for key in clinics if key not in theirs]
+    assert theirs
+    assert mine
+    assert owners.claim(mine[0]).epoch == 1
+    with pytest.raises(owners.OwnedElsewhere) as problem:
+        owners.claim(theirs[0])
+    assert problem.value.server == other.address
+    sql("UPDATE rehab_clinicowner SET owner = %s WHERE clinic_id = %s", other.id, mine[0])
+    with pytest.raises(owners.OwnedElsewhere) as problem:
+        owners.claim(mine[0])
+    assert problem.value.server == other.address
+    with monkeypatch.context() as in_a_command:
+        in_a_command.setattr(lease, "_held", None)
+        with pytest.raises(owners.OwnedElsewhere):
+            owners.claim(mine[0])
+    sql("DELETE FROM rehab_server WHERE id = %s", other.id)
+    assert owners.claim(mine[0]) == (mine[0], 2, [], True)
+    assert owners.claim(theirs[0]) == (theirs[0], 1, [], False)
+
+
 def test_a_lease_is_renewed_and_outlives_its_connection():
-    one = enter(shares=True)
+    one = enter()
     time.sleep(0.8)
     assert valid_ids() == {one.id}
     assert one._connection is not None
@@ -81,7 +122,7 @@ def test_a_lease_is_renewed_and_outlives_its_connection():
 
 
 def test_an_owner_lives_as_long_as_its_lease_whatever_its_host_is_called():
-    other, own = enter(shares=True), enter(shares=True)
+    other, own = enter(), enter()
     time.sleep(0.2)  # from then on it judges
     assert own.may_judge
     assert owners.is_alive(other.id)
@@ -91,27 +132,30 @@ def test_an_owner_lives_as_long_as_its_lease_whatever_its_host_is_called():
     time.sleep(0.7)
     assert not owners.is_alive(other.id)
     other.release()
-    assert not owners.is_alive(owners.HANDED_ON)
     own.release()
 
 
 def test_what_a_beat_costs_does_not_depend_on_how_many_servers_there_are(two_servers):
-    live, _ = two_servers
+    live, own = two_servers
     dead = [f"{number:032}" for number in range(20)]
-    place = build_place("elm")
-    owned_by = {owner: open_session(place, at_station=False).pk for owner in (live.id, *dead)}
-    for owner, key in owned_by.items():
-        row = TrainingSession.everywhere.filter(pk=key)
-        row.update(owner=owner, state="running")
-    del owned_by[live.id]
+    gone = "a server that has no lease any more"
+    owned_by = {}
+    for owner in (live.id, own.id, "", owners.HANDED_ON, gone, *dead):
+        owned_by[owner] = Clinic.everywhere.create(name=f"of {owner}").pk
+        set_owner(owned_by[owner], owner)
     sql("UPDATE rehab_server SET expires_at = clock_timestamp() + interval '9 s'")
+    for owner in dead:
+        sql("INSERT INTO rehab_server VALUES (%s, '', true, now() - interval '1 s')", owner)
     with CaptureQueriesContext(connection) as asked:
-        assert owners.find_ownerless() == (sorted(owned_by.values()), [])
+        found = owners.find_ownerless(thorough=False)
+    left = [owned_by[owner] for owner in dead]
+    assert found == (left, [owned_by[owners.HANDED_ON]])
     assert len(asked) == 1
+    assert owners.find_ownerless() == ([owned_by[gone], *left], [owned_by[owners.HANDED_ON]])
 
 
 def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkeypatch):
-    own = enter(shares=True)
+    own = enter()
     monkeypatch.setattr(lease, "RENEW_S", 5.0)
     own._unbroken_since_s = time.monotonic()  # it has just come back
     assert not own.may_judge
@@ -123,7 +167,7 @@ def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkey
 @pytest.fixture
 def two_servers(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Lease, Lease]]:
     """Two servers, the second of them ours and judging; none renews its lease in the meantime."""
-    other, own = enter(shares=True), enter(shares=True)
+    other, own = enter(1), enter(2)
     time.sleep(0.2)
     for one in (other, own):
         one._closing.set()
@@ -146,18 +190,7 @@ def test_a_dead_server_does_not_live_on_when_the_databases_clock_is_set_back(two
     sql("UPDATE rehab_server SET expires_at = expires_at + interval '1 hour'")
     assert owners.is_alive(other.id)  # until own lease is renewed by the new time
     assert own._execute(lease.RENEW) == 0
-    assert own._enter()
+    own._enter()
     own._unbroken_since_s -= 1
     assert not owners.is_alive(other.id)
     assert valid_ids() == {own.id}
-
-
-def test_a_server_without_redis_whose_database_another_has_taken_ends(monkeypatch):
-    lost = threading.Event()
-    one = enter(shares=False, lost=lost)
-    monkeypatch.setattr(one, "_execute", lambda _: 0)  # it hangs: its row expires
-    sql("UPDATE rehab_server SET expires_at = now() - interval '1 s', id = 'x'")
-    sql("INSERT INTO rehab_server VALUES ('y', '127.0.0.1:2', false, now() + interval '9 s')")
-    assert lost.wait(10)
-    monkeypatch.undo()
-    one.release()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from typing import Any
 
 import pytest
@@ -12,7 +11,6 @@ from django.db import DatabaseError, connection
 from django.test.utils import CaptureQueriesContext
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database import owners
 from rehab.sessions.live.session import loading
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Remark, RobotEntry, Step
@@ -52,7 +50,7 @@ def plain(one: loading.LoadedSession) -> tuple[Any, ...]:
 
 
 def loaded(keys: list[int]) -> dict[int, loading.LoadedSession]:
-    found = loading.load_together(keys)
+    found = loading.load_together(dict.fromkeys(keys, 0))
     return {key: one for key, one in found.items() if isinstance(one, loading.LoadedSession)}
 
 
@@ -74,36 +72,31 @@ def test_sessions_loaded_together_are_what_each_is_alone():
         stored.checkpoint = None
         assert vars(one.aggregate.fold) == vars(SessionAggregate.load(stored).fold)
         assert plain(one) == plain(loaded([session.pk])[session.pk])
-        assert stored.owner == owners.own_name()
     assert [together[key].robot_stopped for key in keys] == [False, False, False, True]
     assert [len(together[key].recent) for key in keys] == [60, 5, 9, 0]
     assert [TrainingSession.everywhere.get(pk=key).last_number for key in keys] == [70, 5, 9, 0]
 
 
 def test_a_session_that_cannot_be_loaded_leaves_the_others_alone():
-    whole, damaged, elsewhere = (walk(build_place(name), 4) for name in ("elm", "oak", "ash"))
+    whole, damaged = (walk(build_place(name), 4) for name in ("elm", "oak"))
     Step.everywhere.filter(session=damaged, number=2).delete()
-    host, parent = owners.own_name().partition("|")[0], os.getppid()
-    owner = f"{host}|{parent}|{owners._start_time(parent)}"
-    TrainingSession.everywhere.filter(pk=elsewhere.pk).update(owner=owner)
-    found = loading.load_together([whole.pk, damaged.pk, elsewhere.pk, 0])
+    found = loading.load_together(dict.fromkeys([whole.pk, damaged.pk, 0], 0))
     assert isinstance(found[whole.pk], loading.LoadedSession)
     assert isinstance(found[damaged.pk], DamagedLog)
-    assert isinstance(found[elsewhere.pk], owners.OwnedElsewhere)
     assert isinstance(found[0], TrainingSession.DoesNotExist)
 
 
 def test_what_the_database_refuses_of_all_is_tried_of_each(monkeypatch):
     first, second = (walk(build_place(name), 2) for name in ("elm", "oak"))
-    claim = owners.claim
+    read = loading._read_steps
 
-    def fail(session: TrainingSession) -> str:
-        if session.pk == second.pk:
+    def fail(session_id: int, after: int) -> Any:
+        if session_id == second.pk:
             raise DatabaseError("locked")
-        return claim(session)
+        return read(session_id, after)
 
-    monkeypatch.setattr(owners, "claim", fail)
-    found = loading.load_together([first.pk, second.pk])
+    monkeypatch.setattr(loading, "_read_steps", fail)
+    found = loading.load_together(dict.fromkeys([first.pk, second.pk], 0))
     assert isinstance(found[first.pk], loading.LoadedSession)
     assert isinstance(found[second.pk], DatabaseError)
 
@@ -111,10 +104,8 @@ def test_what_the_database_refuses_of_all_is_tried_of_each(monkeypatch):
 def test_many_sessions_take_hardly_more_queries_than_one():
     keys = [walk(build_place(name), 2).pk for name in ("elm", "oak", "ash", "fir")]
     with CaptureQueriesContext(connection) as asked:
-        loading.load_together(keys)
-    for_each = 3 * len(keys)  # two to claim it, one for its latest steps
-    savepoint = 2
-    assert len(asked.captured_queries) <= for_each + savepoint + 4
+        loading.load_together(dict.fromkeys(keys, 0))
+    assert len(asked.captured_queries) <= len(keys) + 4  # one for each: its latest steps
 
 
 @pytest.mark.django_db(transaction=True)
@@ -125,14 +116,14 @@ async def test_sessions_asked_for_in_one_turn_are_loaded_together(place, begun, 
     await restart()
     together, load = [], loading.load_together
 
-    def note(session_ids):
-        together.append(sorted(session_ids))
-        return load(session_ids)
+    def note(epochs):
+        together.append(sorted(epochs))
+        return load(epochs)
 
     monkeypatch.setattr(loading, "load_together", note)
     runtime = runtimes.current()
     asked = [runtime.session(key) for key in (*keys, 0)]
     found = await asyncio.gather(*asked, return_exceptions=True)
-    assert together == [sorted([0, *keys])]
+    assert together == [sorted(keys)]
     assert [runtime.sessions[key] for key in keys] == found[:2]
     assert isinstance(found[2], TrainingSession.DoesNotExist)

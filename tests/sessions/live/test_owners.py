@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import pytest
@@ -21,9 +21,12 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session import loading
+from rehab.sessions.live.supervisor import source_name
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.ownership import ClinicOwner
 from tests.support.callers import a_step, change, reread, turns
+from tests.support.world import set_owner
 
 pytestmark = pytest.mark.postgres
 
@@ -63,35 +66,33 @@ def call_processes(monkeypatch: pytest.MonkeyPatch) -> threading.local:
     """Let threads stand for processes that all live; each says its name in what this gives."""
     process = threading.local()
     monkeypatch.setattr(owners, "own_name", lambda: process.name)
-    monkeypatch.setattr(owners, "is_alive", lambda owner: owner.startswith("process"))
+    monkeypatch.setattr(owners, "is_alive", lambda owner, _: owner.startswith("process"))
     return process
 
 
-async def test_of_two_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
-    session = await ready(place)
+async def test_of_two_that_claim_a_clinic_at_once_one_has_it(place, monkeypatch):
     process = call_processes(monkeypatch)
-    one, two = [await reread(session) for _ in range(2)]
-    refresh, refused = TrainingSession.refresh_from_db, list[Any]()
+    clinic_id, find, refused = place.clinic.pk, owners.find_elsewhere, list[Any]()
 
-    def refresh_late(read: TrainingSession, *args: Any, **options: Any) -> None:
-        if read is one and not refused:  # the other one comes as the first one reads back
+    def find_late(*args: Any) -> Any:
+        found = find(*args)
+        if process.name == "process|1|0" and not refused:  # the other one comes before it writes
             process.name = "process|2|0"
-            with pytest.raises(owners.OwnedElsewhere) as problem:
-                owners.claim(two)
-            refused.append(problem)
+            owners.claim(clinic_id)
             process.name = "process|1|0"
-        refresh(read, *args, **options)
+            refused.append(found)
+        return found
 
     def claim() -> None:
         process.name = "process|1|0"
-        owners.claim(one)
+        with pytest.raises(owners.OwnedElsewhere, match=r"another process \(2\)"):
+            owners.claim(clinic_id)
 
-    monkeypatch.setattr(TrainingSession, "refresh_from_db", refresh_late)
+    monkeypatch.setattr(owners, "find_elsewhere", find_late)
     await sync_to_async(claim)()
-    stored = await reread(session)
-    assert (stored.owner, stored.epoch) == ("process|1|0", session.epoch + 1)
-    assert (one.owner, one.epoch) == (stored.owner, stored.epoch)
-    assert refused
+    stored = await ClinicOwner.everywhere.aget(pk=clinic_id)
+    assert (stored.owner, stored.epoch) == ("process|2|0", 1)
+    assert refused == [None]
 
 
 FAKE_PS = """#!/bin/sh
@@ -129,17 +130,83 @@ def test_what_the_real_ps_tells(tmp_path, monkeypatch):
 
 
 async def own(session: TrainingSession, owner: str) -> None:
-    await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner=owner)
+    await sync_to_async(set_owner)(session.clinic_id, owner)
 
 
-async def test_a_session_is_claimed_from_the_dead_and_given_up_at_the_drain(place, ready):
+async def owner_of(session: TrainingSession) -> str:
+    return (await ClinicOwner.everywhere.aget(pk=session.clinic_id)).owner
+
+
+async def test_a_clinic_is_claimed_from_the_dead_and_released_at_the_drain(place, ready):
     session = await ready(place)
     await own(session, f"{HOST}|{dead_pid()}|5")
-    await runtimes.current().session(session.pk)
-    claimed = await reread(session)
-    assert (claimed.owner, claimed.epoch) == (owners.own_name(), session.epoch + 1)
+    live = await runtimes.current().session(session.pk)
+    assert (await owner_of(session), live.epoch) == (owners.own_name(), 1)
     await runtimes.current().drain()
-    assert (await reread(session)).owner == ""
+    assert await owner_of(session) == ""
+
+
+async def test_a_clinic_is_released_when_nobody_is_there(place, ready):
+    session, runtime = await ready(place), runtimes.current()
+    source = await place.source().open()
+    for _ in range(3):
+        await runtime.close_unused_clinics()
+    assert await owner_of(session) == owners.own_name()
+    await source.hang_up()
+    await runtime.close(runtime.sessions[session.pk])
+    for _ in range(2):
+        await runtime.close_unused_clinics()
+    assert await owner_of(session) == ""
+    assert (await (await place.source().dial()).hello())["session"] == session.pk
+    assert await owner_of(session) == owners.own_name()
+
+
+async def test_a_device_that_waits_has_its_clinic_here(place):
+    robot = await place.robot().dial()
+    assert (await robot.hello())["session"] is None
+    assert place.clinic.pk in runtimes.current().clinics
+
+
+async def test_a_clinic_that_another_process_took_is_dropped_with_all_its_sockets(
+    place, begun, bystander, monkeypatch
+):
+    session = await begun(place)
+    source, tablet = await place.source().open(), await place.tablet(session).open()
+    runtime, parent = runtimes.current(), os.getppid()
+    stopped: list[str] = []
+
+    async def stop(name: str) -> None:
+        stopped.append(name)
+
+    monkeypatch.setattr(runtime.supervisor, "stop", stop)
+    taken = ClinicOwner.everywhere.filter(pk=place.clinic.pk)
+    other = f"{HOST}|{parent}|{owners._start_time(parent)}"
+    await taken.aupdate(owner=other, epoch=7)
+    await source.say(a_step(1))
+    assert (await source.sent_away())[0] == 4011
+    assert (await tablet.sent_away())[0] == 4012
+    assert place.clinic.pk not in runtime.clinics
+    assert session.pk not in runtime.sessions
+    assert stopped == [source_name(session.pk)]
+    assert not await Step.everywhere.filter(session=session).aexists()
+    again = await place.tablet(session).dial()
+    assert (await again.sent_away())[0] == 4421
+
+
+async def test_a_clinic_without_an_open_session_moves_to_another_server(place, sourced):
+    session, source = await sourced(place)
+    tablet, runtime = await place.tablet(session).open(), runtimes.current()
+    await source.walk(4.0, 4.0)
+    await change(session, "pause")
+    await runtime.give_up(place.clinic.pk)  # it is open: nothing happens
+    assert await owner_of(session) == owners.own_name()
+    await change(session, "finish")
+    await runtime.give_up(place.clinic.pk)
+    assert await owner_of(session) == ""
+    assert (await source.sent_away())[0] == 4012
+    assert (await tablet.sent_away())[0] == 4012
+    assert session.pk not in runtime.sessions
+    assert (await place.tablet(session).watch())["number"] == 2
 
 
 # --- recovery -------------------------------------------------------------------------------------
@@ -195,7 +262,7 @@ async def test_a_session_of_a_dead_server_is_paused_by_whoever_takes_it_over(
     await source.say({"type": "hello", "version": 1, "run": "r1", "last": 3})
     assert (await source.sent_away())[0] == 4011
     stall.problem = None
-    assert (await reread(session)).owner == owners.own_name()
+    assert await owner_of(session) == owners.own_name()
     source = await place.source().dial()
     welcome = await source.hello()
     assert (welcome["state"], welcome["next"]) == ("paused", 4)
@@ -222,14 +289,15 @@ async def test_a_session_that_another_server_recovered_meanwhile_is_not_paused_a
     session = await left_running(place, begun, 1)
     with monkeypatch.context() as patch:
 
-        def fail(session_ids: Collection[int]) -> Any:
+        def fail(epochs: Mapping[int, int]) -> Any:
             raise DatabaseError("the connection was lost")
 
         patch.setattr(loading, "load_together", fail)
         assert await runtimes.current().recover() == 1
-    epoch = (await reread(session)).epoch + 1
-    row = TrainingSession.everywhere.filter(pk=session.pk)
-    await row.aupdate(owner=owners.HANDED_ON, epoch=epoch)  # there it was resumed, and handed on
+    runtimes.current().lose(place.clinic.pk)
+    # There it was resumed, and released.
+    await ClinicOwner.everywhere.filter(pk=place.clinic.pk).aupdate(owner=owners.HANDED_ON, epoch=9)
+    runtimes.current().recovery.forget(session.pk)
     live = await runtimes.current().session(session.pk)
     assert live.is_running
     assert not await SessionEvent.everywhere.filter(session=session, kind="pause").aexists()
@@ -255,31 +323,29 @@ async def test_a_client_that_does_not_listen_keeps_no_session_from_being_handed_
     monkeypatch.setattr(Socket, "close_now", lambda *_: listening.wait())
     await place.tablet(session).watch()
     await runtime.drain()
-    assert (await reread(session)).owner == owners.HANDED_ON
+    assert await owner_of(session) == owners.HANDED_ON
     listening.set()
 
 
-async def test_a_session_that_opens_again_while_it_is_closed_is_handed_on(
-    place, ready, monkeypatch
-):
+async def test_who_asks_for_a_clinic_while_it_is_released_gets_it_again(place, ready, monkeypatch):
     session, runtime = await ready(place), runtimes.current()
-    live = await runtime.session(session.pk)
+    await runtime.session(session.pk)
+    await change(session, "abort")
     release, may_release = owners.release, threading.Event()
 
-    def release_late(session_id: int, epoch: int) -> None:
+    def release_late(clinic_ids: Collection[int]) -> None:
         assert may_release.wait(10)
-        release(session_id, epoch)
+        release(clinic_ids)
 
     monkeypatch.setattr(owners, "release", release_late)
-    closing = asyncio.create_task(runtime.close(live))
+    leaving = asyncio.create_task(runtime.give_up(place.clinic.pk))
     await turns()
     opening = asyncio.create_task(runtime.session(session.pk))
     await turns()
+    assert not opening.done()
     may_release.set()
-    await asyncio.gather(closing, opening)
-    await change(session, "start")
-    await runtime.drain()
-    assert (await reread(session)).owner == owners.HANDED_ON
+    await asyncio.gather(leaving, opening)
+    assert await owner_of(session) == owners.own_name()
 
 
 async def test_the_drain_commits_and_closes_every_socket_with_4012(place, sourced, stall):
@@ -310,8 +376,8 @@ async def test_a_session_that_opens_during_the_drain_is_released(place, begun, m
     reading, may_read = threading.Event(), threading.Event()
     load = loading.load_together
 
-    def load_late(session_ids: Collection[int]) -> Any:
-        loaded = load(session_ids)
+    def load_late(epochs: Mapping[int, int]) -> Any:
+        loaded = load(epochs)
         reading.set()
         assert may_read.wait(10)
         return loaded
@@ -326,5 +392,5 @@ async def test_a_session_that_opens_during_the_drain_is_released(place, begun, m
         await runtimes.current().session(session.pk + 1)
     may_read.set()
     await draining
-    left = await reread(session)
-    assert (left.owner, left.state) == (owners.HANDED_ON, "running")
+    assert await owner_of(session) == owners.HANDED_ON
+    assert (await reread(session)).state == "running"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from rehab.sessions.log import Step
 from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
@@ -9,6 +11,7 @@ from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
 from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
+from rehab.training.valences import CueGestures
 from robot.wire.cue_limits import CueRule
 from tests.support.callers import a_step, events_of, restart
 
@@ -63,6 +66,18 @@ async def test_a_phase_without_the_robot_sends_it_no_steps(place, begun):
     robot, source = await place.robot().open(), await place.source().open()
     await source.walk(4.0, 5.0)
     assert (await robot.hear("step"))["number"] == 2
+
+
+@pytest.mark.parametrize("valence", ["positive", "explicit"])
+async def test_a_robot_hears_nothing_of_baseline_and_catch(place, begun, valence):
+    phases = (make_phase(kind, strides=1) for kind in ("baseline", "catch", "washout", "training"))
+    await begun(place, *phases, valence=valence, cue=CueGestures("joy", "disappointment"))
+    robot, source = await place.robot().dial(), await place.source().dial()
+    cue = (await robot.hello())["cue"]
+    assert cue["only_informs"] == (valence == "explicit")
+    await source.hello()
+    await source.walk(4.0, 5.0, 4.0, 5.0)
+    assert (await robot.hear("step"))["number"] == 4
 
 
 async def test_an_automatic_goal_is_told_logged_and_found_again(place, begun):

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection
 from typing import Any
 
 import pytest
-from asgiref.sync import sync_to_async
 from django.db import OperationalError
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import NotStored
-from rehab.sessions.live.session import commits, loading
+from rehab.sessions.live.session import commits
 from rehab.sessions.live.session import group_commit as writers
-from rehab.sessions.log import RobotEntry, SessionEvent
-from rehab.stations.models import Station
 from tests.support.callers import change, restart, turns
 from tests.support.robot_reports import ARM, STOP, is_stopped, log_of
 from tests.support.world import NOW
@@ -222,82 +218,6 @@ async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
     await other.wait_until_committed()
     assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
     assert (await here.session(first.pk)).robot_orders.is_stopped
-
-
-# --- stops at other servers -----------------------------------------------------------------------
-
-
-find_stopped = sync_to_async(loading.find_stopped)
-
-
-async def test_a_stop_that_came_while_a_session_was_loaded_is_found_in_the_database(
-    place, begun, monkeypatch
-):
-    session = await begun(place)
-    await restart()
-    here, load, station_id = runtimes.current(), loading.load_together, place.station.pk
-
-    def load_before_the_stop(session_ids: Collection[int]) -> Any:
-        loaded = load(session_ids)
-        Station.everywhere.filter(pk=station_id).update(robot_stopped=True)  # by another server
-        here.loop.call_soon_threadsafe(here.robots.stop_at, station_id, None, {})
-        return loaded
-
-    monkeypatch.setattr(loading, "load_together", load_before_the_stop)
-    robot = await place.robot().dial()
-    assert (await robot.hello())["stopped"] is False
-    await here.robots.stop_as_stored(find_stopped)
-    await robot.hear("stop")
-    live = await here.session(session.pk)
-    assert live.robot_orders.is_stopped
-    await live.wait_until_committed()
-    assert [row["kind"] for row in await log_of(session)] == ["robot_stop"]
-    await here.robots.stop_as_stored(find_stopped)  # it is known now
-    await live.wait_until_committed()
-    assert len(await log_of(session)) == 1
-
-
-async def test_what_was_stored_before_an_arming_does_not_undo_it(place, begun, stall):
-    session, here = await begun(place), runtimes.current()
-    robot, live = await place.robot().dial(), await here.session(session.pk)
-    await robot.hello()
-    orders = live.robot_orders
-    orders.stop(None, NOW, {})
-    await live.wait_until_committed()
-    stall.begin()
-    arming = orders.arm(place.pt, NOW)
-    await here.robots.stop_as_stored(find_stopped)
-    assert not orders.is_stopped
-    stall.end()
-    await arming
-    await robot.hear("arm")
-
-    async def find_what_was_between(station_ids: Collection[int]) -> Collection[int]:
-        orders.stop(None, NOW, {})
-        await orders.arm(place.pt, NOW)
-        return station_ids
-
-    await here.robots.stop_as_stored(find_what_was_between)
-    assert not orders.is_stopped
-    await here.robots.stop_as_stored(find_stopped)
-    assert not orders.is_stopped
-
-
-async def test_a_stop_is_stored_again_where_another_server_may_have_armed_the_robot(place, begun):
-    session, here = await begun(place), runtimes.current()
-    live, station = await here.session(session.pk), Station.everywhere.filter(pk=place.station.pk)
-    here.robots.stop(live, None, {})
-    await live.wait_until_committed()
-    await station.aupdate(robot_stopped=False)
-    here.robots.stop(live, None, {}, again=True)
-    await live.wait_until_committed()
-    assert (await station.aget()).robot_stopped
-    logged = SessionEvent.everywhere.filter(session=session, kind=RobotEntry.STOP)
-    assert await logged.acount() == 2
-    for _ in range(5):  # nobody has armed it since: nothing more is logged
-        here.robots.stop(live, None, {}, again=True)
-        await live.wait_until_committed()
-    assert await logged.acount() == 2
 
 
 ASKED = [

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+from asgiref.sync import sync_to_async
+
 from rehab.people.models import Clinic, User
 from rehab.sessions.events.snapshot import snapshot
-from rehab.sessions.live import runtime
+from rehab.sessions.live import orders, runtime
 from rehab.sessions.live.session import live_session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.training.changes import NotAllowed
 from rehab.training.controls import Audience
 from rehab.training.phases import make_phase
 from rehab.training.valences import CueGestures
-from tests.support.callers import events_of, restart, turns
-from tests.support.world import NOW
+from tests.support.callers import change, events_of, restart, turns
+from tests.support.world import NOW, set_owner
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
 
@@ -148,6 +152,24 @@ async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place,
     ]
 
 
+async def test_a_clinic_has_no_more_running_sessions_than_one_process_serves(
+    place, elsewhere, ready, begun, monkeypatch
+):
+    monkeypatch.setattr(orders, "MAX_RUNNING", 2)
+    await begun(elsewhere)
+    first, second, third = [await ready(place, at_station=False) for _ in range(3)]
+    await change(first, "start")
+    await change(second, "start")
+    with pytest.raises(NotAllowed, match="2 sessions of this clinic run already"):
+        await change(third, "start")
+    await change(second, "pause")
+    await change(third, "start")
+    with pytest.raises(NotAllowed):
+        await change(second, "resume")
+    await change(first, "finish")
+    await change(second, "resume")
+
+
 async def test_pages_hear_who_paused_a_session(place, begun):
     session = await begun(place)
     tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
@@ -160,7 +182,7 @@ async def test_pages_hear_who_paused_a_session(place, begun):
     await monitor.change("resume")
     await runtime.current().drain()
     runtime._current = None
-    await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner="gone|1|1")  # a crash
+    await sync_to_async(set_owner)(session.clinic_id, "gone|1|1")  # a crash
     await runtime.current().recover()
     shown = await place.monitor(session).watch()
     assert (shown["state"], shown["pause_reason"]) == ("paused", "restart")

@@ -102,7 +102,7 @@ async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_th
     monkeypatch.setattr(settings, "METRICS_TOKEN", "a token")
     assert "garry_ready 1.0" in await figures()
     with monkeypatch.context() as cut_off:
-        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True, silent_s=0.0))
+        cut_off.setattr(runtime, "servers", SimpleNamespace(is_isolated=True))
         assert "cut off" in (await health("/readyz"))[1]
         assert "garry_ready 0.0" in await figures()
     with monkeypatch.context() as expired:
@@ -216,7 +216,7 @@ def test_locks_of_a_server_that_is_gone_are_released(transactional_db, monkeypat
         with gone.cursor() as cursor:
             cursor.execute("BEGIN")
             cursor.execute("LOCK TABLE rehab_trainingsession")
-        assert TrainingSession.everywhere.update(owner="another") == 0  # waits, at most 10 s
+        assert TrainingSession.everywhere.update(source="another") == 0  # waits, at most 10 s
         with pytest.raises(DatabaseError, match="idle-in-transaction"), gone.cursor() as cursor:
             cursor.execute("COMMIT")
         with connection.cursor() as cursor:

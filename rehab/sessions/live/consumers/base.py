@@ -16,12 +16,14 @@ from rehab.people.rate_limits import TokenBucket
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
+from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.protocol.messages import read_frame
 from rehab.sessions.live.protocol.outgoing import Outbox
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
+from rehab.sessions.replay import DamagedLog
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame
 
@@ -37,13 +39,12 @@ def _cannot_write(_: str) -> bool:
 
 
 class CloseSocket(Exception):
-    """Closes a socket with a code, after an error message. ``more``: what else the error has."""
+    """Closes a socket with a code, after an error message."""
 
-    def __init__(self, code: int, error: str, message: str, **more: str) -> None:
+    def __init__(self, code: int, error: str, message: str) -> None:
         super().__init__(message)
         self.code = code
         self.error = error
-        self.more = more
 
 
 class Socket(AsyncWebsocketConsumer):
@@ -57,6 +58,7 @@ class Socket(AsyncWebsocketConsumer):
 
     live: LiveSession | None = None
     actor: Actor = None  # once authenticated
+    clinic_id: int | None = None  # once it is known
     first_frame_s = FIRST_FRAME_S
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
@@ -144,9 +146,14 @@ class Socket(AsyncWebsocketConsumer):
         except BadFrame as problem:
             await self.close_with_error(CloseCode.NOT_PROTOCOL, problem.code, str(problem))
         except CloseSocket as problem:
-            await self.close_with_error(problem.code, problem.error, str(problem), **problem.more)
+            await self.close_with_error(problem.code, problem.error, str(problem))
         except runtimes.Draining:
             await self.close_now(CloseCode.RESTARTING)
+        except OwnedElsewhere as problem:
+            more = {"server": problem.server} if problem.server else {}
+            await self.close_with_error(CloseCode.ELSEWHERE, "elsewhere", str(problem), **more)
+        except DamagedLog as problem:
+            await self.close_with_error(CloseCode.NO_SESSION, "damaged_log", str(problem))
         except NotStored as problem:
             await self.close_with_error(CloseCode.NOT_STORED, "not_stored", str(problem))
         except DatabaseError as problem:

@@ -17,12 +17,10 @@ from rehab.sessions.live.auth import (
     take_successor,
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
-from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.protocol.messages import read_frame
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
-from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES
 from robot.wire.close_codes import CloseCode
@@ -113,6 +111,8 @@ class DeviceSocket(Socket):
         self.hello_received = True
         self._first_frame_timer.cancel()
         device = self._authorize(self.device)
+        self.clinic_id = device.clinic_id
+        await self.runtime.clinics.own(device.clinic_id)
         self.runtime.devices.add(device.station_id, self)
         found = await find_open_session(device, session_id)
         if found is not None:
@@ -139,16 +139,8 @@ class DeviceSocket(Socket):
             self.start(self._offer_token())
 
     async def _attach(self, session_id: int) -> None:
-        try:
-            # Settled: nothing may come between taking the slot and the welcome.
-            live = await self.runtime.session_for_device(session_id, self.slot)
-        except OwnedElsewhere as problem:
-            servers = self.runtime.servers
-            address = servers.address_of(problem.owner) if servers is not None else ""
-            more = {"server": address} if address else {}
-            raise CloseSocket(CloseCode.ELSEWHERE, "elsewhere", str(problem), **more) from None
-        except DamagedLog as problem:
-            raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
+        # Settled: nothing may come between taking the slot and the welcome.
+        live = await self.runtime.settled_session(session_id)
         other: ConnectedDevice | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:

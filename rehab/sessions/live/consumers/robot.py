@@ -82,7 +82,7 @@ class RobotConsumer(DeviceSocket):
             return
         if report.get("kind") == "stop":  # a sensor or its button: a person has to check it
             details = {"device": self.device_id, "reason": report["reason"]}
-            self.runtime.stop_robots(self.live, None, details)
+            self.runtime.robots.stop(self.live, None, details)
         else:
             self.live.robot_orders.record_report(report, timezone.now())
 

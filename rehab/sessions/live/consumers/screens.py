@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Awaitable
 from typing import ClassVar
 
@@ -20,9 +19,8 @@ from rehab.sessions.events.event import to_text
 from rehab.sessions.events.snapshot import history_entry
 from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
-from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
-from rehab.sessions.live.orders import ArmOrder, ChangeOrder, Order, RemarkOrder, StopOrder
+from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder
 from rehab.sessions.live.protocol.backlog import read_backlog
 from rehab.sessions.live.protocol.messages import (
     read_after,
@@ -32,25 +30,15 @@ from rehab.sessions.live.protocol.messages import (
     read_seen,
 )
 from rehab.sessions.live.robot_permissions import RobotOrder, read_robot_order
-from rehab.sessions.live.servers.following import FollowedSession
 from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
-from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame, read_name, read_number, read_whole
-
-log = logging.getLogger(__name__)
-
-# For programs; pages have their own words.
-_NOT_DELIVERED = {
-    "stop": "The stop did not arrive. If the robot moves, use its own switch.",
-    "arm": "The order did not arrive. Try again.",
-}
 
 
 class ScreenConsumer(Socket):
@@ -80,12 +68,8 @@ class ScreenConsumer(Socket):
             raise CloseSocket(
                 CloseCode.NO_SESSION, "elsewhere", "The patient has not agreed to remote view."
             )
-        try:
-            self.live = live = await self.runtime.viewed_session(session_id)
-        except OwnedElsewhere as problem:
-            raise CloseSocket(CloseCode.ELSEWHERE, "elsewhere", str(problem)) from None
-        except DamagedLog as problem:
-            raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
+        self.live = live = await self.runtime.session(session_id)
+        self.clinic_id = live.clinic_id
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_seen_at = timezone.now()
@@ -232,44 +216,23 @@ class ScreenConsumer(Socket):
             self._drive_robot(message)
             return
         live, actor = self._open_session(), self.actor
-        order: ArmOrder | StopOrder
-        if isinstance(actor, User):
-            order = ArmOrder(actor) if wanted is RobotOrder.ARM else StopOrder(actor)
+        if wanted is RobotOrder.ARM and isinstance(actor, User):
+            # In a task, so that a stop meanwhile does not wait.
+            self.start(self.runtime.robots.arm(live, actor))
         else:
-            order = StopOrder(None, {"device": actor.pk} if actor is not None else {})
-        if isinstance(live, FollowedSession):
-            self.run_to_end(self._order_at_owner(live, order, wanted))
-        elif isinstance(order, StopOrder):
-            self.runtime.stop_robots(live, order.by, order.details)
-        else:  # in a task, so that a stop meanwhile does not wait
-            self.start(self.runtime.robots.arm(live, order.by))
+            person = actor if isinstance(actor, User) else None
+            device = {"device": actor.pk} if isinstance(actor, Device) else {}
+            self.runtime.robots.stop(live, person, device)
         # Queued: no robot waits for the audit log.
         act = Act(f"robot_{wanted}")
         self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
-
-    async def _order_at_owner(
-        self, live: FollowedSession, order: ArmOrder | StopOrder, wanted: RobotOrder
-    ) -> None:
-        """Have the session's owner order its robot; report where it does not answer."""
-        servers = self.runtime.servers
-        if servers is None:
-            return
-        try:
-            await servers.order(live.owner, live.id, order)
-        except NotStored as problem:
-            log.error("Session %s: %s did not arrive: %s", live.id, wanted, problem)
-            undelivered = {"type": "error", "code": "robot_unheard", "order": wanted}
-            await self.send_message(undelivered | {"message": _NOT_DELIVERED[wanted]})
 
     def _drive_robot(self, message: Message) -> None:
         """Pass on that a person holds a button to drive the robot to its mark."""
         shares = {"ahead": (0, 1), "left": (-1, 1)}
         drive = {name: read_number(message, name, *ends) for name, ends in shares.items()}
-        live, servers = self.live, self.runtime.servers
-        if isinstance(live, FollowedSession) and servers is not None:
-            servers.drive_robot(live.owner, live.id, drive)
-        elif live is not None:
-            self.runtime.robots.drive(live.id, drive)
+        if self.live is not None and self.runtime.may_move_robots:
+            self.runtime.robots.drive(self.live.id, drive)
 
     async def _refuse(self, request_id: str, code: str, message: str) -> None:
         await self.send_message(

@@ -1,9 +1,7 @@
 """The lease of a hosted server: others own nothing of it while it is valid.
 
 A row each, renewed every second by a thread with a connection of its own, and judged by the
-database's clock alone: names of hosts and numbers of processes mean nothing. A server without
-Redis shares its database with no other: live sessions are in the memory of one process, and two
-that cannot exchange messages would send pages and robots half of what happens.
+database's clock alone: names of hosts and numbers of processes mean nothing.
 """
 
 from __future__ import annotations
@@ -12,8 +10,9 @@ import logging
 import threading
 import time
 import uuid
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from contextlib import contextmanager
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from django.db import DatabaseError, InterfaceError, connection
@@ -27,12 +26,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-LEASE_S = 5.0  # after so long without a renewal a server's sessions are taken over
+LEASE_S = 5.0  # after so long without a renewal a server's clinics are taken over
 RENEW_S = 1.0
-WAIT_S = 45.0  # longer than a server takes to stop (process.STOP_S)
-RETRY_S = 0.25
 TIMEOUT_MS = 2_000  # a database that is stuck
-KEY = 0x67_61_72_72_79  # "garry": advisory locks are numbers. Held while a server enters
 
 # A lease that ends later than any server asks for is from before the database's clock was set back.
 VALID = f"""
@@ -40,32 +36,28 @@ expires_at > clock_timestamp()
 AND expires_at < clock_timestamp() + {2 * LEASE_S} * interval '1 second'
 """
 ENTER = """
-INSERT INTO rehab_server (id, address, shares, expires_at)
-VALUES (%(id)s, %(address)s, %(shares)s, clock_timestamp() + %(for)s * interval '1 second')
-ON CONFLICT (id) DO UPDATE SET expires_at = EXCLUDED.expires_at
+INSERT INTO rehab_server (id, address, ready, expires_at)
+VALUES (%(id)s, %(address)s, %(ready)s, clock_timestamp() + %(for)s * interval '1 second')
+ON CONFLICT (id) DO UPDATE SET ready = EXCLUDED.ready, expires_at = EXCLUDED.expires_at
 """
 RENEW = f"""
-UPDATE rehab_server SET expires_at = clock_timestamp() + %(for)s * interval '1 second'
+UPDATE rehab_server
+SET ready = %(ready)s, expires_at = clock_timestamp() + %(for)s * interval '1 second'
 WHERE id = %(id)s AND {VALID}
 """  # noqa: S608
 FORGET = """
 DELETE FROM rehab_server WHERE expires_at
 NOT BETWEEN clock_timestamp() - interval '1 hour' AND clock_timestamp() + interval '1 hour'
 """
-EXCLUDING = f"""
-SELECT address FROM rehab_server WHERE id <> %(id)s AND {VALID} AND NOT (shares AND %(shares)s)
-"""  # noqa: S608
-
-
-class AnotherServer(RuntimeError):
-    """A server runs on the database that cannot share it; the message has the cure."""
+SERVERS = f"SELECT id, address, ready FROM rehab_server WHERE {VALID}"  # noqa: S608
 
 
 class Server(NamedTuple):
-    """Another server: its id, and the address by which a proxy reaches it."""
+    """A server: its id, the address by which a proxy reaches it, and whether it takes clinics."""
 
     id: str
     address: str
+    ready: bool
 
 
 _held: Lease | None = None
@@ -79,8 +71,21 @@ def held() -> Lease | None:
 def valid_servers() -> list[Server]:
     """Return the servers whose lease is valid."""
     with connection.cursor() as cursor:
-        cursor.execute(f"SELECT id, address FROM rehab_server WHERE {VALID}")  # noqa: S608
+        cursor.execute(SERVERS)
         return [Server(*row) for row in cursor.fetchall()]
+
+
+def find_place(clinic_id: int, servers: Collection[Server]) -> Server | None:
+    """Return the server that a clinic belongs to while nobody has it; None where none is ready.
+
+    By rendezvous hashing: all servers agree without a word, and where one comes or goes only its
+    share of the clinics moves.
+    """
+
+    def weigh(server: Server) -> tuple[bytes, str]:
+        return sha256(f"{clinic_id} {server.address}".encode()).digest(), server.id
+
+    return max((server for server in servers if server.ready), key=weigh, default=None)
 
 
 class Lease:
@@ -90,20 +95,14 @@ class Lease:
     ----------
     address
         How a proxy reaches the server: host and port.
-    shares
-        Whether the server exchanges messages with others on its database (by Redis).
-    on_excluded
-        Called, on that thread, where another server has the database and one of them cannot share
-        it: this one must end. Steps are safe meanwhile: each session's epoch prevents an earlier
-        owner from writing.
     """
 
-    def __init__(self, address: str, *, shares: bool, on_excluded: Callable[[], None]) -> None:
+    def __init__(self, address: str) -> None:
         self.id = uuid.uuid4().hex
         self.address = address
-        self.shares = shares
+        self.is_ready = False  # for clinics; others learn of it with the next renewal
         self.entered = 0  # how often: more than once where it expired meanwhile
-        self._on_excluded = on_excluded
+        self.servers: list[Server] = []  # that were valid when it was renewed last
         self._connection: BaseDatabaseWrapper | None = None
         self._renewed_s = 0.0  # by the monotonic clock
         self._unbroken_since_s = 0.0
@@ -121,8 +120,6 @@ class Lease:
 
         After an outage each server renews its lease within a second; until then none is gone.
         """
-        if not self.shares:
-            return True  # there was no other when it entered
         now_s = time.monotonic()
         return self.is_current and now_s - self._unbroken_since_s > 2 * RENEW_S
 
@@ -132,29 +129,12 @@ class Lease:
         Where this one is not among them either, the database's clock was set: all leases expired
         at once, and each server renews its own within a second.
         """
-        return self.may_judge and (not self.shares or self.id in valid_ids)
+        return self.may_judge and self.id in valid_ids
 
-    def acquire(self, wait_s: float = WAIT_S) -> None:
-        """Enter, once no server is there that cannot share the database; then stay.
-
-        Raises AnotherServer where that takes longer than ``wait_s``, and DatabaseError where
-        nothing answers.
-        """
+    def acquire(self) -> None:
+        """Enter, then stay. Raises DatabaseError where nothing answers."""
         global _held  # noqa: PLW0603 (one lease a process)
-        deadline_s = time.monotonic() + wait_s
-        waited = False
-        while not self._enter():
-            if time.monotonic() > deadline_s:
-                self._disconnect()
-                raise AnotherServer(
-                    "Another server runs on this database, and not both have Redis, by which "
-                    "several exchange messages. Stop the other one, set the same GARRY_REDIS_URL "
-                    "for all, or give this one a database of its own (GARRY_DATABASE_URL)."
-                )
-            if not waited:
-                log.warning("Another server runs on this database; waiting until it has ended.")
-                waited = True
-            time.sleep(RETRY_S)
+        self._enter()
         _held = self
         self._thread.start()
 
@@ -174,40 +154,35 @@ class Lease:
 
     def _renew(self) -> None:
         while not self._closing.wait(RENEW_S):
+            began_s = time.monotonic()
             try:
                 if self._execute(RENEW):
-                    self._renewed_s = time.monotonic()
-                elif not self._enter():
-                    log.critical("Another server has taken this database; this one ends.")
-                    self._on_excluded()
-                    return
+                    self._renewed_s = began_s
+                else:
+                    self._enter()
+                self._read_servers()
             except (DatabaseError, InterfaceError) as problem:
                 log.warning("The server's lease could not be renewed: %s", problem)
                 self._disconnect()
 
-    def _enter(self) -> bool:
-        """Write the row, unless a server is there that excludes this one or is excluded by it."""
-        with self._cursor() as cursor:
-            cursor.execute("SELECT pg_advisory_lock(%s)", [KEY])  # one at a time
-            try:
-                cursor.execute(EXCLUDING, self._parameters)
-                if cursor.fetchone() is not None:
-                    return False
-                cursor.execute(FORGET)
-                cursor.execute(ENTER, self._parameters)
-            finally:
-                cursor.execute("SELECT pg_advisory_unlock(%s)", [KEY])
-        self._renewed_s = self._unbroken_since_s = time.monotonic()
-        self.entered += 1
-        return True
+    def _enter(self) -> None:
+        """Write the row."""
+        began_s = time.monotonic()
+        self._execute(FORGET)
+        self._execute(ENTER)
+        self.entered += 1  # first: what others took meanwhile is dropped before robots move again
+        self._renewed_s = self._unbroken_since_s = began_s
+        self._read_servers()
 
-    @property
-    def _parameters(self) -> dict[str, Any]:
-        return {"id": self.id, "address": self.address, "shares": self.shares, "for": LEASE_S}
+    def _read_servers(self) -> None:
+        with self._cursor() as cursor:
+            cursor.execute(SERVERS)
+            self.servers = [Server(*row) for row in cursor.fetchall()]
 
     def _execute(self, statement: str) -> int:
+        given = {"id": self.id, "address": self.address, "ready": self.is_ready, "for": LEASE_S}
         with self._cursor() as cursor:
-            cursor.execute(statement, self._parameters)
+            cursor.execute(statement, given)
             return int(cursor.rowcount)
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""Ownership of sessions: which process writes one. Each claim raises the epoch, a fencing token.
+"""Ownership of clinics: which process writes their sessions. Each claim raises a fencing token.
 
 Hosted servers are named by their lease; elsewhere, and for commands, the process itself is asked
 for.
@@ -12,45 +12,71 @@ import subprocess
 from collections.abc import Collection
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from django.conf import settings
 from django.db import connection
+from django.db.models import Exists, OuterRef
 
 from rehab.sessions.live.database import lease
+from rehab.sessions.live.database.lease import Server
 from rehab.sessions.log import noted_end
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.ownership import ClinicOwner
 from rehab.training.changes import State
 
 PROC_DIR = Path("/proc")
-HANDED_ON = "handed on"  # the owner of a session that runs, whose process was stopped in order
-# The previous owner may have written these since the session was read.
-WRITTEN_BY_OWNER = ("checkpoint", "last_number", "state", "started_at", "ended_at")
-
-
-LEFT = """
-SELECT id, owner, false FROM rehab_trainingsession
-WHERE owner > '' AND owner <> %(own)s AND state = %(running)s
-"""
-# Without those of servers whose lease is valid; and whether this one's is.
+HANDED_ON = "handed on"  # the owner of a clinic that was released while sessions ran
+FREE = ("", HANDED_ON)
+# Of servers: by the index of owners. It costs what dead servers had, whatever others have.
 LEFT_BY_SERVERS = f"""
-SELECT id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {lease.VALID})
-FROM rehab_trainingsession
-WHERE owner > '' AND owner <> %(own)s AND state = %(running)s
-AND NOT EXISTS (SELECT 1 FROM rehab_server WHERE id = owner AND {lease.VALID})
+SELECT clinic_id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {lease.VALID})
+FROM rehab_clinicowner
+WHERE owner = ANY (ARRAY(
+    SELECT id FROM rehab_server WHERE NOT ({lease.VALID}) UNION ALL SELECT %(handed_on)s
+))
 """  # noqa: S608
+# Also of those that have no lease at all: a database may be a copy, or older than they are.
+LEFT_BY_ANY = f"""
+WITH valid AS MATERIALIZED (SELECT id FROM rehab_server WHERE {lease.VALID})
+SELECT clinic_id, owner, EXISTS (SELECT 1 FROM valid WHERE id = %(own)s) FROM rehab_clinicowner
+WHERE owner NOT IN ('', %(own)s) AND NOT EXISTS (SELECT 1 FROM valid WHERE id = owner)
+"""  # noqa: S608
+LEFT_BY_PROCESSES = """
+SELECT clinic_id, owner, false FROM rehab_clinicowner WHERE owner NOT IN ('', %(own)s)
+"""
 
 
 class OwnedElsewhere(RuntimeError):
-    """Another process is running the session; the message names it. ``owner``: its name."""
+    """Another process has the clinic. ``server``: its address for the proxy, if it is a server."""
 
-    def __init__(self, session_id: int, owner: str) -> None:
+    def __init__(self, owner: str, server: str = "") -> None:
         super().__init__(
-            f"Session {session_id} is run by another process ({owner.split('|')[1]}). Wait until "
+            f"The clinic's sessions are run by another process ({owner.split('|')[1]}). Wait until "
             "it has ended, or stop that process."
             if "|" in owner
-            else f"Session {session_id} is run by another server. Try again in a moment."
+            else "The clinic's sessions are run by another server. Try again in a moment."
         )
-        self.owner = owner
+        self.server = server
+
+
+class Claim(NamedTuple):
+    """A clinic that this process has claimed.
+
+    Attributes
+    ----------
+    epoch
+        Under which it writes.
+    running
+        The clinic's sessions that run.
+    is_orphaned
+        Whether the process that had the clinic died; else it had released it.
+    """
+
+    clinic_id: int
+    epoch: int
+    running: list[int]
+    is_orphaned: bool
 
 
 def _start_time(pid: int) -> str:
@@ -79,11 +105,15 @@ def own_name() -> str:
     return f"{socket.gethostname()}|{os.getpid()}|{_own_start_time(os.getpid())}"
 
 
-def is_alive(owner: str) -> bool:
-    """Return whether an owner's process runs, or that cannot be known."""
+def is_alive(owner: str, servers: Collection[Server] | None = None) -> bool:
+    """Return whether an owner's process runs, or that cannot be known.
+
+    ``servers``: those whose lease is valid, if they were read already.
+    """
     own = lease.held()
-    if owner and settings.HOSTED and owner != HANDED_ON and "|" not in owner:
-        valid_ids = {server.id for server in lease.valid_servers()}
+    if owner and settings.HOSTED and "|" not in owner:
+        valid = lease.valid_servers() if servers is None else servers
+        valid_ids = {server.id for server in valid}
         return owner in valid_ids or not (own is None or own.may_judge_by(valid_ids))
     try:
         host, pid, started = owner.split("|")
@@ -101,55 +131,76 @@ def is_alive(owner: str) -> bool:
     return _start_time(int(pid)) == started
 
 
-def claim(session: TrainingSession) -> str:
-    """Make this process the session's writer; return the previous owner, if any.
+def _has_leases() -> bool:
+    return settings.HOSTED and connection.vendor == "postgresql"
 
-    Of several that try at once one succeeds. Raises OwnedElsewhere while another process runs it.
+
+def find_elsewhere(clinic_id: int, owner: str | None = None) -> OwnedElsewhere | None:
+    """Return who has a clinic, or is to have it, where that is not this process.
+
+    ``owner``: as it is stored, if it was read already.
     """
+    if owner is None:
+        rows = ClinicOwner.everywhere.filter(pk=clinic_id)
+        owner = rows.values_list("owner", flat=True).first() or ""
+    servers = lease.valid_servers() if _has_leases() else []
+    if owner in FREE and lease.held() is not None:
+        place = lease.find_place(clinic_id, servers)
+        owner = own_name() if place is None else place.id
+    if owner in (*FREE, own_name()) or not is_alive(owner, servers):
+        return None
+    addresses = {server.id: server.address for server in servers}
+    return OwnedElsewhere(owner, addresses.get(owner, ""))
+
+
+def claim(clinic_id: int) -> Claim:
+    """Make this process the writer of a clinic's sessions.
+
+    Of several that try at once one succeeds. Raises OwnedElsewhere while another process has the
+    clinic, or a clinic that nobody has belongs to another server.
+    """
+    ClinicOwner.everywhere.get_or_create(pk=clinic_id)
     while True:
-        previous = session.owner
-        if previous and previous != own_name() and is_alive(previous):
-            raise OwnedElsewhere(session.pk, previous)
-        still = TrainingSession.everywhere.filter(pk=session.pk, epoch=session.epoch)
-        if still.update(epoch=session.epoch + 1, owner=own_name()):
-            session.epoch, session.owner = session.epoch + 1, own_name()
-            session.refresh_from_db(fields=WRITTEN_BY_OWNER)
-            return previous
-        session.refresh_from_db(fields=["epoch", "owner"])  # another process was faster
+        row = ClinicOwner.everywhere.get(pk=clinic_id)
+        if (problem := find_elsewhere(clinic_id, row.owner)) is not None:
+            raise problem
+        still = ClinicOwner.everywhere.filter(pk=clinic_id, epoch=row.epoch)
+        if still.update(epoch=row.epoch + 1, owner=own_name()):  # else another was faster
+            there = TrainingSession.everywhere.filter(clinic=clinic_id, state=State.RUNNING.value)
+            running = list(there.order_by("pk").values_list("pk", flat=True))
+            return Claim(clinic_id, row.epoch + 1, running, row.owner not in (*FREE, own_name()))
 
 
-def release(session_id: int, epoch: int) -> None:
-    """Release the session, so that any process can claim it."""
-    held = TrainingSession.everywhere.filter(pk=session_id, epoch=epoch)
-    held.update(owner="", last_number=noted_end())
+def note_ends(session_ids: Collection[int]) -> None:
+    """Note where the logs of these sessions end."""
+    TrainingSession.everywhere.filter(pk__in=session_ids).update(last_number=noted_end())
 
 
-def hand_on(session_id: int, epoch: int) -> bool:
-    """Release a session for another process that waits for it; False where it is not ours now."""
-    held = TrainingSession.everywhere.filter(pk=session_id, epoch=epoch, owner=own_name())
-    running = held.filter(state=State.RUNNING.value)
-    end = noted_end()
-    return bool(running.update(owner=HANDED_ON, last_number=end)) or bool(
-        held.update(owner="", last_number=end)
-    )
+def release(clinic_ids: Collection[int]) -> None:
+    """Release clinics that this process has, so that any other can claim them."""
+    held = ClinicOwner.everywhere.filter(pk__in=clinic_ids, owner=own_name())
+    running = TrainingSession.everywhere.filter(clinic=OuterRef("pk"), state=State.RUNNING.value)
+    held.filter(Exists(running)).update(owner=HANDED_ON)
+    held.update(owner="")
 
 
-def release_all(held: Collection[int]) -> None:
-    """Release the sessions that this process has; hand those on that run."""
-    own = TrainingSession.everywhere.filter(pk__in=held, owner=own_name())
-    own.filter(state=State.RUNNING.value).update(owner=HANDED_ON, last_number=noted_end())
-    own.update(owner="", last_number=noted_end())
+def find_taken(epochs: dict[int, int]) -> set[int]:
+    """Return the clinics, given with their epochs, that another process has claimed since."""
+    stored = dict(ClinicOwner.everywhere.filter(pk__in=epochs).values_list("pk", "epoch"))
+    return {key for key, epoch in epochs.items() if stored.get(key) != epoch}
 
 
-def find_ownerless() -> tuple[list[int], list[int]]:
-    """Return the running sessions whose process died, and those that one handed on.
+def find_ownerless(*, thorough: bool = True) -> tuple[list[int], list[int]]:
+    """Return the clinics whose process died, and those that one released while sessions ran.
 
-    One statement, however many servers there are and whatever they run.
+    One statement, however many servers there are and whatever they have. ``thorough``: also where
+    the dead one has left no lease.
     """
-    has_leases = settings.HOSTED and connection.vendor == "postgresql"
+    statement = LEFT_BY_PROCESSES
+    if has_leases := _has_leases():
+        statement = LEFT_BY_ANY if thorough else LEFT_BY_SERVERS
     with connection.cursor() as cursor:
-        names = {"own": own_name(), "running": State.RUNNING.value}
-        cursor.execute(LEFT_BY_SERVERS if has_leases else LEFT, names)
+        cursor.execute(statement, {"own": own_name(), "handed_on": HANDED_ON})
         left = sorted(cursor.fetchall())
     own = lease.held()
     may_judge = own is None or (own.may_judge and any(is_valid for _, _, is_valid in left))
@@ -160,3 +211,10 @@ def find_ownerless() -> tuple[list[int], list[int]]:
     dead = {owner for _, owner, _ in left if owner != HANDED_ON and is_dead(owner)}
     orphaned = [key for key, owner, _ in left if owner in dead]
     return orphaned, [key for key, owner, _ in left if owner == HANDED_ON]
+
+
+def belongs_here(clinic_id: int) -> bool:
+    """Return whether it is this process's to take a clinic that was left."""
+    own = lease.held()
+    place = lease.find_place(clinic_id, own.servers) if own is not None else None
+    return place is None or place.id == own_name()

@@ -32,16 +32,7 @@ class StepRow(NamedTuple):
     late: bool = False  # not shown as live
 
 
-class RepeatedStop(NamedTuple):
-    """An order to stop a robot that is stopped already, as far as this server knows.
-
-    It is logged only where another server has armed the robot meanwhile.
-    """
-
-    event: SessionEvent
-
-
-Row = StepRow | SessionEvent | RepeatedStop | SessionMetric
+Row = StepRow | SessionEvent | SessionMetric
 CHECKPOINT_STEPS = 100
 MARKS = 100  # the newest; more would hide the strides
 Summary = dict[str, Any]

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import msgspec
 from django.db import connection, transaction
 
-from rehab.sessions.live.session.aggregate import RepeatedStop, Row, StepRow, Summary
+from rehab.sessions.live.session.aggregate import Row, StepRow, Summary
 from rehab.sessions.log import (
     RobotEntry,
     SessionEvent,
@@ -41,9 +41,9 @@ COPIED_ROWS = 4  # from so many on PostgreSQL's COPY is quicker than INSERT
 # Compared before each commit. Reading a log's end from the steps' index is cheaper than raising a
 # number in the session's row, which is wide and is then rewritten whole (docs/performance.md).
 LOG_ENDS = (
-    "SELECT id, epoch, "
-    "(SELECT MAX(number) FROM rehab_step WHERE session_id = rehab_trainingsession.id) AS last "
-    "FROM rehab_trainingsession WHERE id IN ({marks})"
+    "SELECT one.id, epoch, (SELECT MAX(number) FROM rehab_step WHERE session_id = one.id) AS last "
+    "FROM rehab_trainingsession AS one JOIN rehab_clinicowner AS its USING (clinic_id) "
+    "WHERE one.id IN ({marks})"
 )
 # From SQLite in one row: its module gives up the interpreter's lock for each, and the event loop
 # takes it meanwhile.
@@ -77,7 +77,7 @@ def _insert_statement(count: int, mark: str) -> str:
 
 
 class Fenced(RuntimeError):
-    """Another process has claimed the session; this one must not write to it."""
+    """Another process has claimed the clinic; this one must not write to its sessions."""
 
 
 class LogDiffers(RuntimeError):
@@ -108,17 +108,15 @@ class Job(NamedTuple):
 def commit(jobs: Sequence[Job]) -> None:
     """Write jobs, in their order, in one transaction.
 
-    Raises Fenced if a session has another owner, LogDiffers if steps do not follow those that are
-    stored, and the database's errors; nothing is written then.
+    Raises Fenced if a session's clinic has another owner, LogDiffers if steps do not follow those
+    that are stored, and the database's errors; nothing is written then.
     """
     steps = [row for job in jobs for row in job.rows if isinstance(row, StepRow)]
     epochs = {job.session_id: job.epoch for job in jobs}
     with transaction.atomic():
         _check_logs(epochs, _find_first_numbers(steps))
         _insert_steps(steps)
-        repeated = [row.event for job in jobs for row in job.rows if isinstance(row, RepeatedStop)]
-        events = [event for event in repeated if _is_armed(event.session.station_id)]
-        events += [row for job in jobs for row in job.rows if isinstance(row, SessionEvent)]
+        events = [row for job in jobs for row in job.rows if isinstance(row, SessionEvent)]
         if events:
             SessionEvent.everywhere.bulk_create(events)
             _note_robot_orders(events)
@@ -141,13 +139,6 @@ def _announce_figures(patients: set[int]) -> None:
             figures_stored.send(SessionMetric, patients=patients)
     except Exception:
         log.exception("Boards miss new figures; they follow within a day.")
-
-
-def _is_armed(station_id: int | None) -> bool:
-    """Return whether a station's robot may move by what is stored."""
-    if station_id is None:  # the session looks into its own log
-        return False
-    return Station.everywhere.filter(pk=station_id, robot_stopped=False).exists()
 
 
 def _note_robot_orders(events: Sequence[SessionEvent]) -> None:
@@ -190,10 +181,10 @@ def _check_logs(epochs: dict[int, int], firsts: dict[int, int]) -> None:
             cursor.execute(IN_ONE_ROW.format(select=select), list(epochs))
             stored = _from_json(cursor.fetchone()[0])
         else:  # other transactions run at the same time: they must not claim it now
-            cursor.execute(f"{select} FOR SHARE", list(epochs))
+            cursor.execute(f"{select} FOR SHARE OF its", list(epochs))
             stored = cursor.fetchall()
     if {key: epoch for key, epoch, _ in stored} != epochs:
-        raise Fenced("Another process has taken the session over.")
+        raise Fenced("Another process has taken the clinic over.")
     differing = [
         f"the log of session {key} ends with step {last or 0}, before step {firsts[key]} was to be "
         "stored. The database has lost steps, or was set back"

@@ -79,8 +79,6 @@ class Subscriber(Outgoing):
     Its ``pump`` raises Lagged or Stalled if the subscriber must start again.
     """
 
-    tablets = 0  # that it stands for: those of another server
-
     def __init__(
         self,
         feed: EventFeed,

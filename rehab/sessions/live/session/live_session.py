@@ -7,7 +7,6 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
-from typing import Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events.change import source_message
@@ -19,31 +18,21 @@ from rehab.sessions.events.event import (
     robot_state_event,
 )
 from rehab.sessions.events.snapshot import snapshot
-from rehab.sessions.live.database.trouble import WORDS, NotStored, Trouble, classify_failure
+from rehab.sessions.live.database.trouble import WORDS, NotStored, classify_failure
 from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.robot_orders import RobotOrders
 from rehab.sessions.log import Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
-from rehab.training.changes import Change, ChangeKind, State
+from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State
 from rehab.training.controls import Audience
 from rehab.training.steps import Measurement, ScoredStep
 
 RECENT_STEPS = 60  # strides that a page's chart may begin with
-
-
-class Log(Protocol):
-    """Where a session's rows go: the writer of their owner."""
-
-    @property
-    def trouble(self) -> Trouble:
-        """Why nothing is stored at present, if that is so."""
-
-    def submit(self, job: Job) -> None:
-        """Queue a job without waiting."""
 
 
 class LiveSession:
@@ -55,7 +44,8 @@ class LiveSession:
     def __init__(
         self,
         aggregate: SessionAggregate,
-        writer: Log,
+        epoch: int,
+        writer: Writer,
         recent: list[Step],
         on_failure: Callable[[LiveSession, Exception], None],
         *,
@@ -63,11 +53,13 @@ class LiveSession:
     ) -> None:
         session = aggregate.session
         self.id = session.pk
+        self.clinic_id = session.clinic_id
         self.station_id = session.station_id
         # Sessions of one location share its robot.
         here = f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
         self.location = here
         self.aggregate = aggregate
+        self.epoch = epoch
         self.feed = EventFeed()
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
         self.source: ConnectedDevice | None = None
@@ -105,6 +97,11 @@ class LiveSession:
     def is_running(self) -> bool:
         """Whether its state is running."""
         return self.aggregate.fold.state is State.RUNNING
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has not ended."""
+        return self.aggregate.fold.state not in ENDED_STATES
 
     @property
     def is_watched(self) -> bool:
@@ -207,7 +204,7 @@ class LiveSession:
             Job(
                 owner=self.aggregate,
                 session_id=self.id,
-                epoch=self.aggregate.session.epoch,
+                epoch=self.epoch,
                 rows=rows,
                 summary=summary,
                 done=done,
@@ -217,14 +214,13 @@ class LiveSession:
 
     def presence(self, now: datetime) -> Message:
         """Return who is connected, and how long ago source and tablet last sent something."""
-        tablets = self.tablets + sum(one.tablets for one in self.feed.subscribers)
         return {
             "source": self.source is not None,
             "source_trouble": self.source_trouble if self.source else "",
             "robot": self.robot is not None,
-            "tablets": tablets,
+            "tablets": self.tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),
-            "tablet_ago_s": _ago_s(self.tablet_seen_at, now) if tablets else None,
+            "tablet_ago_s": _ago_s(self.tablet_seen_at, now) if self.tablets else None,
             "storage": self._writer.trouble.value,
         }
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import logging
-from collections.abc import Collection, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from itertools import groupby, islice
 from operator import attrgetter
 from typing import NamedTuple
 
 from asgiref.sync import sync_to_async
-from django.db import transaction
 from django.db.models import QuerySet
 
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import MARKS, SessionAggregate, kinds_with_marks
 from rehab.sessions.live.session.live_session import RECENT_STEPS
-from rehab.sessions.log import RobotEntry, SessionEvent, Step, noted_end
+from rehab.sessions.log import RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.sessions.replay import (
     MEASURED,
@@ -27,8 +26,7 @@ from rehab.sessions.replay import (
     fold_entries,
     merge_entries,
 )
-from rehab.stations.models import Station
-from rehab.training.changes import OPEN_STATES, State
+from rehab.training.changes import OPEN_STATES
 from rehab.training.controls import CONTROLS
 
 log = logging.getLogger(__name__)
@@ -38,29 +36,39 @@ TOGETHER = 50  # sessions that are loaded at a time
 
 
 class LoadedSession(NamedTuple):
-    """A session as its log has it."""
+    """A session as its log has it; ``epoch``: under which this process writes its clinic's."""
 
     aggregate: SessionAggregate
     recent: list[Step]
     robot_stopped: bool
-    owned_before: str  # by whom, before it was claimed here; or empty
+    epoch: int
 
 
 LoadResult = LoadedSession | Exception
+Own = Callable[[int], Awaitable[int]]
 
 
 class Loader:
     """Loads what is asked for, and what is asked for meanwhile then together.
 
     After a restart all sources and pages come back at once; each alone takes twice the time.
+
+    Parameters
+    ----------
+    own
+        Makes this process the owner of a clinic and returns the epoch; raises OwnedElsewhere.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, own: Own) -> None:
+        self._own = own
         self._wanted: dict[int, asyncio.Future[LoadedSession]] = {}
         self._task: asyncio.Task[None] | None = None
 
     async def load(self, session_id: int) -> LoadedSession:
-        """Return a session as its log has it. Raises what ``load_together`` gives for it."""
+        """Return a session as its log has it.
+
+        Raises OwnedElsewhere, and what ``load_together`` gives for it.
+        """
         loop = asyncio.get_running_loop()
         future = self._wanted.setdefault(session_id, loop.create_future())
         if self._task is None:
@@ -72,7 +80,7 @@ class Loader:
         while some := dict(islice(self._wanted.items(), TOGETHER)):
             loaded: dict[int, LoadResult]
             try:
-                loaded = await sync_to_async(load_together)(some)
+                loaded = await self._load(list(some))
             except Exception as problem:
                 loaded = dict.fromkeys(some, problem)
             for session_id, future in some.items():
@@ -86,39 +94,58 @@ class Loader:
                     future.set_result(found)
         self._task = None
 
+    async def _load(self, session_ids: list[int]) -> dict[int, LoadResult]:
+        """Own the clinics of sessions first: from then on nobody else writes their logs."""
+        clinics = await sync_to_async(find_clinics)(session_ids)
+        wanted = sorted(set(clinics.values()))
+        results = await asyncio.gather(*map(self._own, wanted), return_exceptions=True)
+        owned = dict(zip(wanted, results, strict=True))
+        epochs: dict[int, int] = {}
+        found: dict[int, LoadResult] = {}
+        for session_id in session_ids:
+            match owned.get(clinics.get(session_id, 0)):
+                case int(epoch):
+                    epochs[session_id] = epoch
+                case Exception() as problem:
+                    found[session_id] = problem
+                case _:
+                    found[session_id] = TrainingSession.DoesNotExist(
+                        f"There is no session {session_id}."
+                    )
+        return found | (await sync_to_async(load_together)(epochs) if epochs else {})
 
-def load_together(session_ids: Collection[int]) -> dict[int, LoadResult]:
-    """Rebuild sessions from their logs, and become the writer of those that are open.
 
-    For one that cannot be loaded its error is returned: TrainingSession.DoesNotExist,
-    OwnedElsewhere, DamagedLog, or the database's.
+def find_clinics(session_ids: Collection[int]) -> dict[int, int]:
+    """Return the clinic of each session that there is."""
+    rows = TrainingSession.everywhere.filter(pk__in=session_ids).order_by()
+    return dict(rows.values_list("pk", "clinic"))
+
+
+def load_together(epochs: Mapping[int, int]) -> dict[int, LoadResult]:
+    """Rebuild sessions from their logs, given with the epochs of their clinics.
+
+    For one that cannot be loaded its error is returned: TrainingSession.DoesNotExist, DamagedLog,
+    or the database's.
     """
     try:
-        return _load(session_ids)
+        return _load(epochs)
     except Exception as problem:
-        if len(session_ids) == 1:
-            return dict.fromkeys(session_ids, problem)
+        if len(epochs) == 1:
+            return dict.fromkeys(epochs, problem)
         log.exception("Sessions could not be loaded together; each is tried alone")
-        return {key: found for one in session_ids for key, found in load_together([one]).items()}
+        alone = [load_together({key: epoch}) for key, epoch in epochs.items()]
+        return {key: found for one in alone for key, found in one.items()}
 
 
-def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
+def _load(epochs: Mapping[int, int]) -> dict[int, LoadResult]:
     chosen = TrainingSession.everywhere.select_related("patient", "measure", "station")
-    sessions = chosen.order_by().in_bulk(session_ids)
+    sessions = chosen.order_by().in_bulk(epochs)
     found: dict[int, LoadResult] = {
         key: TrainingSession.DoesNotExist(f"There is no session {key}.")
-        for key in session_ids
+        for key in epochs
         if key not in sessions
     }
-    owned_before: dict[int, str] = {}
-    with transaction.atomic():
-        for key, session in sorted(sessions.items()):  # in one order, so that none wait in a ring
-            if State(session.state) in OPEN_STATES:
-                try:
-                    owned_before[key] = owners.claim(session)
-                except owners.OwnedElsewhere as problem:
-                    found[key] = problem
-    ends = count_steps([key for key in sessions if key not in found])
+    ends = count_steps(list(sessions))
     last_numbers: dict[int, int] = {}
     for key, stored in ends.items():
         try:
@@ -127,7 +154,7 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
             found[key] = problem
     behind = [key for key, last in last_numbers.items() if last > sessions[key].last_number]
     if behind:  # their owner did not come to note it
-        TrainingSession.everywhere.filter(pk__in=behind).update(last_number=noted_end())
+        owners.note_ends(behind)
     logs, marked = _read_events(last_numbers), kinds_with_marks()
     for key, last in last_numbers.items():
         session, events = sessions[key], logs.get(key, [])
@@ -140,7 +167,7 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
             aggregate=aggregate,
             recent=steps[-RECENT_STEPS:],
             robot_stopped=is_robot_stopped(session, events),
-            owned_before=owned_before.get(key, ""),
+            epoch=epochs[key],
         )
     return found
 
@@ -177,12 +204,6 @@ def is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) -
         return session.station.robot_stopped
     orders = [one.kind for one in events if one.kind in (RobotEntry.STOP, RobotEntry.ARM)]
     return orders[-1:] == [RobotEntry.STOP]
-
-
-def find_stopped(station_ids: Collection[int]) -> set[int]:
-    """Return the stations among these whose robot's latest order was stop."""
-    stopped = Station.everywhere.filter(pk__in=station_ids, robot_stopped=True).order_by()
-    return set(stopped.values_list("pk", flat=True))
 
 
 def find_newest_open(station_id: int) -> int | None:

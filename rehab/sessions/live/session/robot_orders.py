@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 from rehab.people.models import User
 from rehab.sessions.events.event import robot_report_event, robot_stopped_event
 from rehab.sessions.live.devices import ConnectedDevice
-from rehab.sessions.live.session.aggregate import RepeatedStop, SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.hub import EventFeed
 from rehab.sessions.log import RobotEntry
 from rehab.sessions.payloads import Message
@@ -52,26 +52,17 @@ class RobotOrders:
         self.is_stopped = is_stopped  # until a person arms it again
         self.unlogged_stop: RobotStop | None = None  # in force, not committed yet
         self.reports: Message = {"status": None, "decision": None}  # the latest
-        self._armings = self._logged_armings = 0
         self._live = live
         self._submit = submit
 
-    @property
-    def logged_arming(self) -> int | None:
-        """The count of armings, where the robot may move by what is committed; else None."""
-        is_logged = not self.is_stopped and self._logged_armings == self._armings
-        return self._armings if is_logged else None
-
-    def stop(self, by: User | None, at: datetime, data: Message, *, again: bool = False) -> None:
+    def stop(self, by: User | None, at: datetime, data: Message) -> None:
         """Stop the robot at once, until a person arms it.
 
-        ``data``: which device stopped it, if it was no person. ``again``: where the robot is
-        stopped already, the stop is stored all the same if another server has armed it meanwhile.
+        ``data``: which device stopped it, if it was no person.
         """
         if self._live.robot is not None:
             self._live.robot.outbox.queue({"type": "stop"})
-        is_repeated = self.is_stopped
-        if is_repeated and (self.unlogged_stop is not None or not again):
+        if self.is_stopped:
             return
         self.is_stopped = True
         self.unlogged_stop = stop = RobotStop(by, at, data)
@@ -82,17 +73,12 @@ class RobotOrders:
 
         row = self._live.aggregate.log_event(RobotEntry.STOP, by, at, data)
         event = robot_stopped_event(self._live.aggregate.fold, True)
-        rows = [RepeatedStop(row) if is_repeated else row]
-        self._submit(rows, [event], [], on_stored=forget)
+        self._submit([row], [event], [], on_stored=forget)
 
     def arm(self, by: User | None, at: datetime) -> asyncio.Future[None]:
         """Let the robot move again once that is committed; then the future is done."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.is_stopped = False
-        self._armings += 1
-
-        def note() -> None:
-            self._logged_armings += 1
 
         def notify_robot(result: asyncio.Future[None]) -> None:
             failed = result.cancelled() or result.exception() is not None
@@ -102,7 +88,7 @@ class RobotOrders:
         stored.add_done_callback(notify_robot)
         row = self._live.aggregate.log_event(RobotEntry.ARM, by, at, {})
         event = robot_stopped_event(self._live.aggregate.fold, False)
-        self._submit([row], [event], [], stored=stored, on_stored=note)
+        self._submit([row], [event], [], stored=stored)
         return stored
 
     def record_report(self, report: Message, at: datetime) -> None:

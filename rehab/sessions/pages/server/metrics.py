@@ -41,6 +41,9 @@ class LiveSessions(Collector):
         )
         yield _labeled("garry_viewers", "Connected pages and robots' screens.", "audience", pages)
         yield GaugeMetricFamily(
+            "garry_clinics", "Clinics that live here.", len(live.clinics.epochs)
+        )
+        yield GaugeMetricFamily(
             "garry_sources", "Connected sources.", sum(one.source is not None for one in sessions)
         )
         yield GaugeMetricFamily(
@@ -52,12 +55,6 @@ class LiveSessions(Collector):
         now = live.writer.trouble
         troubles = Counter({kind.value: int(kind is now) for kind in Trouble if kind.value})
         yield _labeled("garry_storage_trouble", "1 while steps cannot be stored.", "kind", troubles)
-        silent_s = 0.0 if live.servers is None else live.servers.silent_s
-        yield GaugeMetricFamily(
-            "garry_servers_silent_seconds",
-            "Since when nothing passes between servers; 0 where there is one.",
-            silent_s,
-        )
         yield GaugeMetricFamily(
             "garry_ready", "1 while it may get visitors, as /readyz says.", int(not find_unready())
         )

@@ -10,11 +10,12 @@ from robot.motion.pools import VARIANTS
 from robot.play_gesture import play_gesture
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import OPEN, Stage, moving
+from tests.support.variants import cases
 
 pytestmark = pytest.mark.matrix
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", cases(BUILT_IN))
 @pytest.mark.parametrize("goes", [1.0, 0.93])
 def test_every_gesture_closed_on_odometry_ends_at_home(name, goes):
     stage = Stage()
@@ -40,7 +41,7 @@ def test_a_session_s_gesture_in_a_closed_loop(stage):
     assert (status["open_loop"], status["bumpers"]) == (False, True)
 
 
-@pytest.mark.parametrize("name", GESTURES | VARIANTS)
+@pytest.mark.parametrize("name", cases(GESTURES | VARIANTS))
 def test_an_open_loop_is_short_timed_and_told(name):
     stage = Stage(OPEN)
     stage.robot.odometry = ""

@@ -1,0 +1,104 @@
+"""A study's own files in an export: enough to analyze it again, and to check its allocation.
+
+Everybody who was ever allocated has a row, walked, gone or removed: without the pseudonym of
+those whose data were removed, or whom the account may not see (any more). Groups are empty until
+the study is closed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from rehab.exports.archive import write_csv
+from rehab.exports.research.dates import shift_of
+from rehab.people.models import User
+from rehab.studies.analysis.outcomes import define_outcomes
+from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.participants import Enrollment
+from rehab.studies.registration.protocol_json import write_json
+from rehab.studies.results.drawing import TABLES, write_table
+from rehab.studies.results.results import read_results
+
+PARTICIPANTS = (
+    *("number", "participant", "pseudonym", "levels", "group", "version"),
+    *("enrolled_at", "withdrawn_at", "data_kept"),
+)
+VERIFIER = Path(__file__).with_name("verify_allocation.py")
+
+
+def studies_of(user: User, code: str) -> list[Study]:
+    """Return the studies that an export tells of: the one of a short name, or all.
+
+    Drafts are left out, and running studies in which the account assesses.
+    """
+    studies = Study.objects.visible_to(user).exclude(state=StudyState.DRAFT).order_by("pk")
+    named = studies.filter(code=code) if code else studies
+    return [
+        study
+        for study in named
+        if study.closed_at or not has_mark(study, user, StudyMark.Task.ASSESSOR)
+    ]
+
+
+def study_files(
+    user: User, study: Study, now: datetime, *, shift_dates: bool
+) -> Iterator[tuple[str, Any]]:
+    """Yield a study's files: name and content in pieces."""
+    folder = f"studies/{study.code}"
+    yield f"{folder}/protocol.json", [write_json(study, has_dates=not shift_dates)]
+    rows = participant_rows(user, study, shift_dates=shift_dates)
+    yield f"{folder}/participants.csv", write_csv(PARTICIPANTS, rows)
+    definitions = define_outcomes()
+    yield f"{folder}/definitions.csv", [write_table(definitions)]
+    if study.state == StudyState.CLOSED:
+        yield f"{folder}/verify_allocation.py", [VERIFIER.read_text("utf-8")]
+        results = read_results(study, now)
+        for name, table in TABLES.items():
+            cells = table(results)
+            if shift_dates:
+                cells = ({key: row[key] for key in row if key != "at"} for row in cells)
+            yield f"{folder}/{name}.csv", [write_table(cells)]
+
+
+def participant_rows(user: User, study: Study, *, shift_dates: bool) -> Iterator[tuple[Any, ...]]:
+    """Yield the cells of `PARTICIPANTS` of everybody who was ever allocated, in their order."""
+    related = ("patient", "allocation", "version")
+    enrollments = Enrollment.everywhere.filter(study=study).select_related(*related)
+    seen = set(Enrollment.objects.visible_to(user).filter(study=study).values_list("pk", flat=True))
+    is_closed = study.state == StudyState.CLOSED
+    for number, one in enumerate(enrollments.order_by("allocation__pk"), start=1):
+        pseudonym = one.patient.pseudonym if one.is_analyzed and one.pk in seen else ""
+        shift = shift_of(one.patient.pseudonym) if shift_dates else timedelta()
+        yield (
+            number,
+            one.code,
+            pseudonym,
+            json.dumps(one.levels, ensure_ascii=False),
+            one.allocation.group if is_closed else "",
+            one.version.number,
+            one.enrolled_at + shift,
+            one.withdrawn_at and one.withdrawn_at + shift,
+            one.keep_data,
+        )
+
+
+def groups_of(user: User, studies: list[Study]) -> dict[str, dict[str, str]]:
+    """Return each participant's studies, codes and groups (of closed ones), by pseudonym."""
+    found: dict[str, dict[str, str]] = {}
+    for study in studies:
+        for row in participant_rows(user, study, shift_dates=False):
+            about = dict(zip(PARTICIPANTS, row, strict=True))
+            of_person = found.setdefault(about["pseudonym"], {})
+            cells = {
+                "study": study.code,
+                "participant": about["participant"],
+                "group": about["group"],
+            }
+            for name, cell in cells.items():
+                of_person[name] = " ".join(filter(None, (of_person.get(name), cell)))
+    found.pop("", None)
+    return found

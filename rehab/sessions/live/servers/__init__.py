@@ -1,1 +1,0 @@
-"""Several servers on one database: what they ask each other for, whose sessions they follow."""

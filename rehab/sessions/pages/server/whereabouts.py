@@ -1,0 +1,61 @@
+"""Requests that change something of a clinic: answered where the clinic lives.
+
+Another server says 421 (RFC 9110, 15.5.20) and names that one, for the proxy to ask it. Pages that
+only show something read the database, at any server.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+from django.http import HttpRequest, HttpResponse, HttpResponseBase
+
+from rehab.people.models import User
+from rehab.people.web.api_base import caller
+from rehab.sessions.live import runtime
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from robot.wire.limits import SERVER_HEADER
+
+SAFE = ("GET", "HEAD", "OPTIONS")
+
+
+def find_elsewhere(request: HttpRequest, user: Any) -> OwnedElsewhere | None:
+    """Return which other server a person's request is for, where it may change something."""
+    clinic_id = user.clinic_id if isinstance(user, User) else None
+    live = runtime.peek()
+    if clinic_id is None or request.method in SAFE or live is None or live.servers is None:
+        return None
+    return None if clinic_id in live.clinics else owners.find_elsewhere(clinic_id)
+
+
+class ClinicServerMiddleware:
+    """Sends the forms of a clinic's people to the clinic's server. Sync; it keeps no state."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        """Pass the request on."""
+        return self.get_response(request)
+
+    def process_view(self, request: HttpRequest, *_: Any) -> HttpResponseBase | None:
+        """Let the view run, or send the request away."""
+        if (problem := find_elsewhere(request, request.user)) is None:
+            return None
+        headers = {SERVER_HEADER: problem.server, "Cache-Control": "no-store"}
+        return HttpResponse(f"{problem}\n", "text/plain", 421, headers=headers)
+
+
+def at_clinics_server(call: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a call of the API run where the caller's clinic lives. Raises OwnedElsewhere."""
+
+    @wraps(call)
+    def checked(request: HttpRequest, **values: Any) -> Any:
+        if (problem := find_elsewhere(request, caller(request))) is not None:
+            raise problem
+        return call(request, **values)
+
+    return checked

@@ -1,0 +1,187 @@
+"""A linear mixed model for a few visits of each person, by restricted maximum likelihood (REML).
+
+Estimates are unbiased where visits are missing at random: depending on the arm, the baseline and
+what was seen before (Rubin 1976, Biometrika 63:581-592). Intervals are those of Kenward and Roger
+(1997, Biometrics 53:983-997), which hold for small groups.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from rehab.studies.analysis.walks import Flags, Floats
+
+MAX_ROUNDS = 200
+TOLERANCE = 1e-9  # relative change of the variances at which the iteration ends
+LEAST_EIGENVALUE = 1e-7  # of a person's covariance, as a share of the residual variance
+EXACT = 1e-12  # a residual variance below this share of the values' is rounding alone
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A linear combination of effects, its standard error and degrees of freedom."""
+
+    value: float
+    error: float
+    freedom: float
+
+    def interval(self, confidence: float) -> tuple[float, float]:
+        """Return both ends of Student's interval."""
+        half = float(stdtrit(self.freedom, (1 + confidence) / 2)) * self.error
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model that was fitted.
+
+    Attributes
+    ----------
+    effects
+        Shape (k,), in the unit of the values.
+    span
+        Shape (k, k): projects on the combinations of effects that the data tell.
+    plain, adjusted
+        Shape (k, k): covariance of the effects, without and with the small-sample correction.
+    slopes
+        Shape (v, k, k): how ``plain`` changes with each variance.
+    of_variances
+        Shape (v, v): covariance of the estimated variances.
+    freedom
+        Observations less effects; without any there are no intervals.
+    """
+
+    effects: Floats
+    span: Floats
+    plain: Floats
+    adjusted: Floats
+    slopes: Floats
+    of_variances: Floats
+    freedom: int
+
+    def tells(self, weights: Floats) -> bool:
+        """Return whether the data tell a combination of effects. ``weights``: shape (k,)."""
+        return bool(np.allclose(self.span @ weights, weights, atol=1e-8))
+
+    def estimate(self, weights: Floats) -> Estimate:
+        """Return a combination of effects. ``weights``: shape (k,)."""
+        value, plain = float(weights @ self.effects), float(weights @ self.plain @ weights)
+        if plain <= 0 or self.freedom < 1:
+            return Estimate(value, 0.0, float(self.freedom))
+        slopes = np.einsum("k,vkl,l->v", weights, self.slopes, weights) / plain
+        spread = float(slopes @ self.of_variances @ slopes)
+        freedom = min(2 / spread, float(self.freedom)) if spread > 0 else float(self.freedom)
+        error = float(weights @ self.adjusted @ weights)
+        return Estimate(value, max(error, plain) ** 0.5, freedom)
+
+
+def fit(x: Floats, y: Floats, seen: Flags, alike: Floats) -> Fit:
+    """Return the model that explains values by effects, with visits of a person that are alike.
+
+    Parameters
+    ----------
+    x
+        Shape (n, t, k): for each person and visit what each effect is multiplied with.
+    y, seen
+        Shape (n, t): the values, and whether there is one.
+    alike
+        Shape (a, t, t): 1 where two visits of a person share a variance, as all of them do, or
+        those of one period; 0 elsewhere. The variance that each visit has of its own is added.
+    """
+    x, y = np.where(seen[..., None], x, 0.0), np.where(seen, y, 0.0)
+    parts = _parts(seen, alike)
+    count, rank = int(seen.sum()), int(np.linalg.matrix_rank(x.reshape(-1, x.shape[2])))
+    effects, span, residual = _least_squares(x, y)
+    freedom = count - rank
+    residual_variance = residual / freedom if freedom > 0 else 0.0
+    if residual_variance <= EXACT * max(float((y * y).sum()) / max(count, 1), 1e-300):
+        zero = np.zeros_like(span)
+        none = np.zeros((len(parts), *span.shape))
+        return Fit(effects, span, zero, zero, none, np.zeros((len(parts),) * 2), freedom)
+    variances = np.zeros(len(parts))
+    variances[0] = residual_variance
+    for _ in range(MAX_ROUNDS):
+        _round = _Round(x, y, seen, parts, variances)
+        target = np.linalg.pinv(_round.information) @ (_round.squares / 2)
+        step = _largest_step(parts, seen, variances, target, residual_variance)
+        moved = variances + step * (target - variances)
+        change = float(np.abs(moved - variances).max()) / residual_variance
+        variances = moved
+        if change < TOLERANCE:
+            break
+    return _Round(x, y, seen, parts, variances).to_fit(span, freedom)
+
+
+def _parts(seen: Flags, alike: Floats) -> Floats:
+    """Return what each variance adds to each person's covariance, shape (v, n, t, t).
+
+    A part that no two visits of anybody share is left out: it could not be told from the rest.
+    """
+    both = seen[:, :, None] & seen[:, None, :]
+    own = np.eye(seen.shape[1]) * both
+    off = [part * both for part in alike]
+    return np.array([own, *(part for part in off if ((part > 0) & (own == 0)).any())])
+
+
+def _least_squares(x: Floats, y: Floats) -> tuple[Floats, Floats, float]:
+    flat = x.reshape(-1, x.shape[2])
+    inverse = np.linalg.pinv(flat)
+    effects = inverse @ y.ravel()
+    residual = y.ravel() - flat @ effects
+    return effects, inverse @ flat, float(residual @ residual)
+
+
+def _largest_step(
+    parts: Floats, seen: Flags, here: Floats, target: Floats, residual_variance: float
+) -> float:
+    """Return how far to go towards a target such that covariances stay positive."""
+    step = 1.0
+    for _ in range(40):
+        values = _covariance(parts, seen, here + step * (target - here), residual_variance)
+        if np.linalg.eigvalsh(values).min() >= LEAST_EIGENVALUE * residual_variance:
+            return step
+        step /= 2
+    return 0.0
+
+
+def _covariance(parts: Floats, seen: Flags, variances: Floats, unseen: float) -> Floats:
+    """Return each person's covariance, shape (n, t, t); ``unseen`` stands for missing visits."""
+    missing = unseen * np.eye(seen.shape[1]) * ~seen[:, :, None]
+    return np.asarray(np.einsum("v,vnst->nst", variances, parts) + missing)
+
+
+class _Round:
+    """What follows from given variances: effects, and the next variances."""
+
+    def __init__(self, x: Floats, y: Floats, seen: Flags, parts: Floats, variances: Floats) -> None:
+        weight = np.linalg.inv(_covariance(parts, seen, variances, 1.0))
+        self._x = x
+        self._across = np.swapaxes(x, 1, 2)
+        self.plain = np.linalg.pinv((self._across @ weight @ x).sum(0), hermitian=True)
+        self.effects = self.plain @ np.einsum("ntk,nt->k", weight @ x, y)
+        error = np.einsum("nst,nt->ns", weight, y - x @ self.effects)
+        self.squares = np.einsum("ns,vnst,nt->v", error, parts, error)
+        weighted = weight @ parts  # (v, n, t, t)
+        inner = weighted @ weight
+        self.slopes = (self._across @ inner @ x).sum(1)  # (v, k, k)
+        self._pairs = weighted[:, None] @ inner[None]  # (v, v, n, t, t)
+        traces = np.einsum("vnst,wnts->vw", weighted, weighted, optimize=True)
+        once = np.einsum("vwnst,nts->vw", self._pairs, x @ self.plain @ self._across)
+        mixed = self.plain @ self.slopes
+        twice = np.einsum("vkl,wlk->vw", mixed, mixed)
+        self.information = (traces - 2 * once + twice) / 2
+
+    def to_fit(self, span: Floats, freedom: int) -> Fit:
+        """Return the fit with the correction of Kenward and Roger."""
+        of_variances = np.linalg.pinv(self.information, hermitian=True)
+        pairs = np.einsum("vw,vwnst->nst", of_variances, self._pairs)
+        crossed = np.einsum(
+            "vw,vkl,wlm->km", of_variances, self.slopes @ self.plain, self.slopes, optimize=True
+        )
+        inner = (self._across @ pairs @ self._x).sum(0) - crossed
+        adjusted = self.plain + 2 * self.plain @ inner @ self.plain
+        slopes = self.plain @ self.slopes @ self.plain
+        return Fit(self.effects, span, self.plain, adjusted, slopes, of_variances, freedom)

@@ -1,0 +1,72 @@
+"""Every variant of every pool: seen at its least, short, and home on late bases."""
+
+import math
+
+import pytest
+
+from robot.bases.kinematic import Imperfections
+from robot.motion.dry_run import dry_run
+from robot.motion.limits import REACH_M
+from robot.motion.path import Drive, plan_path
+from robot.motion.pools import POOLS, TABLE, VARIANTS
+from robot.motion.pose import HOME
+from tests.support.gesture_runs import play_in_a_row
+from tests.support.variants import SHOWN
+
+
+def late_cases():
+    """Return each variant on the latest base; some on one that answers at once, and all between."""
+    cases = []
+    for name in VARIANTS:
+        for dead_time_s in (0.0, 0.25, 0.05, 0.1, 0.15, 0.2):
+            is_usual = dead_time_s == 0.25 or (dead_time_s == 0 and name in SHOWN)
+            marks = () if is_usual else pytest.mark.long
+            cases.append(pytest.param(name, dead_time_s, marks=marks))
+    return cases
+
+
+@pytest.mark.parametrize(("name", "dead_time_s"), late_cases())
+def test_it_ends_at_home_on_a_base_that_nobody_has_measured(name, dead_time_s):
+    faults = Imperfections(dead_time_s, 0.06, left_scale=0.98, drift_deg_min=3.0)
+    for played in play_in_a_row(VARIANTS[name], faults, times=2):
+        assert played.outcome == "done"
+        assert played.away_m < 0.02
+        assert played.turned_deg < 2
+        assert played.took_s <= 4.5
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_it_is_seen_at_its_least_and_short(name):
+    gesture = VARIANTS[name]
+    for pace, most_s, size in (
+        (1, 3.3, gesture.least),
+        (1, 3.3, 1.0),
+        (0.5, 4.5, max(gesture.least, 0.5)),
+    ):
+        played = dry_run(gesture.scaled(size), pace=pace)
+        turned_rad = max(abs(pose.heading_rad) for pose in played.poses)
+        assert played.outcome == "done"
+        assert played.took_s <= most_s
+        assert played.farthest_m >= 0.10 or turned_rad >= math.radians(45)
+
+
+def test_no_variant_goes_far_or_out_backwards():
+    for gesture in VARIANTS.values():
+        farthest_m, start = 0.0, HOME
+        for waypoint in gesture.waypoints:
+            there_m = waypoint.pose.distance_m(HOME)
+            assert there_m <= REACH_M
+            for leg in plan_path(start, waypoint.pose):
+                if isinstance(leg, Drive) and leg.by_m < 0:
+                    assert there_m < farthest_m  # the way it came
+            farthest_m, start = max(farthest_m, there_m), waypoint.pose
+
+
+def test_pools_hold_enough_variants_and_no_two_of_a_pool_move_alike():
+    for name, pool in POOLS.items():
+        motions = {
+            tuple((w.x_m, w.heading_rad, w.pace, w.hold_s) for w in one.waypoints) for one in pool
+        }
+        assert len(motions) == len(pool) >= 4  # none comes back within four answers
+        if name in ("joy", "disappointment"):
+            assert len(TABLE[name].rows) >= 8

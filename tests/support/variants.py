@@ -1,0 +1,33 @@
+"""The variants of the robot's pools as cases: one of each path by default, all under `long`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+from robot.motion.pools import POOLS, TABLE, VARIANTS
+
+
+def _first_of_each_path() -> set[str]:
+    """Return names of variants that together show each path, to each side."""
+    shown: dict[tuple[str, int], str] = {}
+    for pool, variants in POOLS.items():
+        rows = [
+            (row.path, side)
+            for row in TABLE[pool].rows
+            for side in ((1, -1) if row.turns else (1,))
+        ]
+        for key, variant in zip(rows, variants, strict=True):
+            shown.setdefault(key, variant.name)
+    return set(shown.values())
+
+
+SHOWN = _first_of_each_path()
+
+
+def cases(names: Iterable[str]) -> list[Any]:
+    """Return gestures' names as cases; variants that `SHOWN` stand for are `long`."""
+    rare = set(VARIANTS) - SHOWN
+    return [pytest.param(name, marks=pytest.mark.long if name in rare else ()) for name in names]
