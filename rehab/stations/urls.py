@@ -2,11 +2,13 @@
 
 from django.urls import path
 
-from rehab.stations.pages import pairing, stations
+from rehab.stations.pages import pairing, phones, stations
 
 urlpatterns = [
     path("tablets/pair/", pairing.pair, name="pair"),
     path("tablets/leave/", pairing.leave, name="leave"),
+    path("phones/pair/", phones.pair_phone, name="pair-phone"),
+    path("sensor/", phones.show_sensor, name="sensor"),
     path("stations/", stations.list_stations, name="stations"),
     path("stations/new/", stations.edit_station, name="new-station"),
     path("stations/<int:station_id>/", stations.edit_station, name="edit-station"),

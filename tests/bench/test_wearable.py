@@ -9,7 +9,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from rehab.gait.wearables import WearableStride
+from rehab.gait.wearables import WearableDetector, WearableStride
 from tests.support.data import signals
 from tests.support.simulated_leg import random_mounting
 from tests.support.worn_sensors import (
@@ -215,6 +215,23 @@ def test_after_a_stroke():
         assert np.median(spreads) <= 15
     assert signs == len(shares) == 72
     assert weakest == 8
+
+
+def test_strides_are_known_soon():
+    """From an initial contact until its stride is returned, at a phone's 60 Hz."""
+    for place in ("foot", "shank"):
+        waits: list[float] = []
+        for walk in (one.thinned(60) for one in stroke_walks() if one.place == place):
+            detector, own = WearableDetector(place), []
+            for t_s, rate, acceleration in zip(
+                walk.t_s.tolist(), walk.rate.tolist(), walk.acceleration.tolist(), strict=True
+            ):
+                found = detector.add(t_s, tuple(rate), tuple(acceleration))
+                own += [t_s - one.end_s for one in found[-1:]]
+            waits += own[1:]  # the first ones wait until the sign is known
+        middle, most, longest = 1000 * np.percentile(waits, [50, 95, 100])
+        print(f"\n{place}: {middle:.0f} ms, 95 %: {most:.0f}, at most {longest:.0f} ms", end="")
+        assert longest <= 150
 
 
 def read_pitches(foot: str) -> dict[int, list[float]]:

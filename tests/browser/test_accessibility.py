@@ -46,6 +46,8 @@ PT_PAGES = [
     "/sessions/{session}/report/",
     "/sessions/{walk}/monitor/",
     "/tablets/pair/",
+    "/phones/pair/",
+    "/sensor/",
     "/first-steps/?step=station",
     "/stations/",
     "/insight/?goal=any",

@@ -53,7 +53,7 @@ def entries():
 # Pages and calls that show nothing of patients. Whatever is not here must leave an entry.
 SILENT = {
     *("account", "own-password", "set-up-second-factor", "add-app", "add-passkey"),
-    *("remove-authenticator", "recovery-codes", "pair", "consent-text", "export"),
+    *("remove-authenticator", "recovery-codes", "pair", "pair-phone", "consent-text", "export"),
     *(
         "catalog",
         "home",
@@ -62,6 +62,7 @@ SILENT = {
         "tablet",
         "tablet-app",
         "tablet-state",
+        "sensor",
         "sign-in",
         "second-factor",
         "confirm",

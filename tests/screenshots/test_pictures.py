@@ -61,6 +61,8 @@ PAGES = {
     "screen": "/patients/2/screen/",
     "pairing": "/tablet/",
     "pair": "/tablets/pair/",
+    "phone": "/phones/pair/",
+    "sensor": "/sensor/#token=x&place=shank&side=left",
     "check-recording": "/recordings/check/",
     "set-up": "/patients/2/new/",
     "set-up-preset": "/patients/2/new/?preset=1",

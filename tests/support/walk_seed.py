@@ -2,8 +2,8 @@
 
 JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal" (or
 "goal_percent", of the baseline), "minutes", "screen": {"screen_side", …}, "pin", "close_percent"
-(of the protocol)}, where anything may be left out. Each gets a station of its own with tokens for
-its devices.
+(of the protocol), "measure"}, where anything may be left out. Each gets a station of its own with
+tokens for its devices.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic
     from rehab.sessions.services import SessionRequest, create_session
-    from rehab.sessions.setup.protocols import Protocol
+    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
     from rehab.stations.models import Device, Station
     from rehab.stations.pins import set_pin
     from rehab.training.goals import GoalRule, Target
@@ -189,6 +189,9 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 goal=GoalRule(percent_of_baseline=wish["goal_percent"])
                 if "goal_percent" in wish
                 else GoalRule(value=wish.get("goal", GOAL)),
+                measure=MeasureDefinition.everywhere.get(
+                    clinic=None, slug=wish.get("measure", "a2")
+                ),
                 phases=phases,
                 protocol=protocol,
                 target=Target(duration_s=60 * wish.get("minutes", 10)),

@@ -213,13 +213,12 @@ class WearableDetector:
         strides = []
         while self._best.strides:
             stride, rest = self._best.strides.popleft()
-            if self._moved:
-                self._moved -= 1
+            has_moved = rest != NOWHERE and self._mounting.add(rest, self._axis.axis)
+            if has_moved or self._moved:
                 stride = replace(stride, reasons=(*stride.reasons, Doubt.SENSOR_MOVED))
             strides.append(stride)
-            if rest != NOWHERE and self._mounting.add(rest, self._axis.axis):
-                strides[-1] = replace(stride, reasons=(*stride.reasons, Doubt.SENSOR_MOVED))
-                self._moved = STRIDES_MOVED
+            self._moved = STRIDES_MOVED if has_moved else max(0, self._moved - 1)
+            if has_moved:
                 self._begin()
                 break
         return strides

@@ -12,11 +12,22 @@ function ago(seconds) {
   return fill(_("%(count)s min ago"), { count: Math.round(seconds / 60) });
 }
 
-function describeSource(isThere, strides, silent_s, isRunning) {
+// What a worn sensor says of itself; its strides are invalid meanwhile.
+const TROUBLES = {
+  hidden: _("the phone’s page is not in front"),
+  slow: _("the phone measures too slowly: charge it, turn off power saving"),
+  gap: _("the phone missed samples"),
+  moved: _("the sensor has moved: is the strap tight?"),
+  battery: _("the phone’s battery is low"),
+  doubt: _("unsure how it is worn: stand still, lift the toes (shin: swing the leg forward) once"),
+};
+
+function describeSource(isThere, strides, silent_s, isRunning, trouble) {
   if (!isThere) {
     const since = silent_s !== null && fill(_("not connected, last stride %(ago)s"), { ago: ago(silent_s) });
     return ["–", since || _("not connected")];
   }
+  if (trouble) return ["!", TROUBLES[trouble]];
   if (!strides.length || silent_s === null) return ["✓", _("connected, no stride yet")];
   const valid = strides.filter((stride) => stride.valid).length;
   const count = strides.length;
@@ -39,7 +50,13 @@ export function createConnections({ state, show }, robot) {
     const strides = state.strides.slice(-LAST);
     const { text, isLow } = robot.connection;
     return {
-      source: describeSource(presence.source, strides, silent(presence.stride_ago_s), sessionState === "running"),
+      source: describeSource(
+        presence.source,
+        strides,
+        silent(presence.stride_ago_s),
+        sessionState === "running",
+        presence.source_trouble,
+      ),
       tablets: describeTablets(presence.tablets, silent(presence.tablet_ago_s)),
       robot: presence.robot ? [isLow ? "!" : "✓", text] : ["–", _("none")],
     };

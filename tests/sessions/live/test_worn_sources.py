@@ -36,3 +36,19 @@ async def test_a_worn_sensors_own_measure_is_scored(place, sourced):
     assert (first.value, first.valid, first.hit) == (21.5, True, True)
     assert (second.valid, second.reasons, second.hit) == (False, ["turning"], None)
     assert await sync_to_async(lambda: first.extra["wearable_foot"])() == 1
+
+
+async def test_the_therapist_sees_what_is_wrong_with_a_sensor(place, sourced):
+    measure = await MeasureDefinition.everywhere.aget(clinic=None, slug="foot_strike")
+    session, source = await sourced(place, measure=measure, goal=GoalRule(value=20.0))
+    monitor, tablet = await place.monitor(session).open(), await place.tablet(session).open()
+    for trouble in ("hidden", ""):
+        await source.say({"type": "sensor", "trouble": trouble})
+        await monitor.until(
+            lambda e, it=trouble: e["kind"] == "presence" and e["presence"]["source_trouble"] == it
+        )
+    await tablet.overhear()
+    told = [event for event in tablet.events if event["kind"] == "presence"]
+    assert all("source_trouble" not in event["presence"] for event in told)
+    await source.say({"type": "sensor", "trouble": "tired"})
+    assert (await source.sent_away())[0] == 4400

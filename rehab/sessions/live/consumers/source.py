@@ -13,8 +13,10 @@ from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.protocol.backlog import is_duplicate
 from rehab.sessions.live.protocol.messages import (
     Hello,
+    SensorTrouble,
     read_hello,
     read_plain,
+    read_trouble,
 )
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.live.session.lateness import Lateness
@@ -76,8 +78,16 @@ class SourceConsumer(DeviceSocket):
             await self._handle_hello(read_hello(message))
         elif kind in ("step", "steps"):
             await self._handle_steps(read_steps(message))
+        elif kind == "sensor":
+            self._note_trouble(read_trouble(message))
         elif kind is not None or "token" not in message:
-            raise BadFrame('A source sends "hello", "step" and "steps".')
+            raise BadFrame('A source sends "hello", "step", "steps" and "sensor".')
+
+    def _note_trouble(self, trouble: SensorTrouble) -> None:
+        live = self.live
+        if live is not None and live.source_trouble != trouble:
+            live.source_trouble = trouble.value
+            live.announce_presence(timezone.now())
 
     async def _handle_hello(self, hello: Hello) -> None:
         self.lateness = Lateness(
@@ -95,6 +105,7 @@ class SourceConsumer(DeviceSocket):
         if clock is not None and clock.run == self.lateness.run and not self.lateness.is_known:
             self.lateness = clock
         live.source_clock = self.lateness
+        live.source_trouble = ""  # a sensor says so again
         fold = live.aggregate.fold
         await self.send_message(
             {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from enum import StrEnum
 from typing import Annotated, Any, Literal
 from urllib.parse import parse_qs
 
@@ -172,6 +173,27 @@ def read_hello(message: Message) -> Hello:
             "version",
         )
     return read_fields({**message, "session": message.get("session") or None}, Hello)
+
+
+class SensorTrouble(StrEnum):
+    """Why a worn sensor's strides do not count for now; the therapist's page says what to do."""
+
+    NONE = ""
+    HIDDEN = "hidden"
+    SLOW = "slow"
+    GAP = "gap"
+    MOVED = "moved"
+    BATTERY = "battery"
+    DOUBT = "doubt"
+
+
+class _Sensor(Struct):
+    trouble: SensorTrouble
+
+
+def read_trouble(message: Message) -> SensorTrouble:
+    """Return what a worn sensor says of itself. Raises BadFrame."""
+    return read_fields(message, _Sensor).trouble
 
 
 def read_plain(text: str) -> tuple[float | None, float | None] | None:

@@ -64,6 +64,7 @@ class LiveSession:
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
         self.source: ConnectedDevice | None = None
         self.source_clock: Lateness | None = None  # of its latest run
+        self.source_trouble = ""  # what a worn sensor says of itself
         self.robot: ConnectedDevice | None = None
         self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
         self.tablets = 0
@@ -215,6 +216,7 @@ class LiveSession:
         """Return who is connected, and how long ago source and tablet last sent something."""
         return {
             "source": self.source is not None,
+            "source_trouble": self.source_trouble if self.source else "",
             "robot": self.robot is not None,
             "tablets": self.tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),

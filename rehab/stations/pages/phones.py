@@ -1,0 +1,72 @@
+"""A phone as a sensor: paired by a QR code on the therapist's page, worn on a leg."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import segno
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.urls import reverse
+from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from rehab.people.access import clinic_of, for_roles, public, user_of
+from rehab.people.audit.audit_log import Act, record_security_change
+from rehab.people.roles import Role
+from rehab.people.row_values import read_key
+from rehab.people.sign_in import step_up
+from rehab.stations.builtin import first_station
+from rehab.stations.models import Device, Station
+from rehab.training.measures import WORN
+from rehab.training.steps import Side
+
+LIFETIME = timedelta(hours=12)  # of a phone's token: a day in the clinic
+LEGS = {Side.LEFT: gettext_lazy("left"), Side.RIGHT: gettext_lazy("right")}
+PLACES = {"shank": gettext_lazy("shin"), "foot": gettext_lazy("foot")}
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)
+@never_cache
+@step_up.required
+@require_http_methods(["GET", "HEAD", "POST"])
+def pair_phone(request: HttpRequest) -> HttpResponse:
+    """Choose where a phone is worn; then show the code to scan, once."""
+    user, now = user_of(request), timezone.now()
+    first_station(clinic_of(user))
+    stations = Station.objects.visible_to(user)
+    context: dict[str, Any] = {"stations": stations, "legs": LEGS.items(), "places": PLACES.items()}
+    if request.method == "POST":
+        station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
+        place, side = request.POST.get("place"), request.POST.get("side")
+        if station is None or place not in WORN or side not in LEGS:
+            context["problem"] = _("Choose a station, a place and a leg.")
+        else:
+            where = {"leg": LEGS[Side(side)], "place": PLACES[place]}
+            device = Device(
+                clinic_id=station.clinic_id,
+                station=station,
+                kind=Device.Kind.SOURCE,
+                name=_("Phone, %(leg)s %(place)s") % where,
+            )
+            token = device.new_token()
+            device.token_expires_at = now + LIFETIME
+            device.save()
+            record_security_change(Act.TOKEN, request, device, now)
+            # Behind the # nothing of it reaches a server's log.
+            address = request.build_absolute_uri(reverse("sensor"))
+            address += f"#token={token}&place={place}&side={side}"
+            drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
+            context |= {"device": device, "qr": drawing, "is_secure": request.is_secure()}
+    return render(request, "stations/phone.html", context)
+
+
+@public
+@require_safe
+def show_sensor(request: HttpRequest) -> HttpResponse:
+    """Show the page of a phone that is worn; what it may do is in the address that it scanned."""
+    return render(request, "stations/sensor.html")

@@ -1,0 +1,24 @@
+// A stride of the detector as a step of the protocol: rehab/sources/intake/measurements.py, from_wearable.
+
+import { VERSION } from "garry/sensor/detector";
+
+const toDegrees = (angle) => (angle === null ? null : (angle * 180) / Math.PI);
+
+export function toStep(stride, place, side) {
+  const stance_percent = (100 * stride.stance_s) / stride.stride_s;
+  const extra = {
+    [`wearable_${place}`]: VERSION,
+    initial_contact_s: stride.initial_contact_s,
+    terminal_contact_s: stride.terminal_contact_s,
+    stride_s: stride.stride_s,
+    stance_s: stride.stance_s,
+    cadence_min: 120 / stride.stride_s,
+    [`${place}_stance_percent`]: stance_percent,
+    [`${place}_swing_percent`]: 100 - stance_percent,
+    foot_strike_deg: toDegrees(stride.foot_strike_rad),
+    push_off_deg_s: toDegrees(stride.push_off_rad_s),
+    shank_lean_deg: toDegrees(stride.shank_lean_rad),
+  };
+  const known = Object.entries(extra).filter(([, value]) => value !== null);
+  return { time_s: stride.end_s, side, value: null, reasons: stride.reasons, extra: Object.fromEntries(known) };
+}

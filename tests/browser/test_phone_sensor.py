@@ -1,0 +1,98 @@
+"""A phone on a shin: from the square that it scans to strides, whatever happens to it."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.support.browsers import PATIENCE_MS, Visit
+from tests.support.servers import Server
+from tests.support.walk_seed import make_walks
+from tests.support.worn_phone import WornPhone, read_steps
+
+pytestmark = [pytest.mark.browser, pytest.mark.essential]
+
+
+def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: Visit):
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    pt = visit(walk.monitor_path, walk, size="laptop")
+    with browser.new_context(base_url=server.url) as pocket:
+        pocket.set_default_timeout(PATIENCE_MS)
+        page = pocket.new_page()
+        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
+        assert walk.source not in page.url  # it leaves the address at once
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        phone = WornPhone(page, 360)
+        phone.walk(0, 4)
+        expect(page.locator("[data-check=still]")).to_have_class("done")
+        pt.click("[data-main]")  # the session starts
+        expect(pt.locator("[data-presence=source]")).to_contain_text("connected")
+        phone.walk(4, 24)
+        expect(page.locator("[data-check=walk]")).to_have_class("done")
+        expect(page.locator("[data-show=verdict]")).to_have_text("Good.")
+        page.click("[data-lock]")
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        assert phone.strides >= 14
+
+        pocket.set_offline(True)  # strides wait on the phone, also through a reload
+        phone.walk(24, 300)
+        before = phone.strides
+        expect(page.locator("[data-show=state]")).to_contain_text("no network", timeout=PATIENCE_MS)
+        assert len(read_steps(server, walk.session)) < before - 200
+        pocket.set_offline(False)
+        page.reload()
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        phone.walk(300, 324)
+        page.locator("[data-lock]").dispatch_event("click")
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        expect(page.locator("[data-show=state]")).to_contain_text("connected")
+        after = phone.strides
+        assert before >= 240  # more than one frame takes
+        assert after >= 18
+        stored = read_steps(server, walk.session)
+        assert len(stored) == before + after
+        assert all(is_valid for is_valid, _ in stored)
+        assert {"shank_stance_percent", "wearable_shank"} <= json.loads(stored[0][1]).keys()
+        expect(pt.locator("[data-presence=source]")).to_contain_text("valid")
+
+        page.evaluate("""() => {
+          Object.defineProperty(document, "hidden", { get: () => true });
+          document.dispatchEvent(new Event("visibilitychange"));
+        }""")
+        presence = pt.locator("[data-presence=source]")
+        expect(presence).to_contain_text("the phone’s page is not in front")
+        expect(presence).to_have_class(re.compile(r"\blow\b"))
+        phone.walk(324, 332)
+        hidden = phone.strides - after
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        later = read_steps(server, walk.session)[len(stored) :]
+        assert len(later) == hidden > 4
+        assert not any(is_valid for is_valid, _ in later)  # and so none is a missed goal
+
+
+def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
+    with browser.new_context(base_url=server.url) as pocket:
+        page = pocket.new_page()
+        page.goto("/sensor/")
+        expect(page.locator("[data-show=refusal]")).to_contain_text("Scan the square")
+        page = pocket.new_page()
+        page.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false })")
+        page.goto("/sensor/#token=x&place=shank&side=left")
+        expect(page.locator("[data-show=refusal]")).to_contain_text("https")
+
+
+def test_a_therapist_shows_the_square_once(visit: Visit):
+    page = visit("/stations/", size="laptop")
+    page.click("text=A phone as a sensor")
+    page.check("[name=side][value=right]")
+    page.click("text=Show the square")
+    expect(page.locator(".qr svg")).to_be_visible()
+    expect(page.locator("main")).to_contain_text("Phone, right shin")
+    expect(page.locator("main")).to_contain_text("without https")
+    page.goto("/stations/")
+    expect(page.locator("main")).to_contain_text("Phone, right shin")

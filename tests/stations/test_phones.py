@@ -1,0 +1,47 @@
+"""Phones as sensors: who pairs one and for how long; its page is open to strangers."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.stations.models import Device
+from rehab.stations.pages.phones import LIFETIME
+from tests.support.world import World
+
+pytestmark = pytest.mark.django_db
+
+
+def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
+    station = world.add_station()
+    assert "Show the square" in pt.get("/phones/pair/").content.decode()
+    wish = {"station": station.pk, "place": "shank", "side": "left"}
+    answer = pt.post("/phones/pair/", wish)
+    assert "no-store" in answer.headers["Cache-Control"]
+    page = answer.content.decode()
+    assert "<svg" in page
+    assert "without https" in page
+    assert "without https" not in pt.post("/phones/pair/", wish, secure=True).content.decode()
+    device = Device.everywhere.filter(station=station).order_by("pk")[0]
+    assert (device.kind, device.name) == ("source", "Phone, left shin")
+    assert timedelta(0) < device.token_expires_at - timezone.now() <= LIFETIME
+    assert device.has_expired(timezone.now() + LIFETIME)
+    assert AuditEntry.everywhere.filter(act=Act.TOKEN, about__contains=device.name).exists()
+
+
+@pytest.mark.parametrize("wrong", [{"station": "0"}, {"place": "head"}, {"side": "both"}])
+def test_what_cannot_be_paired_is_refused(pt: Client, world: World, wrong):
+    wish = {"station": world.add_station().pk, "place": "foot", "side": "right"} | wrong
+    page = pt.post("/phones/pair/", wish).content.decode()
+    assert "Choose a station, a place and a leg." in page
+    assert not Device.everywhere.filter(name__startswith="Phone").exists()
+
+
+def test_the_page_of_a_phone_is_for_whoever_scans(client: Client):
+    page = client.get("/sensor/").content.decode()
+    assert "garry/sensor/detector" in page
+    assert "no-referrer" in page
