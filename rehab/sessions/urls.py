@@ -3,6 +3,7 @@
 from django.urls import path
 
 from rehab.sessions.pages import (
+    alarms,
     history,
     incident,
     insight,
@@ -45,6 +46,13 @@ urlpatterns = [
         name="add-questionnaire",
     ),
     path("sessions/<int:session_id>/replay/", replay.show_replay, name="replay"),
+    path("alarms/", alarms.show_alarms, name="alarms"),
+    path(
+        "sessions/<int:session_id>/alarms/seen/",
+        alarms.acknowledge_alarms,
+        name="acknowledge-alarms",
+    ),
+    path("incidents/", alarms.list_incidents, name="incidents"),
     path("incidents/<int:incident_id>/", incident.show_incident, name="incident"),
     path("incidents/<int:incident_id>/file/", incident.download_incident, name="incident-file"),
     path("sessions/<int:session_id>/correct/", session.correct, name="correct"),

@@ -15,6 +15,7 @@ from django.utils import timezone
 from msgspec import Struct
 
 from rehab.people.models import User
+from rehab.sessions.alarms import ACKNOWLEDGMENTS
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.session.loading import find_newest_open
 from rehab.sessions.live.supervisor import source_name
@@ -66,7 +67,8 @@ async def carry_out(host: Host, session_id: int, order: Order) -> None:
             await _change(host, session_id, order)
         case RemarkOrder():
             live = await host.settled_session(session_id)
-            if live.aggregate.fold.state in ENDED_STATES:
+            has_ended = live.aggregate.fold.state in ENDED_STATES
+            if has_ended and order.what not in ACKNOWLEDGMENTS.values():
                 raise NotAllowed("The session has ended.")
             await live.remark(order.what, order.value, order.by, timezone.now())
         case StopOrder():
