@@ -56,11 +56,14 @@ class OpenAlarms:
 
     def __init__(self, events: Iterable[SessionEvent] = ()) -> None:
         self._raised: defaultdict[Alarm, list[SessionEvent]] = defaultdict(list)
+        self.stop_reason = ""  # of the robot's latest stop, where it stopped by itself
         for event in events:
             self.apply(event)
 
     def apply(self, event: SessionEvent) -> list[SessionEvent] | None:
         """Take an event in. Return the alarms that it ended; None where it concerns none."""
+        if event.kind in (RobotEntry.STOP, RobotEntry.ARM):
+            self.stop_reason = event.data.get("reason", "")
         if (raised := alarm_of(event)) is not None:
             self._raised[raised].append(event)
             return []
@@ -81,12 +84,13 @@ class OpenAlarms:
         """Whether the patient fell and nobody has acknowledged it."""
         return bool(self._raised[Alarm.FALL])
 
-    def describe(self) -> list[Message]:
+    def describe(self) -> Message:
         """Return them as the therapist's page gets them."""
-        return [
+        alarms = [
             {"kind": event.kind, "at": event.at.isoformat(), "reason": event.data.get("reason", "")}
             for event in self.events
         ]
+        return {"alarms": alarms, "stop_reason": self.stop_reason}
 
 
 @dataclass(slots=True, eq=False)

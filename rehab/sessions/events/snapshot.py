@@ -88,7 +88,7 @@ def snapshot(
             **describe_coaching(fold),
             "trained_side": plan.trained_side,
             "marks": list(marks),
-            "alarms": alarms.describe(),
+            **alarms.describe(),
             **describe_rates(fold.feedback),
             "obstacle": fold.obstacle,
             "robot": dict(robot),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import fields
+from datetime import datetime
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -49,18 +50,25 @@ def step_event(
     context: StepContext,
     step: ScoredStep,
     audiences: Iterable[Audience],
+    received_at: datetime | None,
     *,
     live: bool,
 ) -> LiveEvent:
     """Return the event of a step that was just scored, for these audiences and no other.
 
-    ``live`` is False for a step that came too late to be shown as one.
+    ``received_at`` lets a page find out how long the event took; None when a session is played
+    back. ``live`` is False for a step that came too late to be shown as one.
     """
     messages = {
         audience: MESSAGES[audience](fold, context, step, live)
         for audience in audiences
         if audience in MESSAGES
     }
+    if received_at is not None:
+        at = received_at.timestamp()
+        for audience, message in messages.items():
+            if message is not None and audience is not Audience.ROBOT:
+                message["at"] = at
     return LiveEvent(step.number, messages.__getitem__)
 
 

@@ -100,7 +100,7 @@ export function createFeedback(body) {
   }
 
   // Draw a screen of the session.
-  return function draw(screen, session) {
+  return function draw(screen, session, page) {
     if (session) set(time, timeLeft(session));
     if (session) body.dataset.chart = session.chart;
     if (screen === "feedback") {
@@ -108,7 +108,10 @@ export function createFeedback(body) {
       drawTotals(session);
       return;
     }
-    const [text, more] = messageFor(screen, session, name, body.classList.contains("alone"));
+    const [text, more] = messageFor(screen, session, name, {
+      isAlone: body.classList.contains("alone"),
+      silent_s: page.silent_s,
+    });
     setPhrase(text);
     delete phrase.dataset.fit;
     set(sub, more);

@@ -119,7 +119,9 @@ class LiveSession:
         fold = self.aggregate.fold
         before = Before.of(fold)
         row = self.aggregate.record_step(measurement, received_at, late=late)
-        events = events_of_step(fold, before, row.step, self.feed.audiences, live=not late)
+        events = events_of_step(
+            fold, before, row.step, self.feed.audiences, received_at, live=not late
+        )
         rows: list[Row] = [row]
         changed = before.changed_by_step(fold)
         if fold.following.moved:
@@ -272,6 +274,7 @@ class LiveSession:
                 marks=self._marks(),
                 alarms=self.aggregate.alarms,
             )
+            shown["now"] = now.timestamp()
             subscriber = Subscriber(self.feed, audience, send, write)
             self.feed.subscribers.add(subscriber)
             return shown, subscriber
