@@ -101,6 +101,11 @@ class Incident:
     ended: SessionEvent | None = None
     severity: FallSeverity | None = None
 
+    @property
+    def was_one(self) -> bool:
+        """Whether nobody took it back."""
+        return self.ended is None or self.ended.kind != Remark.FALL_WITHDRAWN
+
 
 def find_incidents(user: User, since: datetime) -> list[Incident]:
     """Return the alarms that a user may see, acknowledged or not, the newest first."""
@@ -110,11 +115,11 @@ def find_incidents(user: User, since: datetime) -> list[Incident]:
     chosen = rows.select_related("by", "session__patient__clinic", "session__station")
     found: list[Incident] = []
     for _, some in groupby(chosen.order_by("session_id", "pk"), attrgetter("session_id")):
-        found += _fold(some)
+        found += fold_incidents(some)
     return sorted(found, key=lambda one: one.raised.at, reverse=True)
 
 
-def _fold(events: Iterable[SessionEvent]) -> list[Incident]:
+def fold_incidents(events: Iterable[SessionEvent]) -> list[Incident]:
     """Return the incidents among a session's events, in their order."""
     alarms, incidents = OpenAlarms(), dict[int, Incident]()
     for event in events:

@@ -10,8 +10,8 @@ from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 
 from rehab.people.networks import client_address
-from rehab.stations.device_trust import UNUSED_FOR
-from rehab.stations.models import Device
+from rehab.stations.device_trust import UNUSED_FOR, is_trusted, is_unused
+from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
 
 COOKIE = "garry_tablet"
@@ -22,6 +22,12 @@ def find_tablet(token: str | None, now: datetime, address: str = "") -> Device |
     """Return the tablet that this token belongs to; None for any other device."""
     device = find_device(token, now, address) if token and token.isascii() else None
     return device if device is not None and device.kind == Device.Kind.TABLET else None
+
+
+def has_tablet(station: Station | None, now: datetime) -> bool:
+    """Return whether a tablet is paired with a station, and may still show its sessions."""
+    paired = Device.everywhere.filter(is_trusted(), station=station, kind=Device.Kind.TABLET)
+    return any(not (one.is_revoked or is_unused(one, now)) for one in paired)
 
 
 def set_secret_cookie(response: HttpResponseBase, name: str, value: str, age_s: float) -> None:

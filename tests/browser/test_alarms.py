@@ -280,7 +280,7 @@ def test_a_server_that_says_nothing_is_told_first_and_everything_is_gray(
     server: Server, visit: Visit, walk: Walk
 ) -> None:
     pages = [visit("about:blank", walk), visit("about:blank", walk, alone=True)]
-    held: list[WebSocketRoute] = []
+    held: list[None] = []
 
     def pass_on(socket: WebSocketRoute) -> None:
         """As a server that hangs: the connection stays, and nothing comes or is answered."""
@@ -295,7 +295,7 @@ def test_a_server_that_says_nothing_is_told_first_and_everything_is_gray(
     with feet_of(server, walk) as feet, robot_of(server, walk):
         begin(monitor, feet)
         patient.wait_for_selector("body[data-look=feedback]")
-        held.append(None)  # type: ignore[arg-type]
+        held.append(None)
         first = monitor.locator("[data-alarm]")
         expect(first).to_have_count(1)
         expect(first).to_contain_text("The server has not answered for")

@@ -25,7 +25,7 @@ const PAUSES = {
 };
 
 const timeOf = (alarm) =>
-  new Date(alarm.at).toLocaleTimeString(document.documentElement.lang, { hour: "2-digit", minute: "2-digit" });
+  new Date(alarm.at).toLocaleTimeString(document.documentElement.lang, { timeStyle: "short", hourCycle: "h23" });
 const alarmOf = ({ alarms }, kind) => alarms.find((one) => one.kind === kind);
 
 function describeServer({ number }, { socket }) {
