@@ -121,6 +121,18 @@ class Valence:
                 found = band
         return found
 
+    def longest_words(self) -> list[str]:
+        """Return the phrases that need the most room: the longest, and that with the longest word.
+
+        A page finds by them which layout has room for all.
+        """
+        phrases = [phrase for band in self.bands for phrase in band.words.splitlines()]
+        if not phrases:
+            return []
+        long = max(phrases, key=len)
+        wide = max(phrases, key=lambda phrase: max(map(len, phrase.split()), default=0))
+        return [long] if long == wide else [long, wide]
+
     def emblem(self, hit: bool) -> Emblem:
         """Return the drawing for a hit or a miss: it follows the points, not the performance."""
         points = self.points(hit) or 0

@@ -4,7 +4,7 @@ import { fillScreen, keepAwake } from "garry/walk/wake_lock";
 import { createCelebration } from "garry/walk/confetti";
 import { createControls } from "garry/walk/controls";
 import { createFeedback } from "garry/walk/feedback";
-import { createFitting } from "garry/walk/fit_text";
+import { createFitting } from "garry/walk/fit_layout";
 import { guardLeaving } from "garry/walk/leave_guard";
 import { connect } from "garry/shared/session_socket";
 import { createScene } from "garry/walk/scene";
@@ -22,7 +22,7 @@ const scene = createScene(body.querySelector(".scene"));
 const { celebrate, clear } = createCelebration(body.querySelector(".confetti"));
 const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
-const fitCalm = createFitting(body);
+const fit = createFitting(body, scene);
 const page = { link: "", silent_s: 0, asking: false, still: false };
 let session, frame, leaveTimer;
 let stopWaiting = () => {};
@@ -81,7 +81,7 @@ function draw() {
   drawFeedback(screen, session, page);
   if (session) showRobot(session);
   if (hasChanged) keepFocus();
-  if (screen !== "feedback") fitCalm();
+  fit(screen, session);
   if (screen === "feedback") {
     const { last, steps } = session;
     scene.show({

@@ -1,0 +1,43 @@
+// The size of this screen: a drawing that is made as wide as a bank card, or the screen's diagonal; and which sizes of
+// words it can hold.
+
+import { pixelsOfDegree } from "garry/walk/fit_layout";
+
+const INCH_MM = 25.4;
+const USUAL = 4; // pixels a millimeter, to begin with
+// Of a page of words and a number: letters of the longest word, their width and lines (rehab/training/bands.py).
+const LETTERS = 11;
+const LETTER_WIDTH = 0.56;
+const LINES = 3;
+const LINE = 1.04;
+const NUMBER = 2;
+const HEADER = 0.14; // of the screen's height
+
+const form = document.querySelector("main form");
+const [width, diagonal] = ["[data-width]", "[data-diagonal]"].map((name) => form.querySelector(name));
+const { px_per_mm: field, distance_m: distance } = form.elements;
+
+function show(pxPerMm) {
+  width.value = pxPerMm;
+  form.querySelector(".bank-card").style.setProperty("--px-per-mm", pxPerMm);
+  const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
+  for (const row of form.querySelectorAll("[data-factor]")) {
+    const word = degree * Number(row.dataset.factor);
+    const isWide = word * LETTER_WIDTH * LETTERS <= screen.width;
+    const isHigh = word * (LINES * LINE + NUMBER) <= (1 - HEADER) * screen.height;
+    row.firstElementChild.textContent = isWide && isHigh ? "✓" : "–";
+  }
+}
+
+function take(pxPerMm) {
+  field.value = pxPerMm.toFixed(3);
+  show(pxPerMm);
+}
+
+width.addEventListener("input", () => take(Number(width.value)));
+diagonal.addEventListener("input", () => {
+  const inches = Number(diagonal.value);
+  if (inches > 0) take(Math.hypot(screen.width, screen.height) / (inches * INCH_MM));
+});
+distance.addEventListener("change", () => show(Number(field.value || USUAL)));
+show(Number(field.value || USUAL));
