@@ -4,34 +4,99 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-
     dependencies = [
-        ('rehab', '0001_tables'),
+        ("rehab", "0001_tables"),
     ]
 
     operations = [
         migrations.AddField(
-            model_name='device',
-            name='screen_distance_m',
+            model_name="device",
+            name="screen_distance_m",
             field=models.FloatField(default=1.5, editable=False),
         ),
         migrations.AddField(
-            model_name='device',
-            name='screen_px_per_mm',
+            model_name="device",
+            name="screen_px_per_mm",
             field=models.FloatField(editable=False, null=True),
         ),
         migrations.AlterField(
-            model_name='patient',
-            name='screen_side',
-            field=models.CharField(choices=[('right', 'on the right (usual)'), ('left', 'on the left'), ('center', 'everything in the middle'), ('in_right', 'everything in the right half, Pause and Stop as well'), ('in_left', 'everything in the left half, Pause and Stop as well')], default='right', max_length=8, verbose_name='where things are'),
+            model_name="patient",
+            name="screen_side",
+            field=models.CharField(
+                choices=[
+                    ("right", "on the right (usual)"),
+                    ("left", "on the left"),
+                    ("center", "everything in the middle"),
+                    ("in_right", "everything in the right half, Pause and Stop as well"),
+                    ("in_left", "everything in the left half, Pause and Stop as well"),
+                ],
+                default="right",
+                max_length=8,
+                verbose_name="where things are",
+            ),
         ),
         migrations.AlterField(
-            model_name='sessionevent',
-            name='kind',
-            field=models.CharField(choices=[('start', 'start'), ('pause', 'pause'), ('resume', 'resume'), ('finish', 'finish'), ('abort', 'abort'), ('goal', 'goal'), ('goal_adaptation', 'automatic goal'), ('gain', 'gain'), ('phase', 'phase'), ('activation_threshold', 'activation threshold'), ('robot_intensity', 'robot intensity'), ('valence', 'feedback type'), ('valence_now', 'feedback type from the next step'), ('feedback_text', 'words'), ('words_shown', 'words shown'), ('chart_style', 'chart style'), ('goal_followed', 'goal followed'), ('planned_rest', 'planned rest'), ('robot_stop', 'robot stop'), ('robot_arm', 'robot arm'), ('robot_decision', 'robot decision'), ('robot_gesture', 'robot gesture'), ('rest', 'rest'), ('pain', 'pain'), ('dizziness', 'dizziness'), ('near_fall', 'near fall'), ('fall', 'fall'), ('fall_severity', 'hurt by the fall'), ('fall_withdrawn', 'it was no fall'), ('fall_acknowledged', 'fall seen by a therapist'), ('stop_acknowledged', 'robot’s stop seen by a therapist'), ('handrail', 'handrail'), ('verbal_cue', 'verbal cue'), ('borg', 'borg')], max_length=32, verbose_name='kind'),
+            model_name="sessionevent",
+            name="kind",
+            field=models.CharField(
+                choices=[
+                    ("start", "start"),
+                    ("pause", "pause"),
+                    ("resume", "resume"),
+                    ("finish", "finish"),
+                    ("abort", "abort"),
+                    ("goal", "goal"),
+                    ("goal_adaptation", "automatic goal"),
+                    ("gain", "gain"),
+                    ("phase", "phase"),
+                    ("activation_threshold", "activation threshold"),
+                    ("robot_intensity", "robot intensity"),
+                    ("valence", "feedback type"),
+                    ("valence_now", "feedback type from the next step"),
+                    ("feedback_text", "words"),
+                    ("words_shown", "words shown"),
+                    ("chart_style", "chart style"),
+                    ("goal_followed", "goal followed"),
+                    ("planned_rest", "planned rest"),
+                    ("robot_stop", "robot stop"),
+                    ("robot_arm", "robot arm"),
+                    ("robot_decision", "robot decision"),
+                    ("robot_gesture", "robot gesture"),
+                    ("rest", "rest"),
+                    ("pain", "pain"),
+                    ("dizziness", "dizziness"),
+                    ("near_fall", "near fall"),
+                    ("fall", "fall"),
+                    ("fall_severity", "hurt by the fall"),
+                    ("fall_withdrawn", "it was no fall"),
+                    ("fall_acknowledged", "fall seen by a therapist"),
+                    ("stop_acknowledged", "robot’s stop seen by a therapist"),
+                    ("handrail", "handrail"),
+                    ("verbal_cue", "verbal cue"),
+                    ("borg", "borg"),
+                ],
+                max_length=32,
+                verbose_name="kind",
+            ),
         ),
         migrations.AddIndex(
-            model_name='sessionevent',
-            index=models.Index(condition=models.Q(('kind__in', ('fall', 'fall_withdrawn', 'fall_acknowledged', 'stop_acknowledged', 'robot_stop', 'robot_arm'))), fields=['at'], name='event_of_alarm'),
+            model_name="sessionevent",
+            index=models.Index(
+                condition=models.Q(
+                    (
+                        "kind__in",
+                        (
+                            "fall",
+                            "fall_withdrawn",
+                            "fall_acknowledged",
+                            "stop_acknowledged",
+                            "robot_stop",
+                            "robot_arm",
+                        ),
+                    )
+                ),
+                fields=["at"],
+                name="event_of_alarm",
+            ),
         ),
     ]

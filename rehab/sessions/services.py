@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
@@ -174,6 +175,7 @@ def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPl
         gestures=tuple(gestures.values()),
         alternatives=tuple(alternatives),
         language=patient.language,
+        seed=secrets.randbelow(2**31),
     )
 
 

@@ -72,7 +72,7 @@ def walking(browser: Browser, server: Server) -> Iterator[Any]:
                 page.wait_for_selector("body:not([data-look=ready])")
                 feet = stack.enter_context(feet_of(server, walk))
                 feet.walk(1.2, 0.8)
-                page.wait_for_function("document.body.dataset.step == 2")
+                page.wait_for_function("() => document.body.dataset.step == 2")
                 pages[side, language, valence] = page
             return pages[side, language, valence]
 

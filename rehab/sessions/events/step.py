@@ -38,11 +38,12 @@ class StepContext(NamedTuple):
     valence: Valence
     words_shown: bool
     chart_style: str
+    told: int  # answers before it
 
     @classmethod
     def of(cls, fold: SessionFold) -> StepContext:
         """Return the context of the next step."""
-        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style)
+        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style, fold.delivery.told)
 
 
 def step_event(
@@ -128,7 +129,7 @@ def patient_step(
     if answer is None:
         return {"kind": "calm", "number": step.number}
     if plan.schedule.kind is ScheduleKind.SUMMARY:
-        return _summary(context, step, answer, score, streak, live=live)
+        return _summary(plan, context, step, answer, score, streak, live=live)
     valence, band = context.valence, context.valence.band(step.performance)
     if step.close:
         band = Band(0, plan.close_steps.words)
@@ -139,7 +140,7 @@ def patient_step(
         "performance": round(step.performance, 4),
         "hit": step.hit,
         "close": step.close,
-        "words": band.words if context.words_shown else "",
+        "words": plan.choose_words(band, context.told) if context.words_shown else "",
         "chart": context.chart_style,
         "emblem": Emblem.NEUTRAL if step.close else valence.emblem(step.hit),
         "confetti": band.confetti,
@@ -152,6 +153,7 @@ def patient_step(
 
 
 def _summary(
+    plan: SessionPlan,
     context: StepContext,
     step: StoredStep,
     answer: FeedbackSummary,
@@ -169,7 +171,7 @@ def _summary(
         "live": live,
         "performance": round(mean, 4),
         "hit": mean >= 1,
-        "words": band.words if context.words_shown else "",
+        "words": plan.choose_words(band, context.told) if context.words_shown else "",
         "chart": context.chart_style,
         "emblem": valence.emblem(mean >= 1),
         "confetti": band.confetti,
