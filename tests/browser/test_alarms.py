@@ -181,7 +181,7 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
             begin(monitor, feet)
             expect(readiness).to_be_hidden()
             robot = monitor.locator("[data-alarm=robot]")
-            expect(robot).to_contain_text("The robot stands: somebody stopped it.")
+            expect(robot).to_contain_text("The robot stands: it was stopped.")
             monitor.get_by_role("button", name="Let it move").first.click()
             expect(robot).to_have_count(0)
             expect(monitor.locator("[data-presence=robot]")).to_contain_text("✓")

@@ -132,7 +132,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
 
 def steer_the_robot(server: Server, walk: Walk, monitor: Page) -> None:
     pressed(monitor, "data-levels", "0.5")
-    monitor.get_by_label("Threshold up").click()
+    monitor.get_by_label("Celebrate later").click()
     expect(monitor.locator("[data-show=threshold]")).to_have_text("95 %")
 
 
@@ -253,5 +253,5 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         expect(why).to_have_text("")
         stop.click()
         hear(robot, "stop")
-        expect(why).to_have_text("It stands: somebody stopped it.")
+        expect(why).to_have_text("It stands: it was stopped.")
         expect(monitor.locator(".safety .stop")).to_have_text("Robot stopped")

@@ -13,12 +13,13 @@ from django.utils import timezone
 
 from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
-from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
 from rehab.sessions.live.servers.servers import Servers
 from rehab.sessions.live.session.instruments import LATE_S
+from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
@@ -133,6 +134,9 @@ class Routines:
         A few sockets at a time: steps wait while another thread has the interpreter.
         """
         sockets = [socket for socket in self._host.sockets if socket.actor is not None]
+        heard = {one.actor.pk for one in sockets if isinstance(one.actor, Device)}
+        if heard:
+            await note_heard(heard, timezone.now())
         for first in range(0, len(sockets), CHECKED_SOCKETS):
             if first:
                 await asyncio.sleep(CHECK_PAUSE_S)
