@@ -7,7 +7,6 @@ is never blamed, and where the goal was moved that is said in place of how many 
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
@@ -16,7 +15,6 @@ from typing import Any
 
 from django.db.models import Count, F, Max, Q, QuerySet, Sum
 from django.utils.translation import gettext as _
-from django.utils.translation import ngettext
 
 from rehab.people.models import Patient
 from rehab.sessions.formatting import (
@@ -36,8 +34,8 @@ from rehab.sessions.reports.better_or_worse import (
     judge,
     load_results,
 )
+from rehab.sessions.reports.earned import find_earned
 from rehab.training.measures import A2
-from rehab.training.valences import Valence
 
 MILESTONES = (5, 10, 25, 50)  # sessions, and each further hundred
 FAMILY_WEEKS = 6  # of sessions that a family sees
@@ -92,60 +90,6 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
         "sentence": describe_today(results[-1], results[0] if len(results) > 1 else None),
         "earned": earned,
     }
-
-
-@dataclass(frozen=True, slots=True)
-class Earned:
-    """The one number of a session that its patient takes along, what it counts, and its mark."""
-
-    number: str
-    label: str
-    mark: str
-
-
-def find_earned(
-    session: TrainingSession, before: QuerySet[TrainingSession], valence: Valence
-) -> Earned | None:
-    """Return what a session came to, never as a loss; None where nothing was judged.
-
-    Points where they were won; else the steps that reached the goal; under the explicit type, and
-    where no step did, the steps that were walked. A personal best is named, or the next mark above:
-    the best so far or a round number, whichever is nearer. Steps walked have none.
-    """
-    slugs = ("score", "hit_rate", "steps")
-    rows = SessionMetric.everywhere.filter(slug__in=slugs)
-    figures = dict(rows.filter(session=session).values_list("slug", "value"))
-    steps, points = round(figures.get("steps", 0)), round(figures.get("score", 0))
-    if not steps:
-        return None
-    hits = round(figures.get("hit_rate", 0) * steps)
-    if not valence.has_points or not hits:
-        label = ngettext("step walked", "steps walked", steps)
-        return Earned(format_number(steps, 0), label, "")
-    earlier: dict[int, dict[str, float]] = defaultdict(dict)
-    for key, slug, value in rows.filter(session__in=before.values("pk")).values_list(
-        "session", "slug", "value"
-    ):
-        earlier[key][slug] = value
-    if valence.rewards and points > 0:
-        number, label = points, ngettext("point", "points", points)
-        others = [one.get("score", 0) for one in earlier.values()]
-    else:
-        number, label = hits, ngettext("step at the goal", "steps at the goal", hits)
-        others = [one.get("hit_rate", 0) * one.get("steps", 0) for one in earlier.values()]
-    best = round(max(others, default=0))
-    if others and number > best:
-        mark = _("Your best so far!")
-    else:
-        mark = _("Next mark: %(count)s.") % {"count": format_number(next_mark(number, best), 0)}
-    return Earned(format_number(number, 0), label, mark)
-
-
-def next_mark(number: int, best: int) -> int:
-    """Return the nearest mark above a number: the best so far, or the next round number."""
-    size = 10 if number < 100 else 50 if number < 500 else 100
-    round_one = (number // size + 1) * size
-    return min(round_one, best) if best > number else round_one
 
 
 def describe_today(today: Result, last: Result | None) -> str:

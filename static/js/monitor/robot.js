@@ -156,7 +156,10 @@ export class RobotPanel {
     const share = this.#decision?.activated_share;
     show("robot-state", this.#describeState());
     const isOther = this.#isHeld || this.#orderFailure; // than what it decides
-    show("share", share == null || isOther ? "" : fill(_("So far it celebrates %(share)s of the time."), { share: percent(share) }));
+    show(
+      "share",
+      share == null || isOther ? "" : fill(_("So far it celebrates %(share)s of the time."), { share: percent(share) }),
+    );
     show("robot-why", this.#orderFailure || this.#describeHold());
     show("robot-cure", this.#describeCure());
     show("robot-last", isOther ? "" : describeDecision(this.#decision, this.#breakReason));
@@ -247,7 +250,8 @@ export class RobotPanel {
     if (!this.#isConnected) return { text: _("none"), isLow: false };
     if (this.#isHeld) return { text: this.#describeState(), isLow: true };
     const { battery_share: share, battery_low: low, simulated, open_loop: open, bumpers } = this.#status ?? {};
-    const lacks = simulated === false ? `${open ? _(", cannot tell where it is") : ""}${bumpers ? "" : _(", no bumper")}` : "";
+    const lacks =
+      simulated === false ? `${open ? _(", cannot tell where it is") : ""}${bumpers ? "" : _(", no bumper")}` : "";
     if (share == null) return { text: _("connected") + lacks, isLow: false };
     const battery = fill(_("battery %(share)s"), { share: percent(share) });
     return { text: battery + (low ? _(": charge it") : "") + lacks, isLow: Boolean(low) };

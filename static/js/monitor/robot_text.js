@@ -91,7 +91,7 @@ export function describeDecision(decision, breakReason) {
   const { mean, threshold, gesture, intensity, reason } = decision;
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
-  return fill(_("The last five seconds: %(mean)s of the goal (it celebrates from %(threshold)s). %(what)s."), {
+  return fill(_("The last five seconds: %(mean)s of the goal, it celebrates from %(threshold)s: %(what)s."), {
     mean: percent(mean),
     threshold: percent(threshold),
     what: gesture ? gesture + size + end : describeReason(reason),

@@ -11,7 +11,15 @@ const TICKS = [0.25, 0.5, 0.75, 1.25];
 // `low`: where the scale ends once words take the room above it.
 const LAYOUTS = {
   portrait: { box: "0 0 800 1280", x: 600, y150: 484, low: 704, y0: 1068, chart: [60, 476], figure: [400, 930, 1.66] },
-  landscape: { box: "0 0 1280 800", x: 1066, y150: 150, low: 150, y0: 612, chart: [520, 930], figure: [900, 560, 1.36] },
+  landscape: {
+    box: "0 0 1280 800",
+    x: 1066,
+    y150: 150,
+    low: 150,
+    y0: 612,
+    chart: [520, 930],
+    figure: [900, 560, 1.36],
+  },
   column: { box: "0 0 800 1000", x: 600, y150: 456, low: 590, y0: 812, chart: [60, 476], figure: [400, 760, 1.06] },
 };
 
