@@ -131,7 +131,7 @@ def test_round_numbers_become_rarer():
 def test_a_type_that_only_takes_points_praises_no_row(world, patient):
     words = read(world, walk(patient, "negative", [HIT] * 9 + [MISS]))
     assert "Today 9 of 10" in words
-    assert "Next time you can compare with today." in words
+    assert "Next mark: " in words
     assert "in a row" not in words
 
 

@@ -121,8 +121,8 @@ def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | Non
             continue
         if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
-            phase, told = plan.phases[step.phase], context.told - 1
-            context = context._replace(phase=phase, told=told)
+            phase, before = plan.phases[step.phase], context.told - 1
+            context = context._replace(phase=phase, told=before)
             return patient_step(
                 plan, context, step, score, streak, live=False, answer=FeedbackSummary(steps=1)
             )

@@ -1,4 +1,4 @@
-"""The one number of a session that its patient takes along, and the mark it reached or comes next."""
+"""The one number of a session that its patient takes along, and its mark."""
 
 from __future__ import annotations
 

@@ -5,13 +5,13 @@ import { pixelsOfDegree } from "garry/walk/fit_layout";
 
 const INCH_MM = 25.4;
 const USUAL = 4; // pixels a millimeter, to begin with
-// Of a page of words and a number: letters of the longest word, their width and lines (rehab/training/bands.py).
-const LETTERS = 11;
+// Of a page of words and a number: letters of the longest phrase and word (rehab/training/phrases.py), their width, a
+// line's height and the number's with its label.
+const LETTERS = { phrase: 26, word: 12 };
 const LETTER_WIDTH = 0.56;
-const LINES = 3;
 const LINE = 1.04;
-const NUMBER = 2;
-const HEADER = 0.14; // of the screen's height
+const NUMBER = 2.1;
+const USED = { width: 0.93, height: 0.85 }; // of the screen
 
 const form = document.querySelector("main form");
 const [width, diagonal] = ["[data-width]", "[data-diagonal]"].map((name) => form.querySelector(name));
@@ -23,9 +23,10 @@ function show(pxPerMm) {
   const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
   for (const row of form.querySelectorAll("[data-factor]")) {
     const word = degree * Number(row.dataset.factor);
-    const isWide = word * LETTER_WIDTH * LETTERS <= screen.width;
-    const isHigh = word * (LINES * LINE + NUMBER) <= (1 - HEADER) * screen.height;
-    row.firstElementChild.textContent = isWide && isHigh ? "✓" : "–";
+    const inLine = Math.floor((USED.width * screen.width) / (word * LETTER_WIDTH));
+    const lines = Math.ceil(LETTERS.phrase / inLine);
+    const isHeld = inLine >= LETTERS.word && word * (lines * LINE + NUMBER) <= USED.height * screen.height;
+    row.firstElementChild.textContent = isHeld ? "✓" : "–";
   }
 }
 
