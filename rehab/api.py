@@ -7,8 +7,11 @@ from collections.abc import Callable
 from functools import cache, wraps
 from typing import Any
 
+from django.conf import settings
+from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied, RequestDataTooBig, SuspiciousOperation
 from django.http import Http404, HttpRequest, HttpResponse
+from django.http.multipartparser import MultiPartParserError
 from django.urls import URLPattern, re_path
 from django.views.decorators.csrf import csrf_exempt
 from ninja import NinjaAPI
@@ -19,6 +22,7 @@ from rehab.boards import api as boards
 from rehab.legacy import api as legacy
 from rehab.people import api as people
 from rehab.people.access import public
+from rehab.people.models import User
 from rehab.people.web.api_base import PerUserThrottle, Rejected, SessionAuth, TokenAuth, check_roles
 from rehab.sessions import api as sessions
 
@@ -39,6 +43,20 @@ def describe(api: NinjaAPI, path_prefix: str) -> OpenAPISchema:
     return get_schema(api, path_prefix)
 
 
+def for_members(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
+    """Show the description of the calls to strangers on one machine alone, not hosted."""
+
+    @wraps(view)
+    def shown(request: HttpRequest, **names: Any) -> HttpResponse:
+        if not settings.HOSTED or isinstance(request.user, User) or TokenAuth()(request):
+            return view(request, **names)
+        if request.resolver_match and request.resolver_match.url_name == "openapi-view":
+            return redirect_to_login(request.get_full_path())
+        raise AuthenticationError
+
+    return shown
+
+
 api = Api(
     title="GARRY",
     version="1",
@@ -46,6 +64,7 @@ api = Api(
     urls_namespace="api",
     auth=[TokenAuth(), SessionAuth()],
     throttle=PerUserThrottle(),
+    docs_decorator=for_members,
 )
 api.add_decorator(check_roles)
 for room in (people, sessions, boards, legacy):
@@ -115,8 +134,9 @@ def on_permission_denied(request: HttpRequest, problem: PermissionDenied) -> Htt
     return problem_response(request, 403, str(problem) or "This is for other roles.")
 
 
+@api.exception_handler(MultiPartParserError)
 @api.exception_handler(SuspiciousOperation)
-def on_suspicious_operation(request: HttpRequest, problem: SuspiciousOperation) -> HttpResponse:
+def on_suspicious_operation(request: HttpRequest, problem: Exception) -> HttpResponse:
     """Answer a request that Django refuses as suspicious."""
     if isinstance(problem, RequestDataTooBig):
         return problem_response(request, 413, "The body is too long. Send less at once.")
@@ -151,6 +171,8 @@ def with_json_errors(view: Callable[..., HttpResponse]) -> Callable[..., HttpRes
             response = view(request, **names)
         except Http404:  # of the API's root
             return unknown_call(request)
+        except AuthenticationError as problem:  # of its description
+            return on_unauthenticated(request, problem)
         if response.status_code != 405:
             return response
         allowed = ", ".join(sorted(response["Allow"].split(", ")))  # a set: sort it

@@ -25,9 +25,10 @@ class RehabConfig(AppConfig):
         from rehab.people.sign_in import lockout, step_up
         from rehab.people.sign_in.devices import note_browser
         from rehab.people.sign_in.factors.factors import Authenticator
+        from rehab.people.sign_in.first_start import forget_first_password
         from rehab.people.sign_in.tokens import revoke_with_account
         from rehab.sessions.feedback_text_updates import connect_signals
-        from rehab.sessions.setup.defaults import install_defaults
+        from rehab.sessions.setup.default_protocols import install_defaults
         from rehab.studies import signals as studies
 
         post_migrate.connect(install_defaults, sender=self)
@@ -36,6 +37,7 @@ class RehabConfig(AppConfig):
         track_models(*TRACKED)
         sign_in_log.connect_receivers(Authenticator)
         user_logged_in.connect(note_browser)
+        user_logged_in.connect(forget_first_password)
         user_login_failed.connect(lockout.record_lockout)
         pre_save.connect(revoke_with_account, sender=User)
         connect_signals()

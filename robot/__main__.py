@@ -95,7 +95,7 @@ def find_black_box(named: str, own: str) -> Path | None:
     named
         The option: a folder, or off.
     own
-        What stays the same of this robot: its token's file, or the token.
+        What identifies this robot from run to run: its token's file, or the token.
     """
     if named in ("", "off"):
         return None
@@ -153,7 +153,7 @@ def run(options: Namespace) -> int:
     """
     url = websocket_url(options.server, ROBOT_PATH)
     token = find_token(options, "GARRY_ROBOT_TOKEN", "a robot")
-    if options.child:  # Ctrl-C reaches both of us; the server tells when to end
+    if options.child:  # Ctrl-C reaches server and robot; the server decides when to end
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     base, originals = make_base(options, time.monotonic), None
     if options.original_topics is not None:

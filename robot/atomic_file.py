@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def write_atomically(path: Path, data: bytes, *, mode: int = 0o600) -> None:
-    """Write a file anew beside itself, and put it in place once the disk has it.
+    """Write a file under another name beside it, and replace it once the disk has the new one.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def write_atomically(path: Path, data: bytes, *, mode: int = 0o600) -> None:
     Raises
     ------
     OSError
-        Where it cannot be written; the old file is left as it was, and nothing beside it.
+        Where it cannot be written; the old file is left as it was, and the new one is removed.
     """
     path = path.resolve()
     new = path.with_name(f".{path.name}.new")

@@ -24,10 +24,10 @@ from robot.base_options import (
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.behavior.performer import Performer, control_loop
 from robot.calibration import BadCalibration, store_calibration
+from robot.motion.base_response import Response
 from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.limits import TICK_S
 from robot.motion.player import DONE
-from robot.motion.response import Response
 
 REST_S = 4.0
 TIMES = 2

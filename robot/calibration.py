@@ -10,7 +10,7 @@ from typing import Any
 
 from robot.atomic_file import write_atomically
 from robot.bases import MobileBase
-from robot.motion.response import Response
+from robot.motion.base_response import Response
 
 
 class BadCalibration(ValueError):

@@ -1,4 +1,4 @@
-"""Marks text for translation by pages; rules and robot themselves know no languages."""
+"""Marks text for translation by pages; rules and robots themselves know no languages."""
 
 from __future__ import annotations
 

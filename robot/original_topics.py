@@ -84,13 +84,22 @@ class OriginalTopicClient:
         self._true_until_s = math.inf
 
     def allow(self, is_allowed: bool) -> None:
-        """Allow ``True`` and data where our own robot may act; else take back what was said."""
+        """Allow ``True`` and data where our own robot may act; else withdraw what was published."""
         if self.is_allowed and not is_allowed:
             self._take_back()
         self.is_allowed = is_allowed
 
     def handle_message(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Handle a message of the server; a step without finite numbers is not published."""
+        """Handle a message of the server.
+
+        Parameters
+        ----------
+        message
+            Of a step, the shown value and the goal are published; one without finite numbers is
+            not. Of a welcome or a cue, the feedback type is stored.
+        now_s
+            When it came [s].
+        """
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
@@ -103,7 +112,7 @@ class OriginalTopicClient:
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
     def publish_decision(self, above: bool, window_s: float, now_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above.
+        """Publish a decision about a window.
 
         Parameters
         ----------
@@ -145,7 +154,15 @@ class OriginalTopicClient:
                 yield self._publish(topic, message, now_s)
 
     def handle(self, incoming: Incoming, now_s: float) -> None:
-        """Confirm a message by its echo."""
+        """Handle a frame of the bridge.
+
+        Parameters
+        ----------
+        incoming
+            A publication is the echo that confirms its topic; a response is ignored.
+        now_s
+            Not used.
+        """
         if isinstance(incoming, Publication):
             self._unconfirmed.pop(incoming.topic, None)
 
@@ -223,12 +240,20 @@ class OriginalTopics:
             self._client.handle_message(message, self._monotonic())
 
     def publish_decision(self, above: bool, window_s: float) -> None:
-        """Publish a decision: whether the window, of a length [s], was above."""
+        """Publish a decision about a window.
+
+        Parameters
+        ----------
+        above
+            Whether the window's mean reached the threshold.
+        window_s
+            Length of a window [s].
+        """
         with self._bridge.sending():
             self._client.publish_decision(above, window_s, self._monotonic())
 
     def allow(self, is_allowed: bool) -> None:
-        """Allow what moves a robot, or take back what was said."""
+        """Allow what moves a robot, or withdraw what was published."""
         if self._client.is_allowed != is_allowed:  # asked at each tick, by the only one who sets it
             with self._bridge.sending():
                 self._client.allow(is_allowed)

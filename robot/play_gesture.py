@@ -50,6 +50,7 @@ def ending_by_signals() -> Iterator[None]:
     ended: list[int] = []
 
     def end(number: int, _frame: object) -> None:
+        """Raise Ended for the first signal, of this ``number``; ``_frame`` is not used."""
         ended.append(number)
         if len(ended) == 1:  # what follows would disturb the stopping
             raise Ended(number)

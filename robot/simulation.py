@@ -12,7 +12,7 @@ from robot.bases import BASES
 from robot.behavior.performer import Performer, control_loop
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 
-# Simulated bases that keep to any clock.
+# Simulated bases that run on any clock.
 SIMULATED_BASES = [
     name
     for name, base in BASES.items()

@@ -80,6 +80,24 @@ def test_constraints_are_exact_versions_only() -> None:
     assert not [pin for pin in pins if not re.fullmatch(r"[\w.-]+==[\w.]+", pin)]
 
 
+@pytest.mark.parametrize("lock", sorted((ROOT / "locks").glob("*.txt")), ids=lambda lock: lock.stem)
+def test_locks_have_hashes_of_the_same_versions_and_no_address(lock: Path) -> None:
+    text = lock.read_text().replace(" \\\n", " ")
+    pins = (ROOT / "constraints.txt").read_text()
+    pinned = dict(re.findall(r"^([\w.-]+)==([\w.]+)", pins, re.MULTILINE))
+    versions = {
+        name.lower().replace("_", "-").replace(".", "-"): one for name, one in pinned.items()
+    }
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    assert lines
+    for line in lines:
+        found = re.fullmatch(r"([\w-]+)==([\w.]+)( ; [^#]+?)?( +--hash=sha256:\w{64})+", line)
+        assert found, line[:80]
+        # What other systems or Pythons need, and what builds GARRY, is not installed here.
+        assert versions.get(found[1], found[2]) == found[2], line[:80]
+    assert any(line.startswith("setuptools==") for line in lines)
+
+
 def test_browser_libraries_are_exact_and_without_address() -> None:
     package = json.loads((ROOT / "package.json").read_text())
     lock = json.loads((ROOT / "package-lock.json").read_text())

@@ -1,12 +1,10 @@
 """Strides with A2 from raw signals, while a person walks. Pure: no Django, no clock.
 
 ``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` a whole
-recording with the same code. The comments of thresholds name their
-sources.
+recording with the same code, ``WearableDetector`` those of a sensor on a foot or shank. Comments
+name the source of each threshold.
 """
 
-from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector
-from rehab.gait.contacts.gyroscope_strides import GyroscopeStride, GyroscopeStrideDetector
 from rehab.gait.offline import make_detector, measure_strides
 from rehab.gait.online import StrideDetector
 from rehab.gait.selfcheck.checks import Finding, SignalCheck, check_signals
@@ -14,22 +12,20 @@ from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.kinetics import compute_ankle_moment
 from rehab.gait.strides import Flag, GaitInputError, RejectionReason, Stride
 from rehab.gait.two_legs import TwoLegDetector
+from rehab.gait.wearables import WearableDetector, WearableStride
 
 __all__ = [
-    "ContactKind",
     "Finding",
     "Flag",
     "GaitInputError",
-    "GyroscopeContact",
-    "GyroscopeDetector",
-    "GyroscopeStride",
-    "GyroscopeStrideDetector",
     "LegSamples",
     "RejectionReason",
     "SignalCheck",
     "Stride",
     "StrideDetector",
     "TwoLegDetector",
+    "WearableDetector",
+    "WearableStride",
     "check_signals",
     "compute_ankle_moment",
     "make_detector",

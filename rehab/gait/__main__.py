@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rehab.gait.contacts.gyroscope_strides import measure_gyroscope
 from rehab.gait.offline import measure_strides
 from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
@@ -31,6 +30,7 @@ from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError, Stride
+from rehab.gait.wearables import Place, WearableDetector
 
 LOOK_AHEAD_S = 0.05
 
@@ -50,8 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["check"]:
         return check_files(words[1:])
-    if words[:1] == ["gyroscope"]:
-        return measure_gyroscopes(words[1:])
+    if words[:1] == ["wearable"]:
+        return measure_wearables(words[1:])
     options = _read_options(words)
     try:
         if options.plot:
@@ -97,7 +97,7 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
     path = paths[0]
-    time, legs, frames = read_signals(*paths, pairs=options.columns)
+    time, legs, frames, is_overground = read_signals(*paths, pairs=options.columns)
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     strides = measure_strides(
@@ -106,7 +106,7 @@ def _measure_walk(paths: Sequence[Path], options: argparse.Namespace) -> None:
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         look_ahead_s=options.look_ahead,
-        is_overground=options.overground,
+        is_overground=options.overground or is_overground,
         frame=frames,
     )
     check = check_signals(
@@ -173,6 +173,8 @@ def check_files(arguments: Sequence[str]) -> int:
         metavar="CHANNEL=COLUMN",
         help="what you take them for: wrong ones are refused with what was seen",
     )
+    parser.add_argument("--overground", action=argparse.BooleanOptionalAction,
+                        help="over plates in a floor, or not; else by the steps")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="as one JSON object")
     parser.add_argument("--save", type=Path, metavar="NEW.csv",
                         help="write the signals in SI units, if nothing is wrong")  # fmt: skip
@@ -196,7 +198,7 @@ def _check_walk(options: argparse.Namespace) -> int:
     if not options.json:
         print(f"Comparing {len(table)} columns …", file=sys.stderr)
     given = read_column_map(options.columns) if options.columns else None
-    check = check_setup(table, options.mass)
+    check = check_setup(table, options.mass, is_overground=options.overground)
     if options.json:
         print(json.dumps(setup_to_json(check, list(table)), allow_nan=False))
     else:
@@ -209,45 +211,61 @@ def _check_walk(options: argparse.Namespace) -> int:
         require_columns(options.files[0], table, columns)
         frame = columns.frame or check.columns.frame
         frames = None if frame is None else table[frame.name]
-        save_signals(options.save, *apply_columns(table, columns), frames)
+        is_overground = check.proposal.is_overground
+        signals = apply_columns(table, columns)
+        save_signals(options.save, *signals, frames, is_overground=is_overground)
     return 2 if wrong else 0 if check.is_certain else 1
 
 
-def measure_gyroscopes(arguments: Sequence[str]) -> int:
-    """Print the strides of a gyroscope on foot or shank; return the exit status."""
+def measure_wearables(arguments: Sequence[str]) -> int:
+    """Print the strides of a sensor on foot or shank; return the exit status."""
     parser = argparse.ArgumentParser(
-        prog="python -m rehab.gait gyroscope",
-        description="Contacts, stride time and cadence by a gyroscope; its sign is found.",
+        prog="python -m rehab.gait wearable",
+        description="Contacts, times and angles by a sensor on a leg, mounted in any way.",
     )
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.add_argument("--time", default="time", help="column of times [s] (default: time)")
-    parser.add_argument("--rate-column", required=True, metavar="COLUMN[*FACTOR]",
-                        help="sagittal rate in rad/s; *0.01745 for degrees")  # fmt: skip
-    parser.add_argument("--segment", choices=("foot", "shank"), default="foot")
+    parser.add_argument("--columns", required=True, metavar="COLUMN[*FACTOR][,…]",
+                        help="three accelerations [m/s²] and three rates [rad/s], or only the rate "
+                        "from left to right; *0.01745 for degrees")  # fmt: skip
+    parser.add_argument("--place", choices=[str(one) for one in Place], default="foot")
     options = parser.parse_args(arguments)
     try:
-        column = read_column(options.rate_column)
+        columns = [read_column(one) for one in options.columns.split(",")]
         table = read_any_table(options.file)
-        missing = [name for name in (options.time, column.name) if name not in table]
-        if missing:
+        missing = [one for one in (options.time, *(c.name for c in columns)) if one not in table]
+        if missing or len(columns) not in (1, 6):
             raise GaitInputError(
                 f"{options.file.name} has no column {', '.join(missing)}. It has: "
                 f"{', '.join(table)}."
+                if missing
+                else "Give one column or six: ax,ay,az,gx,gy,gz."
             )
-        strides, sign = measure_gyroscope(
-            table[options.time], table[column.name] * column.factor, segment=options.segment
+        rows = np.stack([table[one.name] * one.factor for one in columns], axis=1)
+        detector = WearableDetector(options.place)
+        rates, accelerations = (
+            (rows[:, 0], None) if len(columns) == 1 else (rows[:, 3:], rows[:, :3])
         )
+        strides = detector.feed(table[options.time], rates, accelerations)
+        if detector.left is None:
+            raise GaitInputError(
+                "No strides are found. Give rates in rad/s (COLUMN*0.01745 for degrees) and "
+                "accelerations in m/s² (COLUMN*9.81 for g), of at least five strides."
+            )
     except (GaitInputError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
-    print(f"{'contact':>9} {'leaves':>9} {'stride s':>9} {'stance s':>9} {'steps/min':>9}")
+    print(
+        f"{'contact':>9} {'leaves':>9} {'stride s':>9} {'stance %':>9} {'strike °':>9}  why invalid"
+    )
     for one in strides:
+        strike = math.nan if one.foot_strike_rad is None else math.degrees(one.foot_strike_rad)
         print(
             f"{one.initial_contact_s:9.3f} {one.terminal_contact_s:9.3f} {one.stride_s:9.3f} "
-            f"{one.stance_s:9.3f} {one.cadence_min:9.1f}"
+            f"{100 * one.stance_share:9.1f} {strike:9.1f}  {' '.join(one.reasons)}"
         )
-    turned = "" if sign > 0 else "; its sign is turned"
-    print(f"{len(strides)} strides{turned}")
+    axis = ", ".join(f"{part:z.2f}" for part in detector.left)
+    print(f"{len(strides)} strides; the walker's left is ({axis})")
     return 0
 
 

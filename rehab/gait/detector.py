@@ -57,7 +57,7 @@ class Detector:
         checked = DetectorSettings(rate_hz=rate_hz, mass_kg=mass_kg, **settings)
         self._is_overground = checked.is_overground
         self._sides = sides
-        # Of what is fed, in messages.
+        # Names of the channels, for messages.
         marks = [f"{side} " for side in sides] if len(sides) > 1 else [""]
         self._names = ("t_s", *(mark + name for mark in marks for name in CHANNEL_NAMES))
         self._clock: SampleClock | FrameClock = SampleClock()
@@ -170,7 +170,7 @@ class Detector:
         return strides, count
 
     def _change_rows(self, table: Floats) -> tuple[list[Stride], Floats]:
-        """Look at what waits, and return its strides and a table with the rows that are used now.
+        """Return the strides of the samples that wait, and a table with the rows that are used now.
 
         Samples that the clock holds back go before it, with NaN where they have no values.
         """
@@ -185,7 +185,7 @@ class Detector:
     def _begin_to_count(self, numbers: Floats) -> list[Stride]:
         """Use frame numbers from the next sample on; return the strides until then.
 
-        In the middle of a walk they begin with a chunk that has all of them.
+        In the middle of a walk, the first chunk with a number for each sample begins their use.
         """
         is_first = not (self._samples.filled or self._clock.is_holding)
         if not is_first and not np.isfinite(numbers).all():

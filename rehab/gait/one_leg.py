@@ -120,7 +120,14 @@ class LegDetector:
         self._number = 0
 
     def advance(self, start: int, stop: int) -> list[OneLegStride]:
-        """Process samples ``start:stop``, a second at most; return the strides they complete."""
+        """Process the next samples, and return the strides that they complete.
+
+        Parameters
+        ----------
+        start, stop
+            Indices of the first sample and of the one behind the last, at most ``longest_chunk``
+            apart.
+        """
         self.pending.extend(self.contacts.advance(start, stop))
         strides: list[OneLegStride] = []
         while self.pending:
@@ -146,13 +153,21 @@ class LegDetector:
         return strides
 
     def complete(self, stride: OneLegStride, other_leg: OtherLeg) -> Stride:
-        """Return the whole stride, from its own leg's part and the other leg's."""
+        """Return the whole stride, from its own leg's part and the other leg's.
+
+        Parameters
+        ----------
+        stride
+            What was measured on its own leg.
+        other_leg
+            What the other leg adds: reasons, flags and the figures that take two legs.
+        """
         contact, stance = stride.contact, stride.stance
         reasons = stride.reasons + other_leg.reasons
         flags = [*stance.flags, *other_leg.flags]
         if abs(contact.offset_n) > OFFSET_N:
             flags = [Flag.OFFSET, *flags]
-        # A leg that never bears its weight has help.
+        # A leg that never bears the whole weight is supported.
         if contact.peak_n < FULL_LOAD * self.weight_n and Flag.SUPPORTED not in flags:
             flags = [*flags, Flag.SUPPORTED]
         begin_s, end_s = contact.begin_s, contact.end_s or 0.0
@@ -225,7 +240,7 @@ class LegDetector:
         return begin, stride_s, contact.begin_s - left_s
 
     def _is_unusual(self, stance_s: float) -> bool:
-        """Return whether a stance time is far from the last ones, valid or not, and store it."""
+        """Return whether a stance time is far from the last ones, valid or not; then store it."""
         usual = sorted(self._stances)[len(self._stances) // 2] if len(self._stances) > 1 else None
         if STANCE_MIN_S <= stance_s <= STANCE_MAX_S:
             self._stances.append(stance_s)

@@ -15,8 +15,8 @@ from django.db.models.functions import Coalesce, Greatest
 from rehab.patients.closure import lock_without_open_session
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log, seals
-from rehab.people.audit.audit_log import Act
-from rehab.people.audit.history import erase_values
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.audit.history import HistoryEntry, erase_values
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.consent.tombstones import block_reimport
@@ -117,7 +117,8 @@ def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
 def delete_old_logs(clinic: Clinic, now: datetime) -> int:
     """Delete entries that are older than a clinic keeps its logs; return how many."""
     before = months_before(now, clinic.log_retention_months)
-    return sum(seals.cut_before(log, clinic.pk, before, now) for log in seals.LOGS)
+    logs = (AuditEntry.__name__, HistoryEntry.__name__)
+    return sum(seals.cut_before(log, clinic.pk, before, now) for log in logs)
 
 
 def months_before(moment: datetime, months: int) -> datetime:

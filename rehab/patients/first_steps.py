@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy
 from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import JUST_NOW, format_device_state
+from rehab.stations.presence import JUST_NOW, format_device_states
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,4 +85,4 @@ def _devices(user: User, kind: Device.Kind) -> list[Device]:
 
 
 def _describe(devices: list[Device], now: datetime) -> str:
-    return ", ".join(f"{one.name}, {format_device_state(one, now)}" for one in devices)
+    return ", ".join(f"{one.name}, {state}" for one, state in format_device_states(devices, now))

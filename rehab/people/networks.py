@@ -40,6 +40,14 @@ def is_in_networks(networks: str, address: str) -> bool:
     return client.is_loopback or any(client in network for network in own)
 
 
+def is_outside(networks: str, address: str) -> bool:
+    """Return whether an address, "" where nobody knows it, is outside the networks that are named.
+
+    Nothing is outside where none are named.
+    """
+    return bool(networks) and not (address and is_in_networks(networks, address))
+
+
 def client_address(request: HttpRequest) -> str:
     """Return the client address of a request."""
     return resolve_client_address(

@@ -3,13 +3,13 @@
 from django.urls import path
 
 from rehab.sessions.pages import (
+    after_session,
     alarms,
     history,
     incident,
     insight,
     monitor,
     paper,
-    questions,
     recording,
     replay,
     screen_size,
@@ -41,10 +41,10 @@ urlpatterns = [
     path("sessions/<int:session_id>/note/", monitor.write_note, name="write-note"),
     path("sessions/<int:session_id>/report/", paper.show_report, name="report"),
     path("sessions/<int:session_id>/details/", session.show_session, name="session"),
-    path("sessions/<int:session_id>/questions/", questions.ask_questions, name="questions"),
+    path("sessions/<int:session_id>/questions/", after_session.ask_questions, name="questions"),
     path(
         "sessions/<int:session_id>/questions/add/",
-        questions.add_questionnaire,
+        after_session.add_questionnaire,
         name="add-questionnaire",
     ),
     path("sessions/<int:session_id>/replay/", replay.show_replay, name="replay"),

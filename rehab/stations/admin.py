@@ -19,7 +19,7 @@ from rehab.people.web.row_forms import ClinicForm
 from rehab.people.web.token_admin import TokenAdmin
 from rehab.stations.forms import PinForm
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import format_device_state
+from rehab.stations.presence import format_device_state, format_device_states
 
 
 class DeviceInline(ScopedOptions, admin.TabularInline):
@@ -98,11 +98,8 @@ class StationAdmin(ScopedAdmin):
 
     def _format_devices(self, station: Station, kind: Device.Kind) -> str:
         now = timezone.now()
-        found = [
-            (device.name, format_device_state(device, now))
-            for device in station.devices.all()
-            if device.kind == kind
-        ]
+        devices = [device for device in station.devices.all() if device.kind == kind]
+        found = [(device.name, state) for device, state in format_device_states(devices, now)]
         return format_html_join(", ", "{}: {}", found) or gettext("none")
 
     @admin.display(description=_("PIN to leave"), boolean=True)

@@ -6,6 +6,7 @@ show that person either. Sources and robots are programs without a screen, and n
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from datetime import datetime, timedelta
 
 from django.db.models import F, Q, QuerySet
@@ -13,7 +14,7 @@ from django.utils.translation import gettext as _
 
 from rehab.people.models import User
 from rehab.people.models.blinding import assessors
-from rehab.people.networks import is_in_networks
+from rehab.people.networks import is_outside
 from rehab.people.roles import Role
 from rehab.stations.models import Device
 
@@ -39,8 +40,7 @@ def check_approval(by: User, address: str) -> None:
                 "an arm. Ask a lead or a treating therapist to let it in."
             )
         )
-    networks = by.clinic.networks if by.clinic else ""
-    if networks and not is_in_networks(networks, address):
+    if is_outside(by.clinic.networks if by.clinic else "", address):
         raise NotTrusted(
             _(
                 "This tablet asks from outside the clinic’s networks. Connect it to the clinic’s "
@@ -55,15 +55,14 @@ def is_trusted() -> Q:
     return ~Q(kind=Device.Kind.TABLET) | approved
 
 
-def is_unused(device: Device, now: datetime) -> bool:
-    """Return whether a tablet was not used for so long that it ends."""
-    used_at = device.last_seen_at or device.approved_at or device.created_at
-    return device.kind == Device.Kind.TABLET and now - used_at >= UNUSED_FOR
-
-
-def has_ended(device: Device, now: datetime) -> bool:
-    """Return whether a tablet has lost its approver or was not used for long."""
-    if device.kind != Device.Kind.TABLET:
-        return False
-    is_valid = Device.everywhere.filter(is_trusted(), pk=device.pk).exists()
-    return not is_valid or is_unused(device, now)
+def find_ended(devices: Iterable[Device], now: datetime) -> set[int]:
+    """Return the keys of those tablets that have lost their approver or were not used for long."""
+    used = {
+        device.pk: device.last_seen_at or device.approved_at or device.created_at
+        for device in devices
+        if device.kind == Device.Kind.TABLET
+    }
+    if not used:
+        return set()
+    trusted = Device.everywhere.filter(is_trusted(), pk__in=used).values_list("pk", flat=True)
+    return used.keys() - {pk for pk in trusted if now - used[pk] < UNUSED_FOR}

@@ -9,7 +9,7 @@ from django.db import models
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
-from rehab.people.networks import is_in_networks
+from rehab.people.networks import is_outside
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.sign_in.tokens import TokenModel
 
@@ -105,8 +105,7 @@ class Device(TokenModel):
     @property
     def is_away(self) -> bool:
         """Return whether it is outside its clinic's networks, or nobody knows where."""
-        networks = self.clinic.networks
-        return bool(networks) and not (self.address and is_in_networks(networks, self.address))
+        return is_outside(self.clinic.networks, self.address)
 
     def note_issuer(self, by: User, now: datetime) -> None:
         """Make the person who gives a tablet its token the one who answers for it."""

@@ -9,11 +9,12 @@ from django.core.cache import cache
 from django.db import transaction
 from django.utils.translation import gettext as _
 
-from rehab.people.audit.audit_log import Act, AuditEntry, record, truncate_address
+from rehab.people.audit.audit_log import Act, record, truncate_address
 from rehab.people.models import User
 from rehab.people.random_codes import random_code
 from rehab.people.rate_limits import TokenBuckets
 from rehab.people.row_values import read_values, save_changes
+from rehab.people.sign_in.known import is_known_network
 from rehab.people.sign_in.tokens import hash_token
 from rehab.stations.device_trust import NotTrusted, check_approval
 from rehab.stations.models import Device, Pairing, Station
@@ -22,7 +23,6 @@ LIFETIME = timedelta(minutes=5)
 CODE_LENGTH = 6  # of 31 characters: one in 900 million, with ten attempts in five minutes
 MAX_PENDING = 500  # codes at a time on one server, against floods from many addresses
 MAX_PENDING_KNOWN = 1000  # with those of networks where somebody has signed in lately
-KNOWN_FOR = timedelta(days=30)
 MAX_PENDING_PER_ADDRESS = 20  # a clinic's tablets may share an address
 MAX_STARTED_PER_ADDRESS = 100  # within the lifetime of a code; a tablet keeps its own
 MAX_ATTEMPTS = 10
@@ -55,7 +55,8 @@ def start_pairing(address: str, now: datetime, browser: str = "") -> tuple[Pairi
     kept = list(own.order_by("-pk").values_list("pk", flat=True)[: MAX_PENDING_PER_ADDRESS - 1])
     own.exclude(pk__in=kept).delete()
     count = Pairing.everywhere.count()
-    if count >= MAX_PENDING and (count >= MAX_PENDING_KNOWN or not _is_known(address, now)):
+    is_full = count >= MAX_PENDING and not is_known_network(address, now)
+    if is_full or count >= MAX_PENDING_KNOWN:
         raise PairingRefused(
             _(
                 "Too many tablets are being paired. Sign in on any device in this network first, "
@@ -73,12 +74,6 @@ def start_pairing(address: str, now: datetime, browser: str = "") -> tuple[Pairi
     )
     cache.set(pending, [*kept, pairing.pk], LIFETIME.total_seconds())
     return pairing, secret
-
-
-def _is_known(address: str, now: datetime) -> bool:
-    """Return whether somebody has signed in lately from the network of an address."""
-    sign_ins = AuditEntry.everywhere.filter(act=Act.SIGN_IN, at__gt=now - KNOWN_FOR)
-    return bool(sign_ins.filter(address=truncate_address(address)).exists())
 
 
 def find_pairing(secret: str, now: datetime) -> Pairing | None:

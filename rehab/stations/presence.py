@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from datetime import datetime, timedelta
 
 from django.utils.dateformat import format as format_date
 from django.utils.translation import gettext, ngettext
 
-from rehab.stations.device_trust import is_unused
+from rehab.stations.device_trust import find_ended
 from rehab.stations.models import Device
 
 JUST_NOW = timedelta(minutes=2)  # `last_seen_at` is stored once a minute
@@ -36,11 +37,22 @@ def format_last_seen(moment: datetime | None, now: datetime) -> str:
     }
 
 
+def format_device_states(devices: Collection[Device], now: datetime) -> list[tuple[Device, str]]:
+    """Return devices with what is wrong with each one's token, else when it last connected."""
+    ended = find_ended(devices, now)
+    return [(device, _format_state(device, device.pk in ended, now)) for device in devices]
+
+
 def format_device_state(device: Device, now: datetime) -> str:
     """Return what is wrong with a device's token, else when it last connected."""
+    [(_, state)] = format_device_states([device], now)
+    return state
+
+
+def _format_state(device: Device, has_ended: bool, now: datetime) -> str:
     if device.is_revoked:
         return gettext("revoked")
-    if not getattr(device, "has_approver", True) or is_unused(device, now):  # where it was asked
+    if has_ended:
         return gettext("ended with its approver’s rights or unused: let it in again")
     if device.has_expired(now):
         return gettext("its token has expired: give it a new one")

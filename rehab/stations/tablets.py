@@ -10,7 +10,7 @@ from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 
 from rehab.people.networks import client_address
-from rehab.stations.device_trust import UNUSED_FOR, is_trusted, is_unused
+from rehab.stations.device_trust import UNUSED_FOR, find_ended
 from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
 
@@ -26,8 +26,8 @@ def find_tablet(token: str | None, now: datetime, address: str = "") -> Device |
 
 def has_tablet(station: Station | None, now: datetime) -> bool:
     """Return whether a tablet is paired with a station, and may still show its sessions."""
-    paired = Device.everywhere.filter(is_trusted(), station=station, kind=Device.Kind.TABLET)
-    return any(not (one.is_revoked or is_unused(one, now)) for one in paired)
+    paired = Device.everywhere.filter(station=station, kind=Device.Kind.TABLET, revoked_at=None)
+    return bool({one.pk for one in paired} - find_ended(paired, now))
 
 
 def set_secret_cookie(response: HttpResponseBase, name: str, value: str, age_s: float) -> None:

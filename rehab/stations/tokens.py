@@ -33,7 +33,7 @@ def find_device(token: str, now: datetime, address: str = "") -> Device | None:
     if device is None:
         return None
     device.address = address
-    if device_trust.has_ended(device, now):
+    if device_trust.find_ended([device], now):
         device.revoked_at = now  # it does not come back with its approver's account or role
         device.save(update_fields=["revoked_at"])
         return None

@@ -1,1 +1,1 @@
-"""Studies: arms, allocation, blinding, planned visits; who must not know what."""
+"""Studies: arms, allocation, blinding, planned visits; who must not know which arm."""

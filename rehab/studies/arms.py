@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from rehab.training.measures import InvalidSetting, check_gain
+from rehab.training.measures import WORN_CHANNELS, InvalidSetting, check_gain
 from rehab.training.phases import Phase
 from rehab.training.plans import check_robot_intensity
 from rehab.training.schedules import Schedule
@@ -89,7 +89,15 @@ class ArmRule:
 
 
 def check_arms(arms: Sequence[ArmRule], *, crossover: bool) -> None:
-    """Raise InvalidSetting for arms that a study could not compare."""
+    """Raise InvalidSetting for arms that a study could not compare.
+
+    Parameters
+    ----------
+    arms
+        2 to ``MAX_ARMS`` arms, of different codes and conditions.
+    crossover
+        Whether each participant walks every arm, so that all weights have to be 1.
+    """
     if not 2 <= len(arms) <= MAX_ARMS:
         raise InvalidSetting("A study compares 2 to {most} arms.", most=MAX_ARMS)
     conditions: dict[Condition, ArmRule] = {}
@@ -108,3 +116,12 @@ def check_arms(arms: Sequence[ArmRule], *, crossover: bool) -> None:
         codes.add(arm.code)
         if crossover and arm.weight != 1:
             raise InvalidSetting("In a crossover everybody walks every arm: leave all ratios at 1.")
+
+
+def check_channels(channels: Sequence[str]) -> None:
+    """Raise InvalidSetting where a worn sensor's measure would be pooled with any other one."""
+    if len(set(channels)) > 1 and not WORN_CHANNELS.isdisjoint(channels):
+        raise InvalidSetting(
+            "What a worn sensor measures cannot be compared with anything else. Choose the same "
+            "measure for all arms."
+        )

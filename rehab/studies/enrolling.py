@@ -1,4 +1,4 @@
-"""Enrolling patients, allocating them, and what happens when one withdraws."""
+"""Enrollment of patients, their allocation, and withdrawal."""
 
 from __future__ import annotations
 
@@ -36,13 +36,30 @@ def enroll(
     by: User | None,
     now: datetime,
 ) -> Enrollment:
-    """Take a patient into a running study: allocate, plan the visits, blind.
+    """Enroll a patient in a running study: allocate, plan the visits, blind.
 
-    Raises InvalidSetting for a patient who has not consented to research, is in another study or
-    has an open session, and for a study that is not running, is full, or has run out of its list.
+    Parameters
+    ----------
+    study, patient
+        The study, and who joins it.
+    levels
+        The patient's level of each factor of the study.
+    keep_data
+        Whether sessions still count in the results if the participant withdraws.
+    by
+        Who enrolls; None for a program.
+    now
+        The time of the enrollment.
+
+    Raises
+    ------
+    InvalidSetting
+        For a patient who has not consented to research, is in another study or has an open session;
+        for a study that is not running, is full, or has run out of its list; and where ``by`` is an
+        assessor of the study.
     """
     with transaction.atomic():
-        lock(study)  # of two at once, the second is allocated after the first
+        lock(study)  # of two enrolled at once, the second is allocated after the first
         patient.lock()
         _check_may_enter(study, patient)
         if by is not None and has_mark(study, by, StudyMark.Task.ASSESSOR):
@@ -119,6 +136,15 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
     """Record that a participant leaves the study; sessions count as was agreed at enrollment.
 
     An open session goes on, as a session of care, until the therapist ends it.
+
+    Parameters
+    ----------
+    enrollment
+        The participant; one who has withdrawn already is left as is.
+    by, now
+        Who records it (None for a program), and when.
+    reason
+        Why, as typed; may be empty.
     """
     with transaction.atomic():
         lock(enrollment.study)
@@ -139,7 +165,15 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
 
 
 def withdraw_everywhere(patient: Patient, by: User | None, now: datetime) -> None:
-    """Withdraw a patient from every running study, as when consent to research is withdrawn."""
+    """Withdraw a patient from every running study, as when consent to research is withdrawn.
+
+    Parameters
+    ----------
+    patient
+        Who leaves.
+    by, now
+        Who records it (None for a program), and when.
+    """
     running = patient.enrollments.filter(withdrawn_at=None, study__state=StudyState.RUNNING)
     for enrollment in running.select_related("study", "patient"):
         withdraw(enrollment, by, now)

@@ -1,4 +1,4 @@
-"""The forms of studies: planning without code, taking a patient in, starting a visit's session."""
+"""The forms of studies: planning, enrolling a patient, starting a visit's session."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.visits import Place
 from rehab.training.measures import A2, InvalidSetting
 
-SEED_BYTES = 16  # of a study's seed: more than anybody could try
+SEED_BYTES = 16  # of a study's seed: too many to try them all
 LIST_LETTERS_MAX = 500_000
 ARMS_OFFERED = 4  # rows on the page of a new study
 # What allocates is fixed by the registration.
@@ -47,7 +47,7 @@ ALLOCATION_FIELDS = (
 
 
 class StudyForm(ClinicForm):
-    """The plan of a study. A registered one retains its allocation and asks why it is changed."""
+    """The plan of a study. Of a registered one, the allocation is fixed; changes need a reason."""
 
     block_sizes = forms.CharField(
         label=_("sizes of blocks"),
@@ -173,14 +173,17 @@ class ArmForm(forms.ModelForm):
             fields[name].required = False
 
     def clean(self) -> Any:
-        """Return the answers, with the usual ones for a schedule's that were left empty."""
+        """Return the answers, with defaults for fields of the schedule that were left empty."""
         data: Any = super().clean()
         empty = [name for name in SCHEDULE_FIELDS if data.get(name) in (None, "")]
         return data | {name: OPTIONS[name].default for name in empty if name not in self.errors}
 
 
 def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:
-    """Return the rows of a study's arms: a draft's with empty ones to fill in."""
+    """Return the formset of a study's arms; that of a draft has empty rows to fill in.
+
+    It offers the protocols and measures of the account ``by``; ``data``: what was sent, or None.
+    """
     is_fixed = not study.is_draft
     stored = study.arms.count() if study.pk else 0
     factory: Any = forms.inlineformset_factory(
@@ -194,7 +197,7 @@ def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:
 
 
 def save_arms(arms: Any, study: Study) -> None:
-    """Store the arms of a valid formset, in the order of the rows."""
+    """Store the arms of a valid formset ``arms`` in a study, in the order of the rows."""
     arms.instance = study
     arms.save(commit=False)
     for row in arms.deleted_objects:
@@ -206,7 +209,10 @@ def save_arms(arms: Any, study: Study) -> None:
 
 
 def save_draft(form: StudyForm, arms: Any) -> Study:
-    """Store a draft with its arms. Raises InvalidSetting, and stores nothing, if it cannot run."""
+    """Store a draft from its valid ``form`` and the valid formset ``arms``, and return it.
+
+    Raises InvalidSetting, and stores nothing, for a study that could not be run.
+    """
     with transaction.atomic():
         study: Study = form.save()
         save_arms(arms, study)
@@ -217,7 +223,7 @@ def save_draft(form: StudyForm, arms: Any) -> Study:
 
 
 class EnrollmentForm(forms.Form):
-    """Who is taken into a study, with the level of each factor."""
+    """Who is enrolled in a study, with the level of each factor."""
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(queryset=None)
     keep_data = forms.TypedChoiceField(

@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.translation import valence_choices
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
+from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
@@ -24,7 +25,7 @@ from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
 from rehab.studies.analysis import outcomes
-from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms
+from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms, check_channels
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import ROBOT_LEVELS
@@ -107,7 +108,7 @@ class Study(ClinicModel):
     created_at = models.DateTimeField(default=timezone.now, editable=False)
     registered_at = models.DateTimeField(null=True, editable=False)
     started_at = models.DateTimeField(null=True, editable=False)
-    # From then on nothing is hidden from anybody.
+    # From then on nothing is hidden.
     closed_at = models.DateTimeField(null=True, editable=False)
 
     class Meta(ClinicModel.Meta):
@@ -139,6 +140,7 @@ class Study(ClinicModel):
         """Return what participants are allocated to. Raises InvalidSetting."""
         arms = self.arm_rules()
         check_arms(arms, crossover=self.crossover)
+        check_channels([arm.measure.channel for arm in self.arms.select_related("measure")])
         if self.crossover:
             return crossover_groups([arm.code for arm in arms])
         return tuple(Group((arm.code,), arm.weight) for arm in arms)
@@ -150,7 +152,7 @@ class Study(ClinicModel):
 
     @property
     def risks_early_punishment(self) -> bool:
-        """Whether people may meet negative feedback early after their stroke.
+        """Whether participants may get negative feedback early after their stroke.
 
         It then worked worse than reward (docs/reference/gait.md#feedback-and-time-since-stroke).
         """
@@ -219,7 +221,7 @@ class Arm(ScopedModel):
     measure = models.ForeignKey(
         MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
     )
-    # None once it was deleted; what was walked stands in the study's versions.
+    # None once it was deleted; the study's versions still have what was walked.
     protocol = models.ForeignKey(
         Protocol, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("protocol")
     )
@@ -260,29 +262,34 @@ class Arm(ScopedModel):
         return ArmRule(self.code, self.name, self.weight, condition)
 
 
-class StudyMark(AppendOnlyModel):
+class StudyMark(SealableModel):
     """What an account is in a study besides its role, until ``ended_at``."""
 
     class Task(models.TextChoices):
-        """What the mark says."""
+        """What the mark allows or hides."""
 
         ASSESSOR = "assessor", _("Assesses, and must not know the arm")
         INTERIM = "interim", _("May look before the study is closed")
 
     scope = Scope(clinic="study__clinic")
+    # With the event, which is sealed, of who ended it.
     allowed_changes = (
-        Allowed(("ended_at",), "OLD.ended_at IS NULL AND NEW.ended_at IS NOT NULL"),
-        ACCOUNT_DELETED,
+        Allowed(
+            ("ended_at",),
+            "OLD.ended_at IS NULL AND EXISTS (SELECT 1 FROM rehab_studyevent e WHERE "
+            "e.study_id = NEW.study_id AND e.kind = 'unmarked' AND e.at = NEW.ended_at)",
+        ),
     )
+    sealed_fields = ("study", "user", "task", "by", "at")
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="marks")
     user = models.ForeignKey(User, on_delete=models.PROTECT, related_name="study_marks")
     task = models.CharField(_("task"), max_length=8, choices=Task.choices)
-    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    by = models.ForeignKey(User, on_delete=models.PROTECT, related_name="+", null=True)
     at = models.DateTimeField(default=timezone.now)
     ended_at = models.DateTimeField(null=True)
 
-    class Meta(AppendOnlyModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("mark")
         ordering: ClassVar = ["pk"]
         constraints: ClassVar = [
@@ -298,5 +305,5 @@ class StudyMark(AppendOnlyModel):
 
 
 def has_mark(study: Study, user: Any, task: StudyMark.Task) -> bool:
-    """Return whether an account has a mark of a study now."""
+    """Return whether the account ``user`` has the mark ``task`` in a study now."""
     return study.marks.filter(user=user, task=task, ended_at=None).exists()

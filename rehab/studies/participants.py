@@ -8,7 +8,8 @@ from django.db import models
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
+from rehab.people.append_only import Allowed
+from rehab.people.audit.sealing import ERASED, SealableModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
@@ -17,20 +18,27 @@ from rehab.people.scope import ClinicModel, ScopedModel
 from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Arm, Study, StudyVersion
 
-ERASED_CODE = "E-"  # begins the code of an erased participant
+ERASED_CODE = "E-"  # prefix of an erased participant's code
 OF_STUDY = retained("the study's result, under a code", shown=True, research=True)
 
 
 def replace_codes(patient: Patient, _pseudonym: str) -> None:
-    """Replace an erased participant's codes; the numbers of the studies stay right."""
+    """Replace an erased participant's codes by random ones; the numbers of the studies stay right.
+
+    An eraser of the field policy: ``patient`` is who is erased, ``_pseudonym`` is not used.
+    """
     for enrollment in patient.enrollments.exclude(code__startswith=ERASED_CODE):
         enrollment.code = f"{ERASED_CODE}{random_code(8)}"
         enrollment.save(update_fields=["code"])
 
 
 def empty_reasons(patient: Patient, _pseudonym: str) -> None:
-    """Empty the words that were typed about an erased participant."""
-    StudyEvent.everywhere.filter(enrollment__patient=patient).update(reason="", about="")
+    """Delete what was typed about an erased participant.
+
+    An eraser of the field policy: ``patient`` is who is erased, ``_pseudonym`` is not used.
+    """
+    emptied = {"reason": "", "about": "", "salt": "", "erased": True}
+    StudyEvent.everywhere.filter(enrollment__patient=patient).update(**emptied)
 
 
 class Enrollment(ClinicModel):
@@ -78,10 +86,11 @@ class Enrollment(ClinicModel):
         return self.withdrawn_at is None or self.keep_data
 
 
-class Allocation(AppendOnlyModel):
+class Allocation(SealableModel):
     """The group that a participant was allocated to: an arm's code, or codes in their order."""
 
     scope = PatientScope(clinic="enrollment__clinic", patient="enrollment__patient")
+    sealed_fields = ("enrollment", "group", "at")
 
     enrollment = models.OneToOneField(
         Enrollment, on_delete=models.PROTECT, related_name="allocation"
@@ -92,11 +101,11 @@ class Allocation(AppendOnlyModel):
     personal = personal_fields(
         {
             "enrollment group": OF_STUDY,
-            "at": retained("when it was allocated", shown=False, research=False),
+            "at salt digest erased": retained("when it was allocated", shown=False, research=False),
         }
     )
 
-    class Meta(AppendOnlyModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("allocation")
         ordering: ClassVar = ["pk"]
 
@@ -109,7 +118,7 @@ class Allocation(AppendOnlyModel):
 
 
 class StudyVisit(ScopedModel):
-    """A visit that the study plans. A session that was broken off leaves room for another try."""
+    """A visit that the study plans. An aborted session can be walked again."""
 
     scope = PatientScope(
         clinic="enrollment__clinic", patient="enrollment__patient", tells_condition=False
@@ -141,7 +150,7 @@ class StudyVisit(ScopedModel):
         return f"{self.enrollment} / {self.number}"
 
 
-class StudyEvent(AppendOnlyModel):
+class StudyEvent(SealableModel):
     """Something that happened in a study: who did it, and why."""
 
     class Kind(models.TextChoices):
@@ -163,9 +172,12 @@ class StudyEvent(AppendOnlyModel):
     # Reasons may name the condition.
     scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")
     allowed_changes = (
-        Allowed(("reason", "about"), "NEW.reason = '' AND NEW.about = ''"),  # by an erasure
-        ACCOUNT_DELETED,
+        Allowed(
+            ("reason", "about", "salt", "erased"),
+            f"{ERASED} AND NEW.reason = '' AND NEW.about = ''",
+        ),
     )
+    sealed_fields = ("study", "enrollment", "kind", "about", "reason", "by", "at")
 
     study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="events")
     enrollment = models.ForeignKey(
@@ -175,23 +187,28 @@ class StudyEvent(AppendOnlyModel):
     about = models.CharField(_("about"), max_length=120, blank=True)
     reason = models.TextField(_("reason"), max_length=1000, blank=True)
     by = models.ForeignKey(
-        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+        User, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("by")
     )
     at = models.DateTimeField(_("at"), default=timezone.now)
 
     personal = personal_fields(
         {
-            "reason about": erased_by(empty_reasons, shown=False, research=False),
-            "study enrollment kind at": retained(
+            "reason about salt erased": erased_by(empty_reasons, shown=False, research=False),
+            "study enrollment kind at digest": retained(
                 "what happened, under a code", shown=True, research=False
             ),
             "by": retained("staff", shown=False, research=False),
         }
     )
 
-    class Meta(AppendOnlyModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("event")
         ordering: ClassVar = ["pk"]
 
     def __str__(self) -> str:
         return f"{self.study.code}: {self.get_kind_display()}"
+
+    @property
+    def is_emptied(self) -> bool:
+        """Whether it has no words."""
+        return not self.reason and not self.about

@@ -1,4 +1,4 @@
-"""Power by simulation: what was asked, and what the studies that were simulated so far found."""
+"""Power by simulation: the request, and what the studies simulated so far found."""
 
 from __future__ import annotations
 
@@ -89,10 +89,23 @@ class PowerRun(ScopedModel):
 
 
 def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
-    """Return a study as it is simulated. Raises InvalidSetting for one that cannot be.
+    """Return a study as it is simulated.
 
-    All arms walk the first one's phases, so that what was typed in is the whole difference between
-    them. Simulated people push with A2, in units of their baseline.
+    All arms walk the first one's phases, so that the effects that were typed in are the whole
+    difference between them. Simulated people train A2, in units of their baseline.
+
+    Parameters
+    ----------
+    study
+        The study, with arms.
+    settings
+        ``effects`` by the arm's code [% of the baseline], ``participants``, ``sd_percent``,
+        ``kept_percent`` and ``dropout_percent``, as ``PowerForm.to_settings`` returns them.
+
+    Raises
+    ------
+    InvalidSetting
+        For a study without an effect, or one that cannot be simulated.
     """
     arms = list(study.arms.select_related("protocol", "measure"))
     groups = study.groups()
@@ -126,7 +139,22 @@ def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
 def plan_run(
     study: Study, settings: dict[str, Any], simulations: int, by: User | None, now: datetime
 ) -> PowerRun:
-    """Store what is to be simulated. Raises InvalidSetting for what cannot be."""
+    """Store a run of simulated studies; `work` carries it out.
+
+    Parameters
+    ----------
+    study, settings
+        As for `build_trial`.
+    simulations
+        How many studies, 1 to ``SIMULATIONS_MAX``.
+    by, now
+        Who asks for it, and when.
+
+    Raises
+    ------
+    InvalidSetting
+        For too few or too many, and for a study that cannot be simulated.
+    """
     if not 1 <= simulations <= SIMULATIONS_MAX:
         raise InvalidSetting("Simulate 1 to {most} studies.", most=SIMULATIONS_MAX)
     build_trial(study, settings)

@@ -23,7 +23,15 @@ def connect_receivers() -> None:
 def on_withdrawal(
     patient: Patient, purpose: str, by: User | None, now: datetime, **_signal: Any
 ) -> None:
-    """Let a patient who withdraws consent to research leave the study."""
+    """Withdraw from all studies a patient who withdraws consent to research.
+
+    Parameters
+    ----------
+    patient, purpose
+        Who withdraws consent, and to what.
+    by, now
+        Who records it, and when.
+    """
     if purpose == Purpose.RESEARCH:
         withdraw_everywhere(patient, by, now)
 
@@ -31,6 +39,12 @@ def on_withdrawal(
 def on_patient(
     instance: Patient, raw: bool = False, update_fields: Any = None, **_signal: Any
 ) -> None:
-    """Let a patient who is erased leave the study."""
+    """Withdraw an erased patient from all studies.
+
+    Parameters
+    ----------
+    instance, raw, update_fields
+        As Django's ``post_save`` sends them; only a whole save that loads no fixture counts.
+    """
     if instance.erased_at is not None and not raw and update_fields is None:
         withdraw_everywhere(instance, None, timezone.now())

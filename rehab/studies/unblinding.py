@@ -1,4 +1,4 @@
-"""Who must not know an arm, who may look early, and revealing an arm, which is always recorded."""
+"""Who must not know an arm, who may look early, and revealing arms, which is always recorded."""
 
 from __future__ import annotations
 
@@ -22,10 +22,22 @@ MARKABLE = {Task.ASSESSOR: Role.PT, Task.INTERIM: Role.RESEARCHER}
 
 
 def give_mark(study: Study, user: User, task: Task, by: User | None, now: datetime) -> None:
-    """Mark an account as an assessor, or as one that may look before the end.
+    """Mark an account as an assessor, or as one that may see interim results.
 
-    Raises InvalidSetting for a role that cannot have the mark, an account that set up sessions of
-    the study, and while one is open.
+    Parameters
+    ----------
+    study
+        The study.
+    user, task
+        The account, and its mark.
+    by, now
+        Who gives it (None for a program), and when.
+
+    Raises
+    ------
+    InvalidSetting
+        For a role that cannot have the mark; as assessor, also for an account that has set up
+        sessions of the study, and while a participant's session is open.
     """
     with transaction.atomic():
         lock(study)
@@ -55,14 +67,22 @@ def give_mark(study: Study, user: User, task: Task, by: User | None, now: dateti
 
 
 def take_mark(mark: StudyMark, by: User | None, now: datetime) -> None:
-    """End a mark. An assessor may see sessions from here on; the events record since when."""
+    """End a mark. A former assessor may see sessions from here on; the events show since when.
+
+    Parameters
+    ----------
+    mark
+        The mark; one that has ended already is left as is.
+    by, now
+        Who ends it (None for a program), and when.
+    """
     with transaction.atomic():
         lock(mark.study)
         mark.refresh_from_db()
         if mark.ended_at is None:
+            note(mark.study, StudyEvent.Kind.UNMARKED, by, now, about=f"{mark.task}: {mark.user}")
             mark.ended_at = now
             mark.save(update_fields=["ended_at"])
-            note(mark.study, StudyEvent.Kind.UNMARKED, by, now, about=f"{mark.task}: {mark.user}")
 
 
 class UnblindingRefused(InvalidSetting):
@@ -72,10 +92,27 @@ class UnblindingRefused(InvalidSetting):
 def reveal_arms(
     enrollment: Enrollment, reason: str, *, emergency: bool, by: User, now: datetime
 ) -> list[Arm]:
-    """Return a participant's arms in the order of the periods, and record who asked and why.
+    """Return a participant's arms in the order of the periods.
 
-    The audit log has it, too. Raises InvalidSetting without a reason, and UnblindingRefused, which
-    is recorded as well, for an assessor of the study.
+    The study's events and the audit log record who asked and why.
+
+    Parameters
+    ----------
+    enrollment
+        The participant.
+    reason
+        Why the arms must be known.
+    emergency
+        Whether it is an emergency, which is recorded as such.
+    by, now
+        Who asks, and when.
+
+    Raises
+    ------
+    InvalidSetting
+        Without a reason.
+    UnblindingRefused
+        For an assessor of a running study; the refusal is recorded as well.
     """
     study = enrollment.study
     if not reason.strip():

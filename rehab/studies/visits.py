@@ -53,11 +53,23 @@ def start_session(
 ) -> TrainingSession:
     """Create the session of a participant's next visit, with the arm's condition.
 
-    ``chosen_id``: key of the visit that the page showed as the next one; None without a page.
+    Parameters
+    ----------
+    enrollment
+        The participant.
+    place
+        Where and how the session is walked.
+    by, now
+        Who starts it (None for a program), and when.
+    chosen_id
+        Key of the visit that the page showed as the next one; None without a page.
 
-    Raises InvalidSetting for a participant who has withdrawn, walked all visits or has a session
-    that is open, where another visit is next, for a study that is not running or was changed, a
-    person to whom the arm is hidden, and what `create_session` refuses.
+    Raises
+    ------
+    InvalidSetting
+        For a participant who has withdrawn, walked all visits or has an open session; where another
+        visit is next; for a study that is not running or was changed; and for what `create_session`
+        refuses, such as an assessor.
     """
     study = enrollment.study
     with transaction.atomic():
@@ -79,7 +91,7 @@ def start_session(
             raise InvalidSetting(
                 gettext("Somebody else has started that visit. Look at the list, then start again.")
             )
-        if visit.session is not None:  # it was broken off
+        if visit.session is not None:  # it was aborted
             visit = StudyVisit(
                 enrollment=enrollment,
                 number=visit.number,

@@ -24,7 +24,7 @@ LEAST_HIT_RATE, MOST_HIT_RATE = 0.3, 0.9
 
 
 class AdaptationMode(StrEnum):
-    """What becomes of the goal while the patient walks."""
+    """How the goal changes while the patient walks."""
 
     OFF = gettext_noop("off")
     SUGGEST = gettext_noop("suggest")
@@ -84,7 +84,7 @@ class GoalAdaptation:
             raise InvalidSetting("Automatic goals keep the share of hits within 0 to 30 %.")
 
     def check_hit_rate(self, wanted: float | None) -> None:
-        """Raise InvalidSetting for a wanted share of hits that the staircase cannot keep."""
+        """Raise InvalidSetting for a wanted share of hits that the staircase cannot hold."""
         rate = DEFAULT_HIT_RATE if wanted is None else wanted
         if self.mode is AdaptationMode.AUTOMATIC and not LEAST_HIT_RATE <= rate <= MOST_HIT_RATE:
             raise InvalidSetting(

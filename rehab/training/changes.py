@@ -64,7 +64,7 @@ class Change:
         What changes: a key of ``rehab.training.controls.CONTROLS``.
     value
         The new goal, gain, threshold, intensity or phase index; 1 or 0 for words shown or not; the
-        slug of a valence, a chart style, a way of goals to adapt or the reason of a pause; for
+        slug of a valence, a chart style, an adaptation mode or the reason of a pause; for
         feedback text, the valence and its bands. None for the others.
     """
 

@@ -14,7 +14,7 @@ COVERAGE = 1.96
 
 @dataclass(frozen=True, slots=True)
 class CloseSteps:
-    """Which steps are shown as close: they pay and take nothing, whatever the feedback type.
+    """Which steps are shown as close: they neither earn nor cost points with any feedback type.
 
     A value comes with its standard deviation, and so with an interval that holds the true one 19
     times of 20. Where more than a set part of the interval lies on the other side of the goal, a

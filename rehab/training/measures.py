@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from robot.marking import Marked, TranslatableError, gettext_noop
@@ -12,6 +13,9 @@ GAIN_MAX = 1.5
 # Beyond any unit of gait; sums over a session stay far from where floats overflow.
 BOUND_MAX = 1e9
 A2_SD = "a2_sd_w_kg"  # how sources call the standard deviation of A2
+# The extra values by which a stride says that a sensor on that place measured it; each holds the
+# version of the algorithm.
+WORN = {"foot": "wearable_foot", "shank": "wearable_shank"}
 
 
 class InvalidSetting(TranslatableError):
@@ -25,7 +29,7 @@ class Measure:
     Attributes
     ----------
     slug, name, unit
-        For programs, for people (translated by pages), and of its values.
+        Its name in programs, its name for people (translated by pages), its values' unit.
     value_min, value_max
         Values lie in [value_min, value_max]; others are invalid.
     goal_min, goal_max
@@ -126,7 +130,127 @@ A2 = Measure(
     first_goal=3.9,
 )
 
-MEASURES: dict[str, Measure] = {A2.slug: A2}
+# Of sensors on feet and shanks (docs/sources.md). Both contacts depend on where one sits, so each
+# place has its own share of stance. Bounds are what no walking leg passes; first goals are those of
+# healthy walking.
+WORN_MEASURES = (
+    Measure(
+        slug="foot_stance",
+        name=gettext_noop("stance share (sensor on the foot)"),
+        unit="%",
+        value_min=20.0,
+        value_max=98.0,
+        goal_min=0.0,
+        goal_max=95.0,
+        channel="foot_stance_percent",
+        first_goal=62.0,
+    ),
+    Measure(
+        slug="shank_stance",
+        name=gettext_noop("stance share (sensor on the shank)"),
+        unit="%",
+        value_min=20.0,
+        value_max=98.0,
+        goal_min=0.0,
+        goal_max=95.0,
+        channel="shank_stance_percent",
+        first_goal=62.0,
+    ),
+    Measure(
+        slug="foot_swing",
+        name=gettext_noop("swing share (sensor on the foot)"),
+        unit="%",
+        value_min=2.0,
+        value_max=80.0,
+        goal_min=0.0,
+        goal_max=70.0,
+        channel="foot_swing_percent",
+        first_goal=38.0,
+    ),
+    Measure(
+        slug="shank_swing",
+        name=gettext_noop("swing share (sensor on the shank)"),
+        unit="%",
+        value_min=2.0,
+        value_max=80.0,
+        goal_min=0.0,
+        goal_max=70.0,
+        channel="shank_swing_percent",
+        first_goal=38.0,
+    ),
+    Measure(
+        slug="step_asymmetry",
+        name=gettext_noop("difference of step times"),
+        unit="%",
+        value_min=0.0,
+        value_max=100.0,
+        goal_min=0.0,
+        goal_max=80.0,
+        higher_is_better=False,
+        channel="step_asymmetry_percent",
+        first_goal=10.0,
+    ),
+    Measure(
+        slug="cadence",
+        name=gettext_noop("cadence"),
+        unit="1/min",
+        value_min=15.0,
+        value_max=260.0,
+        goal_min=0.0,
+        goal_max=200.0,
+        channel="cadence_min",
+        first_goal=100.0,
+    ),
+    Measure(
+        slug="foot_strike",
+        name=gettext_noop("foot strike angle"),
+        unit="°",
+        value_min=-60.0,
+        value_max=60.0,
+        goal_min=0.0,
+        goal_max=45.0,
+        channel="foot_strike_deg",
+        first_goal=20.0,
+    ),
+    Measure(
+        slug="push_off_speed",
+        name=gettext_noop("push-off speed of the foot"),
+        unit="°/s",
+        value_min=0.0,
+        value_max=1500.0,
+        goal_min=0.0,
+        goal_max=1200.0,
+        channel="push_off_deg_s",
+        first_goal=400.0,
+    ),
+    Measure(
+        slug="shank_lean",
+        name=gettext_noop("shank lean at toe-off"),
+        unit="°",
+        value_min=-30.0,
+        value_max=90.0,
+        goal_min=0.0,
+        goal_max=80.0,
+        channel="shank_lean_deg",
+        first_goal=40.0,
+    ),
+)
+
+MEASURES: dict[str, Measure] = {one.slug: one for one in (A2, *WORN_MEASURES)}
+WORN_CHANNELS = {one.channel for one in WORN_MEASURES}
+
+
+def check_worn(extra: Mapping[str, float], measure: Measure) -> None:
+    """Raise InvalidSetting where a stride by a worn sensor would be scored as something else.
+
+    Nothing on a foot or shank measures A2: no force and no moment is known there.
+    """
+    if measure.channel not in WORN_CHANNELS and not extra.keys().isdisjoint(WORN.values()):
+        raise InvalidSetting(
+            "A sensor on a foot or shank does not measure {name}. Start a session with one of its "
+            "own measures, such as the foot strike angle.",
+            name=Marked(measure.name),
+        )
 
 
 def check_gain(gain: float) -> float:

@@ -21,7 +21,7 @@ class PhaseKind:
     slug, label
         For programs, and for people (translated by pages).
     feedback
-        Whether its phases give feedback, unless they say otherwise.
+        Whether its phases give feedback by default.
     calm_words
         Text of the patient's screen in a phase without feedback.
     adapts
@@ -88,11 +88,11 @@ class Phase:
     strides, seconds
         Its limits; None without.
     goal_percent
-        The goal from its beginning on, in percent of the baseline; None for the goal that is there.
+        Goal that it begins with, in percent of the baseline; None to leave the goal as it is.
     robot
         Whether the robot gets its steps.
     rest_s
-        The rest after it, which the PT ends: how long it should be [s]; None for none.
+        Planned length of the rest after it [s], which the PT ends; None for no rest.
 
     Raises
     ------
@@ -137,7 +137,13 @@ class Phase:
         return self.feedback and PHASE_KINDS[self.kind].adapts
 
     def is_over(self, strides: int, seconds: float) -> bool:
-        """Return whether a phase of so many strides and seconds has reached a limit."""
+        """Return whether it has reached a limit.
+
+        Parameters
+        ----------
+        strides, seconds
+            Strides of the trained leg, and the source's time [s], since it began.
+        """
         return (self.strides is not None and strides >= self.strides) or (
             self.seconds is not None and seconds >= self.seconds
         )

@@ -9,16 +9,16 @@ from typing import Any
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
 from rehab.training.bands import Band, bands_from_json
 from rehab.training.closeness import CloseSteps
-from rehab.training.cueing import (
+from rehab.training.goals import GoalRule, Target
+from rehab.training.measures import InvalidSetting, Measure
+from rehab.training.phases import Phase
+from rehab.training.phrases import choose_phrase
+from rehab.training.robot_cueing import (
     DEFAULT_ACTIVATION_THRESHOLD,
     CueTiming,
     check_activation_threshold,
     check_cue_rule,
 )
-from rehab.training.goals import GoalRule, Target
-from rehab.training.measures import InvalidSetting, Measure
-from rehab.training.phases import Phase
-from rehab.training.phrases import choose_phrase
 from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence
@@ -66,7 +66,7 @@ class PlanSettings:
     Attributes
     ----------
     goal, target
-        What a step should reach, and what is wanted of the whole session.
+        What a step should reach, and the target of the whole session.
     activation_threshold, robot_intensity, cue_timing
         Mean performance at which the robot celebrates, the share of its gestures' size, and what
         they answer.
@@ -101,7 +101,7 @@ class SessionPlan(PlanSettings):
     gestures
         Composed gestures that a cue names, as they are sent to the robot.
     alternatives
-        Valences that the session may be changed to, as they are then.
+        Valences that the session may be changed to, as edited by the clinic until its creation.
     close_steps
         Which steps are too uncertain to count as hit or miss.
     language
@@ -171,7 +171,7 @@ class SessionPlan(PlanSettings):
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> SessionPlan:
-        """Return the plan of ``to_json``'s data, also of versions that had fewer fields."""
+        """Return the plan that ``to_json`` wrote, also in a version that had fewer fields."""
         return cls(
             measure=Measure(**data["measure"]),
             valence=_read_valence(data["valence"]),

@@ -132,7 +132,17 @@ class FeedbackSummary:
     def add(
         self, performance: float, shown: float, hit: bool, close: bool = False, points: int = 0
     ) -> None:
-        """Count one more step."""
+        """Count one more judged step.
+
+        Parameters
+        ----------
+        performance, shown
+            Its performance (ratio), and the value shown, in the measure's unit.
+        hit, close
+            Its verdict; a close step counts as close, not as a hit.
+        points
+            What it earned.
+        """
         self.steps += 1
         self.hits += hit and not close
         self.close += close

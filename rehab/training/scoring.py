@@ -11,7 +11,7 @@ from rehab.training.steps import Measurement, ScoredStep, Side
 from rehab.training.valences import Valence
 from robot.wire.limits import PERFORMANCE_MAX
 
-# Rises with every change that could alter a stored verdict; every step keeps the one it had, and is
+# Rises with every change that could alter a stored verdict; every step stores its version, and is
 # folded by it again. Versions:
 # 1: a step before the last one, whichever leg, has a clock that ran backwards.
 # 2: a step before the last one of its leg (the legs' strides may overtake each other).
@@ -97,7 +97,7 @@ def score_measurement(
     valence
         What rewards it; None in a phase without feedback.
     close_steps
-        Which steps pay and take nothing, as their values are too uncertain.
+        Which steps are too uncertain to earn or cost points.
     rules_version
         Of the rules that it is scored by.
     """

@@ -10,7 +10,7 @@ from enum import StrEnum
 from rehab.training.measures import Measure
 from robot.wire.limits import TIME_MAX_S
 
-# The extra value that keeps what a source sent as a step's value, where another one is trained.
+# The extra value with what a source sent as a step's value, where another one is trained.
 SENT_VALUE = "sent_value"
 
 
@@ -31,6 +31,7 @@ class InvalidReason(StrEnum):
     PAUSED = "paused"
     FLAGGED = "flagged"
     FORCE_LOST = "force_lost"
+    LATE = "late"  # its samples came late from the lab
 
 
 class InvalidMeasurement(ValueError):
@@ -96,7 +97,7 @@ def select_value(measurement: Measurement, measure: Measure) -> Measurement:
     if not measure.channel:
         return measurement
     extra, named = measurement.extra, measurement.extra.get(measure.channel)
-    value = None if named is None else float(named)  # a whole number is kept whole, where it came
+    value = None if named is None else float(named)  # in ``extra`` an int stays an int
     if value == measurement.value:
         return measurement
     if measurement.value is not None and math.isfinite(measurement.value):
@@ -149,7 +150,14 @@ def find_invalid_reasons(measurement: Measurement, measure: Measure) -> tuple[st
     """Return why a measurement is invalid; nothing for a valid one.
 
     The source's own reasons come first, then at most one of ours, about the value. A stored step
-    that is measured again gets the reasons it has.
+    that is scored again keeps its reasons.
+
+    Parameters
+    ----------
+    measurement
+        The stride.
+    measure
+        What is trained, with the bounds of its values.
     """
     value, reasons = measurement.value, measurement.reasons
     if value is None:

@@ -17,7 +17,7 @@ from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
 from robot.wire.cue_limits import VARIED
 
-# Larger numbers say no more to a patient, and overflow where points are stored.
+# Larger numbers mean nothing more to a patient, and overflow where points are stored.
 POINTS_MAX = 1000
 
 
@@ -47,7 +47,7 @@ class Valence:
     Attributes
     ----------
     slug, label, hue
-        For programs, for people (translated by pages), and the color of its pages.
+        Its name in programs, its name for people (translated by pages), its pages' color.
     hit_points, miss_points
         Added to the score; None for both means that points do not exist.
     bands
@@ -109,7 +109,13 @@ class Valence:
         return (self.hit_points or 0) > 0
 
     def points(self, hit: bool, close: bool = False) -> int | None:
-        """Return what a hit or a miss adds to the score; a close step adds nothing."""
+        """Return what a step adds to the score; None where points do not exist.
+
+        Parameters
+        ----------
+        hit, close
+            The step's verdict; a close step adds nothing.
+        """
         if close:
             return 0 if self.has_points else None
         return self.hit_points if hit else self.miss_points
@@ -140,10 +146,15 @@ class Valence:
         return Emblem.GAIN if points > 0 else Emblem.LOSS if points < 0 else Emblem.NEUTRAL
 
     def keeps_rule_set(self, hit_points: int | None, miss_points: int | None) -> bool:
-        """Return whether with these points it would still be the same rule set.
+        """Return whether it would still be the same rule set with other points.
 
         A study that names a type must be able to rely on it: a type that rewards hits always does,
         one that takes nothing for a miss never does, and one without points has none.
+
+        Parameters
+        ----------
+        hit_points, miss_points
+            Points for a hit and for a miss; None for both means no points.
         """
         if not self.has_points or hit_points is None or miss_points is None:
             return (hit_points, miss_points) == (self.hit_points, self.miss_points)
@@ -234,10 +245,21 @@ def edit_valence(
 ) -> Valence:
     """Return a valence with points, bands and gestures that a clinic chose.
 
+    Parameters
+    ----------
+    slug
+        The valence that is edited.
+    hit_points, miss_points
+        Points for a hit and for a miss; None for both where it has no points.
+    bands
+        Words and confetti, rising from a performance of 0.
+    cue
+        The robot's gestures.
+
     Raises
     ------
     InvalidSetting
-        Where it would be another rule set, or break the rules of ``Valence``.
+        For points that would make it another rule set, and for what ``Valence`` refuses.
     """
     usual = find_valence(slug)
     label = Marked(usual.label)

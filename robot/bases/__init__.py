@@ -1,4 +1,4 @@
-"""The bases that can be driven: one module each."""
+"""The bases that can be driven, each in its own module or folder."""
 
 from robot.bases.avatar import AvatarBase
 from robot.bases.base import (

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar, Self
 
+from robot.motion.base_response import Response
 from robot.motion.pose import Pose
-from robot.motion.response import Response
 from robot.motion.score import Color, Note
 from robot.motion.twist import Twist
 
@@ -34,7 +34,7 @@ class Abilities:
     moves
         Whether it can drive and turn, as gestures need.
     announces
-        Whether it has lights and sounds, with which it tells that it is about to move.
+        Whether it has lights and sounds, which announce that it is about to move.
     notes
         Whether it plays the notes of a gesture's score; else a sound of its own announces each.
     answers
@@ -100,7 +100,7 @@ class SensorState:
     refusal
         Why it must not move at all, as a code; empty where it may.
     stop_pressed
-        Whether somebody presses its stop button.
+        Whether its stop button is pressed.
     battery_v
         Voltage of its battery [V]; None where unknown.
     is_charging
@@ -157,11 +157,11 @@ class MobileBase(ABC):
     abilities: Abilities  # of the class, or of an object with other topics
     port: str = ""  # address of its port or bridge, where it has one; set before it is opened
     response: Response = Response()  # how late it answers
-    on_bytes: Callable[[bytes], None] | None = None  # told what it sent, where that is bytes
+    on_bytes: Callable[[bytes], None] | None = None  # gets the bytes that it sends, if any
 
     @abstractmethod
     def __init__(self, monotonic: Callable[[], float]) -> None:
-        """Make one that is not open yet, given a clock [s]."""
+        """Make one that is not open yet, with a clock [s]."""
 
     @classmethod  # noqa: B027 (not every base has options)
     def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
@@ -177,7 +177,7 @@ class MobileBase(ABC):
         return self.name
 
     def calibrate(self, response: Response) -> None:
-        """Take over how it was measured to answer. Where it stands is home then."""
+        """Apply what was measured of its motion. Its present place becomes home."""
         self.response = response
 
     def __enter__(self) -> Self:
@@ -247,13 +247,27 @@ class MobileBase(ABC):
         return None
 
     def light(self, first: Color, second: Color) -> None:  # noqa: B027 (not every base can)
-        """Show colors of a gesture's score, until ``show`` or the next ones. Never raises."""
+        """Show colors of a gesture's score, until ``show`` or the next ones. Never raises.
+
+        Parameters
+        ----------
+        first, second
+            Colors of its two lights.
+        """
 
     def play(self, note: Note) -> None:  # noqa: B027 (not every base can)
         """Play a note of a gesture's score. Never raises."""
 
     def show(self, indication: Indication, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
-        """Show its state by lights, and by a sound where ``aloud``. Never raises."""
+        """Show a state by its lights. Never raises.
+
+        Parameters
+        ----------
+        indication
+            The state.
+        aloud
+            Whether a sound announces it too, if there is one for it.
+        """
 
     def answer(self, answer: Answer) -> None:  # noqa: B027 (not every base can)
         """Begin to answer, in place of the last answer; ``show`` ends it. Never raises or waits."""

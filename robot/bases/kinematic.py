@@ -19,9 +19,9 @@ from robot.bases.drive_train import (
 )
 from robot.bases.kobuki_protocol.wheels import TICK_M
 from robot.bases.odometry import Odometry
+from robot.motion.base_response import Response
 from robot.motion.limits import ORDER_HOLDS_S, TICK_S, WHEEL_LIMITS
 from robot.motion.pose import HOME, advance
-from robot.motion.response import Response
 from robot.motion.twist import STILL, Twist
 
 STEP_S = TICK_S / 2
@@ -61,7 +61,7 @@ IDEAL = Imperfections(0.0, 0.0, 0.0, has_noise=False, drift_deg_min=0.0)
 
 
 class KinematicBase(MobileBase):
-    """Moves by ``advance``, on a clock [s] that is a parameter. Its chance repeats.
+    """Moves by ``advance``, on a clock [s] that is a parameter. All its runs draw the same noise.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class KinematicBase(MobileBase):
         self._drive_train.held = share
 
     def calibrate(self, response: Response) -> None:
-        """Take over how it was measured to answer."""
+        """Apply what was measured of its motion."""
         super().calibrate(response)
         self._odometry = Odometry(response.gyro_bias_rad_s, response.wheel_scale)
         self._sample()

@@ -26,8 +26,8 @@ from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
 from robot.bases.kobuki_protocol.wheels import STOP, control_to_twist, twist_to_control
 from robot.bases.odometry import Odometry
 from robot.bases.unordered_motion import UNORDERED, UnorderedMotion
+from robot.motion.base_response import Response
 from robot.motion.limits import WHEEL_LIMITS
-from robot.motion.response import Response
 from robot.motion.score import Color, Note
 from robot.motion.twist import STILL, Twist
 from robot.port.client import PortClient, ReceivedBytes
@@ -134,7 +134,7 @@ class KobukiBase(MobileBase):
         return self.name if udid is None else f"{self.name}-{udid.a:08x}{udid.b:08x}{udid.c:08x}"
 
     def calibrate(self, response: Response) -> None:
-        """Take over how it was measured to answer. Where it stands is home then."""
+        """Apply what was measured of its motion. Its present place becomes home."""
         super().calibrate(response)
         with self._lock:
             self._odometry = Odometry(response.gyro_bias_rad_s, response.wheel_scale)
@@ -191,13 +191,21 @@ class KobukiBase(MobileBase):
             self._odometry.set_home()
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
-        """Show its state by the first light, and by a short sound."""
+        """Show its state by the first light.
+
+        Parameters
+        ----------
+        indication
+            The state.
+        aloud
+            Whether a short sound announces it too, if there is one for it.
+        """
         self._set_lights(LIGHTS[indication])
         if aloud and indication in SOUNDS:
             self._sound = encode_commands(SoundSequence(SOUNDS[indication]))
 
     def light(self, first: Color, second: Color) -> None:
-        """Show colors of a gesture's score."""
+        """Show colors of a gesture's score, ``first`` and ``second`` of its two lights."""
         self._set_lights(COLORS[first][0] | COLORS[second][1])
 
     def play(self, note: Note) -> None:

@@ -30,7 +30,7 @@ class Odometry:
     Parameters
     ----------
     drift_rad_s
-        How fast the gyro turns by itself, as long as no rest has told [rad/s].
+        How fast the gyro turns by itself, until a rest has shown it [rad/s].
     wheel_scale
         Distance by the wheels over the true one.
 

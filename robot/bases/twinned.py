@@ -18,7 +18,7 @@ END_S = 2.0
 
 
 class TwinBase(KobukiBase):
-    """Starts a twin, drives it over its port, and ends it with itself."""
+    """Starts a twin, drives it over its port, and ends it when closed."""
 
     name: ClassVar[str] = "twin"
     abilities = replace(KobukiBase.abilities, simulated=True)

@@ -1,11 +1,11 @@
-"""Detects a motion of a base that nobody ordered."""
+"""Detects a motion of a base that was not ordered."""
 
 from __future__ import annotations
 
 import math
 
 # Ordered to stand for this long [s], a base stands: dead time, motor lag and ramps are over. Wheels
-# that move on [m/s] for a moment [s] are driven by somebody else. (All ours.)
+# that move on [m/s] for a moment [s] are driven by someone or something else. (All ours.)
 SETTLED_S = 1.0
 MOVES_M_S = 0.03
 MOVES_FOR_S = 0.2

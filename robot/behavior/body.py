@@ -12,11 +12,11 @@ from robot.behavior.expression import Expression
 from robot.behavior.manual_drive import ManualDrive
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
 from robot.behavior.status import StatusReporter
+from robot.motion.base_response import AT_ONCE
 from robot.motion.gesture import Gesture
 from robot.motion.limits import Limits
 from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
 from robot.motion.pose import HOME
-from robot.motion.response import AT_ONCE
 from robot.motion.twist import STILL
 
 CANNOT_MOVE = "base_cannot_move"

@@ -2,7 +2,7 @@
 
 Nothing here holds up the loop that drives the base: it appends to a list in memory, and a thread
 writes. Where the disk is too slow, the oldest records are dropped and counted. A power cut may lose
-the last seconds: they are written every half second, but the disk is not told to hurry.
+the last seconds: they are written every half second, but the disk may take its time.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from robot.wire.limits import MAX_FRAME_BYTES
 
 Message = dict[str, Any]
 
-# Tells a proxy before several servers which of them to choose: what the error `elsewhere` named.
+# Tells a proxy which of several servers to choose: the one that the error `elsewhere` named.
 SERVER_HEADER = "GARRY-Server"
 ADDRESS = re.compile(r"[A-Za-z0-9.:\[\]_-]{1,100}")
 
@@ -87,10 +87,10 @@ class Link:
         self._back_off = BackOff(timing, jitter)
         self._socket: ClientConnection | None = None
         self._is_closed = False
-        self._was_welcome = False  # ever: then a failure is likely to pass
+        self._was_welcome = False  # on any connection: then a failure is probably temporary
         self._was_heard = False  # on this connection
         self._error = ""  # the last one that the server sent on this connection
-        # Of several servers the one that has the session, as another one said: for the proxy.
+        # Which of several servers has the session, as another one reported: for the proxy.
         self._server = ""
 
     @property
@@ -135,7 +135,7 @@ class Link:
         raise StopAsyncIteration
 
     async def send(self, message: Message) -> bool:
-        """Send a message; False where there is no connection, since nothing is kept here.
+        """Send a message; return False where there is no connection: nothing is queued here.
 
         True does not mean that it arrived. Raises FrameTooLarge, and ValueError for a number that
         is not finite.
@@ -226,7 +226,7 @@ class Link:
         return dict(message)
 
     async def _replace_token(self, message: Message) -> None:
-        """Store the token that the server gives, and only then say it back."""
+        """Store the token that the server gives, and only then confirm it."""
         token = message.get("token")
         if self._store_token is None or not isinstance(token, str) or not token.isascii():
             return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robot.wire.close_codes import CloseCode
 
-# Close code: the cure, for a server that does not name one. Dialing in again unchanged would not
+# Close code: the cure, for a server that does not name one. Connecting again unchanged would not
 # help; after 4009 it would close the newer socket, which would dial in again, and so on.
 REFUSALS: dict[int, str] = {
     CloseCode.UNAUTHORIZED: (

@@ -7,12 +7,12 @@ from collections import deque
 from dataclasses import replace
 
 from robot.marking import gettext_noop
+from robot.motion.base_response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.delay_meter import DelayMeter
 from robot.motion.gesture import MIN_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
 from robot.motion.limits import Limits
 from robot.motion.path import Drive, Segment, Turn, plan_path
 from robot.motion.pose import HOME, Pose, wrap
-from robot.motion.response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.twist import STILL, Twist
 
 DONE = "done"

@@ -49,7 +49,20 @@ class TopicClient(Protocol):
         """Return the frames to send now."""
 
     def handle(self, incoming: Incoming, now_s: float) -> None:
-        """Handle a received frame. Raises BadRosFrame where it is not understood."""
+        """Handle a received frame.
+
+        Parameters
+        ----------
+        incoming
+            The frame.
+        now_s
+            When it came, on the bridge's clock [s].
+
+        Raises
+        ------
+        BadRosFrame
+            Where it is not understood.
+        """
 
     def disconnect(self, now_s: float) -> None:
         """Handle the loss of the connection."""

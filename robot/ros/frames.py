@@ -1,7 +1,7 @@
 """Frames of rosbridge v2: the six operations that are sent, and the two that are received.
 
 A bridge reports no errors (docs/reference/rosbridge.md#behavior), so what matters is confirmed by
-its echo. So that nothing waits in a queue, publishers and subscriptions keep one message.
+its echo. So that nothing waits in a queue, publishers and subscriptions hold one message.
 """
 
 from __future__ import annotations
@@ -48,7 +48,15 @@ Incoming = Publication | ServiceResponse
 
 
 def advertise(topic: Topic, *, latch: bool = False) -> Frame:
-    """Return an advertisement; with ``latch``, later subscribers get the last message."""
+    """Return the frame that advertises a topic.
+
+    Parameters
+    ----------
+    topic
+        What will be published on.
+    latch
+        Whether later subscribers get the last message.
+    """
     return {
         "op": "advertise",
         "topic": topic.name,
@@ -64,7 +72,7 @@ def unadvertise(topic: Topic) -> Frame:
 
 
 def publish(topic: Topic, message: Mapping[str, Any]) -> Frame:
-    """Return a publication."""
+    """Return the frame that publishes ``message`` on ``topic``."""
     return {"op": "publish", "topic": topic.name, "msg": dict(message)}
 
 
@@ -94,7 +102,17 @@ def unsubscribe(topic: Topic) -> Frame:
 
 
 def call_service(service: str, arguments: Mapping[str, Any], call_id: str) -> Frame:
-    """Return a service call; its response has the same id."""
+    """Return the frame that calls a service.
+
+    Parameters
+    ----------
+    service
+        Its name, such as ``/rosapi/publishers``.
+    arguments
+        By name.
+    call_id
+        Id of the call, which its response has too.
+    """
     return {"op": "call_service", "service": service, "args": dict(arguments), "id": call_id}
 
 

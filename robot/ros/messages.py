@@ -25,7 +25,7 @@ BOOL = "std_msgs/Bool"
 STRING = "std_msgs/String"
 HAZARDS = "irobot_create_msgs/HazardDetectionVector"
 DOCK = "irobot_create_msgs/DockStatus"
-# Type of an event: the name of its field that says which sensor it was. Its field ``state`` is 1
+# Type of an event: the name of its field that identifies the sensor. Its field ``state`` is 1
 # while it is pressed, sees an edge, or hangs free (kobuki_msgs, kobuki_ros_interfaces).
 EVENT_FIELDS = {"BumperEvent": "bumper", "CliffEvent": "sensor", "WheelDropEvent": "wheel"}
 EVENTS = {
@@ -50,7 +50,16 @@ def without_msg(kind: str) -> str:
 
 
 def write_twist(twist: Twist, kind: str = TWIST) -> dict[str, Any]:
-    """Return a geometry_msgs/Twist, or a TwistStamped without a time: a base takes that as now."""
+    """Return a twist as a message.
+
+    Parameters
+    ----------
+    twist
+        The velocity.
+    kind
+        Type of the topic: geometry_msgs/Twist or TwistStamped. The latter gets no time, which a
+        base takes as now.
+    """
     message = {
         "linear": {"x": twist.v_m_s, "y": 0.0, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": twist.w_rad_s},
@@ -120,7 +129,7 @@ def read_hazards(message: Message) -> frozenset[str]:
 
 
 def read_flag(message: Message, name: str) -> bool:
-    """Read a field that is true or false. Raises BadRosFrame."""
+    """Return the field ``name`` of ``message``. Raises BadRosFrame where it is no true or false."""
     value = message.get(name)
     if not isinstance(value, bool):
         raise BadRosFrame(f'"{name}" is true or false.')

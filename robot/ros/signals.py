@@ -34,7 +34,7 @@ def _sound(state: str) -> Message:
 
 def _ring(state: str) -> Message:
     red, green, blue = COLORS[state]
-    # Where it waits, the base shows what it likes.
+    # While it waits, the base's own program has its lights.
     lights = [{"red": red, "green": green, "blue": blue}] * RING
     return {"leds": lights, "override_system": state != "waiting"}
 
@@ -49,7 +49,7 @@ def _text(state: str) -> Message:
     return {"data": state}
 
 
-# A topic of text gets the state's name: a node of the base's makes light and sound of it.
+# A topic of text gets the state's name: a node beside the base turns it into light and sound.
 LIGHT_TYPES: Mapping[str, Callable[[str], Message]] = {
     "kobuki_msgs/Led": _led,
     "kobuki_ros_interfaces/Led": _led,
@@ -65,10 +65,26 @@ SOUND_TYPES: Mapping[str, Callable[[str], Message]] = {
 
 
 def write_light(kind: str, state: str) -> Message:
-    """Return the message that shows a state, for a topic of a type."""
+    """Return the message by which a light shows a state.
+
+    Parameters
+    ----------
+    kind
+        Type of the topic: one of ``LIGHT_TYPES``, as ROS 1 or 2 writes it.
+    state
+        Name of an ``Indication``.
+    """
     return LIGHT_TYPES[without_msg(kind)](state)
 
 
 def write_sound(kind: str, state: str) -> Message | None:
-    """Return the message that makes a state heard; None for a state that is silent."""
+    """Return the message that announces a state by sound; None for a silent state.
+
+    Parameters
+    ----------
+    kind
+        Type of the topic: one of ``SOUND_TYPES``, as ROS 1 or 2 writes it.
+    state
+        Name of an ``Indication``.
+    """
     return SOUND_TYPES[without_msg(kind)](state) if state in SOUNDS else None

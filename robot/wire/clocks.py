@@ -20,7 +20,7 @@ class RemoteClock:
 
     The time that arrived with the shortest delay so far stands for a fresh one. The estimate decays
     by ``DRIFT_MAX``, so that a clock that runs slow is followed; a delay that grows no faster
-    cannot be told from that. A time more than ``LATE_S`` before the last one was read from a clock
+    looks the same. A time more than ``LATE_S`` before the last one was read from a clock
     that was set back, by a device that restarted or by its network time: the estimate begins anew.
 
     Parameters

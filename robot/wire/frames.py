@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS, MAX_NESTING
 
 NAME = re.compile(rf"[A-Za-z0-9_.:-]{{1,{MAX_NAME_CHARS}}}")
-# What no text of a database may hold: NUL, and halves of pairs of surrogates (one read whole is one
-# character). Only an escape can write them.
+# What no text in a database may hold: NUL, and single halves of surrogate pairs (a whole pair is
+# one character). Only an escape can write them.
 NO_TEXT = re.compile("[\0\ud800-\udfff]")
 
 
@@ -64,7 +64,7 @@ def read_object(text: str | None) -> dict[str, Any]:
 
 
 def read_name(message: Mapping[str, Any], name: str) -> str:
-    """Return a short name of a message. Raises BadFrame."""
+    """Return the field ``name`` of ``message``, which holds a short name. Raises BadFrame."""
     value = message.get(name)
     if not isinstance(value, str) or not NAME.fullmatch(value):
         raise BadFrame(f'"{name}" is a text of 1 to {MAX_NAME_CHARS} letters, digits or _ . : -')
@@ -112,7 +112,22 @@ def to_number(value: Any, low: float = -math.inf, high: float = math.inf) -> flo
 def read_number(
     message: Mapping[str, Any], name: str, low: float = -math.inf, high: float = math.inf
 ) -> float:
-    """Return a finite number of a message, within bounds. Raises BadFrame."""
+    """Return a finite number of a message.
+
+    Parameters
+    ----------
+    message
+        The message.
+    name
+        The field's name.
+    low, high
+        The least and the largest number, included.
+
+    Raises
+    ------
+    BadFrame
+        For anything else.
+    """
     number = to_number(message.get(name), low, high)
     if number is not None:
         return number
@@ -122,10 +137,20 @@ def read_number(
 
 
 def check_values(value: Any, depth: int = MAX_NESTING) -> None:
-    """Check that a value can be passed on. Raises BadFrame.
+    """Check that a value can be passed on.
 
-    Numbers have to be finite, texts without what no database stores, and objects and lists may nest
-    ``depth`` deep.
+    Parameters
+    ----------
+    value
+        Any JSON value. Numbers have to be finite, and texts without characters that no database
+        stores.
+    depth
+        How deep objects and lists may nest.
+
+    Raises
+    ------
+    BadFrame
+        For any other value.
     """
     if isinstance(value, str) and NO_TEXT.search(value):
         raise BadFrame("Texts hold no NUL and no half of a surrogate pair. Leave it out.")

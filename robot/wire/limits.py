@@ -1,4 +1,4 @@
-"""Sizes, numbers and times that both ends of a websocket keep to (docs/protocol.md)."""
+"""Sizes, numbers and times that both ends of a websocket respect (docs/protocol.md)."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class Watch:
 def watch(path: Path) -> None:
     """Watch this process."""
     from rehab.sessions.live import process
-    from rehab.sessions.live.session import writer
+    from rehab.sessions.live.session import group_commit
     from rehab.sessions.live.session.commits import commit
 
     seen, tune = Watch(), process.tune_interpreter
@@ -98,7 +98,7 @@ def watch(path: Path) -> None:
         tasks.append(asyncio.get_running_loop().create_task(seen.see_loop()))
 
     tasks: list[asyncio.Task[None]] = []
-    vars(writer).update(commit=timed_commit)
+    vars(group_commit).update(commit=timed_commit)
     vars(process).update(tune_interpreter=tune_and_watch)
     gc.callbacks.append(seen.see_collection)
     signal.signal(signal.SIGUSR1, seen.begin)

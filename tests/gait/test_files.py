@@ -81,7 +81,7 @@ def test_the_same_strides_from_each_kind_of_file(walk, tmp_path, name):
     write, pairs = WRITERS[name]
     path = tmp_path / name
     write(path, walk)
-    time_s, legs, _ = read_signals(path, pairs=pairs)
+    time_s, legs, *_ = read_signals(path, pairs=pairs)
 
     assert time_s == pytest.approx(walk.t_s[: len(time_s)], abs=1e-6)
     for found, given, size in zip(legs["left"][:3], walk.left, (700, 100, 0.5), strict=True):
@@ -107,7 +107,7 @@ def test_gzipped_csv(walk, tmp_path):
     with gzip.open(path, "wt") as file:
         np.savetxt(file, np.column_stack([walk.t_s, *walk.left]), "%.9g", ",", header="t,F,M,A",
                    comments="")  # fmt: skip
-    time_s, legs, _ = read_signals(
+    time_s, legs, *_ = read_signals(
         path, pairs=["time=t", "left.force=F", "left.moment=M", "left.angle=A"]
     )
 
@@ -120,7 +120,7 @@ def test_a_column_of_frame_numbers_may_be_empty(walk, tmp_path):
     names = "time_s,left_force_n,left_moment_nm,left_angle_rad,frame"
     rows = ["".join(f"{value:.9g}," for value in row) for row in np.array([walk.t_s, *walk.left]).T]
     path.write_text("\n".join([names, *rows]) + "\n")
-    t_s, legs, frames = read_signals(path)
+    t_s, legs, frames, _ = read_signals(path)
 
     assert find_frame_problem(t_s, frames).startswith("The frame numbers are ignored: some are")
     assert measure_strides(t_s, legs, rate_hz=RATE, mass_kg=75.0, frame=frames)

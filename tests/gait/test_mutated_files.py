@@ -125,11 +125,13 @@ def check_mutated(folder, count, seed):
         if path.suffix in {".c3d", ".gz"} or chance.random() < 0.1:
             data = mutate_bytes(data, chance)
         else:
-            data = mutate_text(data.decode(), chance).encode(errors="replace")
+            encoding = chance.choice(("utf-8", "utf-8", "latin-1", "utf-16"))
+            data = mutate_text(data.decode(), chance).encode(encoding, errors="replace")
         path.write_bytes(data)
         status, said = run_apart(path, folder / "log")
         assert status in (0, 256, 512), f"{path.name}, mutation {number} of seed {seed}: {said}"
         assert status != 512 or re.search(r"[.!?)]\s*$", said), said
+        assert "codec can't" not in said, said
 
 
 @pytest.mark.timeout(600)

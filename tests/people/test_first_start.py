@@ -1,4 +1,4 @@
-"""A new machine gets a clinic and one account, whose password is told until it is changed."""
+"""A new machine gets a clinic and one account, whose password is told until it is used."""
 
 import pytest
 from django.conf import settings as live_settings
@@ -32,6 +32,19 @@ def test_the_password_is_told_again_until_it_is_changed():
     account.save()
     assert first_password() is None
     assert not (live_settings.DATA_DIR / "first_password").exists()
+
+
+def test_the_file_of_the_password_goes_with_the_first_sign_in(client):
+    password, file = first_password(), live_settings.DATA_DIR / "first_password"
+    User.everywhere.create_user(
+        "else", password="my own words", role=Role.PT, clinic=first_clinic()
+    )
+    client.post("/sign-in/", {"username": "else", "password": "my own words"})
+    client.post("/sign-in/", {"username": "pt", "password": "wrong"})
+    assert file.exists()
+    client.post("/sign-in/", {"username": "pt", "password": password})
+    assert not file.exists()
+    assert first_password() is None
 
 
 def test_a_machine_with_accounts_gets_none():

@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from datetime import timedelta
 from typing import Any
 
 import pytest
+import time_machine
+from asgiref.sync import sync_to_async
 from django.test import RequestFactory
+from django.utils import timezone
 
+from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in import hashing, lockout
+from rehab.people.sign_in import hashing, known, lockout
 from rehab.people.sign_in.gate import (
     ALL_BURST,
     ALL_INTERVAL_S,
     AT_ONCE,
     BURST,
     INTERVAL_S,
+    LANE_BURST,
+    LANE_INTERVAL_S,
     MAX_WAITING,
     SignInGate,
 )
 from rehab.people.sign_in.hashing import HashingBusy, HashingPool
+from rehab.people.sign_in.known import Lanes, lane_of_browser
 
 
 class Site:
@@ -48,7 +56,12 @@ class Caller:
 
     def __init__(self, site: Site) -> None:
         self.now_s = 0.0
-        self.gate = SignInGate(site, lambda: self.now_s)
+        self.lanes: dict[str, int] = {}  # of addresses
+        self.gate = SignInGate(site, lambda: self.now_s, self.find_lane)
+
+    async def find_lane(self, cookies: Any, address: str) -> int | None:
+        """Return the lane that an address keeps."""
+        return self.lanes.get(address)
 
     async def call(
         self, address: str = "192.0.2.1", method: str = "POST", path: str = "/sign-in/", **headers
@@ -101,6 +114,91 @@ async def test_a_flood_from_many_addresses_comes_in_at_a_pace_that_training_bear
         await caller.call("203.0.113.1")  # who is refused alone takes no other's place
     assert (await caller.call("203.0.113.2"))[0] == 200
     assert site.entered == ALL_BURST + 3 + BURST + 1
+
+
+async def test_ten_strangers_shut_no_clinic_out():
+    """A try a second each: of twelve tries with the right password seven were refused."""
+    caller = Caller(Site())
+    caller.lanes = {"192.168.7.20": 1, "192.168.8.20": 2}
+    entered: dict[str, list[int]] = {address: [] for address in caller.lanes}
+    for second in range(120):
+        caller.now_s += 1
+        strangers = [(await caller.call(f"192.0.2.{number}"))[0] for number in range(10)]
+        if second % 2 == 0:
+            for address, codes in entered.items():
+                codes.append((await caller.call(address))[0])
+    assert entered == dict.fromkeys(entered, [200] * 60)
+    assert 429 in strangers  # it is a flood
+
+
+async def test_who_floods_a_clinics_lane_shuts_out_that_clinic_alone():
+    caller = Caller(site := Site())
+    flood = [f"192.168.7.{number}" for number in range(3)]
+    caller.lanes = dict.fromkeys(flood, 1) | {"192.168.8.20": 2}
+    for number in range(ALL_BURST):
+        await caller.call(f"192.0.2.{number}")
+    for _ in range(20):
+        for address in flood:
+            await caller.call(address)
+    assert site.entered == ALL_BURST + LANE_BURST
+    assert (await caller.call("192.168.8.20"))[0] == 200
+    caller.now_s += LANE_INTERVAL_S
+    await caller.call("192.0.2.99")
+    await caller.call("192.0.2.98")
+    await caller.call("192.0.2.97")
+    await caller.call("192.0.2.96")
+    assert [(await caller.call(flood[0]))[0] for _ in range(2)] == [200, 429]
+
+
+async def test_strangers_who_wait_take_no_place_of_a_clinics_lane():
+    caller = Caller(site := Site(answers=False))
+    caller.lanes = {"192.168.7.20": 1}
+    calls = [
+        asyncio.create_task(caller.call(f"192.0.2.{number}"))
+        for number in range(AT_ONCE + MAX_WAITING)
+    ]
+    await asyncio.sleep(0)
+    assert (await caller.call("198.51.100.1"))[0] == 429
+    calls.append(asyncio.create_task(caller.call("192.168.7.20")))
+    await asyncio.sleep(0)
+    site.may_answer.set()
+    assert {(await one)[0] for one in calls} == {200}
+
+
+@pytest.mark.django_db
+def test_a_browser_that_has_signed_in_keeps_its_clinics_lane(client, world):
+    user = User.everywhere.create_user(
+        "lea", password="walk well 2026", role=Role.PT, clinic=world.clinic
+    )
+    client.post("/sign-in/", {"username": "lea", "password": "wrong"})
+    assert lane_of_browser(cookies_of(client)) is None
+    client.post("/sign-in/", {"username": "lea", "password": "walk well 2026"})
+    kept = cookies_of(client)
+    assert lane_of_browser(kept) == user.clinic_id
+    assert client.cookies[known.COOKIE]["path"] == "/sign-in/"
+    assert lane_of_browser(kept | {known.COOKIE: f"1{kept[known.COOKIE]}"}) is None
+    with time_machine.travel(timezone.now() + timedelta(days=31)):
+        assert lane_of_browser(kept) is None
+
+
+def cookies_of(client: Any) -> dict[str, str]:
+    return {name: morsel.value for name, morsel in client.cookies.items()}
+
+
+@pytest.mark.django_db(transaction=True)
+@pytest.mark.postgres
+async def test_a_network_from_which_somebody_signed_in_lately_keeps_its_clinics_lane(world):
+    lanes, address = Lanes(), "203.0.113.9"
+    assert await lanes.find({}, address) is None
+    sign_in = sync_to_async(AuditEntry.everywhere.create)
+    entry = {"act": Act.SIGN_IN, "clinic": world.clinic, "address": "203.0.113.0/24"}
+    await sign_in(**entry, at=timezone.now() - timedelta(days=31))
+    assert await Lanes().find({}, address) is None
+    await sign_in(**entry, at=timezone.now() - timedelta(days=29))
+    assert await lanes.find({}, address) is None  # it was read a moment ago
+    assert await Lanes().find({}, address) == world.clinic.pk
+    await sign_in(act=Act.SIGN_IN, clinic=None, address="203.0.113.0/24")
+    assert await Lanes().find({}, address) == known.HOSTS
 
 
 async def test_only_attempts_to_sign_in_are_counted():

@@ -12,6 +12,7 @@ from rehab.gestures.models import GestureStep
 from rehab.models import TRACKED
 from rehab.people.audit import history
 from rehab.people.audit.history import HistoryEntry
+from rehab.people.audit.history_text import describe_actor
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
@@ -68,6 +69,11 @@ def test_a_program_is_named_beside_its_person(world):
     assert answer.status_code == 200
     entry = last_of(world.patient)
     assert (entry.by, entry.through) == (world.people[Role.LEAD], "nightly")
+
+
+def test_a_change_without_a_person_is_the_servers():
+    assert describe_actor(HistoryEntry()) == "the server"
+    assert describe_actor(HistoryEntry(by=User(username="ana"), through="lab")) == "ana · lab"
 
 
 def test_a_save_that_changes_nothing_is_no_change(world):

@@ -25,7 +25,7 @@ from rehab.people.consent.services import (
 )
 from rehab.people.models import BoardsConsent, ErasureReason, Patient
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions.setup.defaults import install_defaults
+from rehab.sessions.setup.default_protocols import install_defaults
 from rehab.training.measures import InvalidSetting
 from tests.support.boards import figures_of
 from tests.support.world import NOW, World, build_world

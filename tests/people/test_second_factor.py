@@ -120,7 +120,16 @@ def test_a_key_that_somebody_else_planted_signs_nobody_in(client, pt, app):
     planted = store.session_key
     client.cookies["sessionid"] = planted
     enter(client)
-    assert client.cookies["sessionid"].value != planted
+    pending = client.cookies["sessionid"].value
+    prove(client, app.code())
+    assert is_in(client)
+    assert len({planted, pending, client.cookies["sessionid"].value}) == 3
+    for key in (planted, pending):
+        other = Client()
+        other.cookies["sessionid"] = key
+        assert not is_in(other)
+        prove(other, app.code())
+        assert not is_in(other)
 
 
 def test_codes_are_guessed_five_times_whatever_the_address(pt, app):

@@ -28,4 +28,6 @@ def test_no_path_leads_out_of_the_static_folders(path, status):
     handler = StaticFilesHandler(get_asgi_application())
     answer = handler.get_response(RequestFactory().get("/", PATH_INFO=path))
     assert answer.status_code == status
+    assert answer["X-Content-Type-Options"] == "nosniff"
+    assert "script-src 'self';" in answer["Content-Security-Policy"]
     answer.close()

@@ -10,7 +10,7 @@ from robot.base_options import VirtualClock
 from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.calibrate import NotMeasured, measure
 from robot.calibration import BadCalibration, apply_calibration, store_calibration
-from robot.motion.response import Response
+from robot.motion.base_response import Response
 
 pytestmark = pytest.mark.matrix
 

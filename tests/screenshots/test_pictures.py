@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from rehab.sessions.setup.defaults import PROTOCOLS
+from rehab.sessions.setup.default_protocols import PROTOCOLS
 from tests.support.browsers import SIZES, chromium, sign_in
 from tests.support.servers import ROOT, clean_environment, serve
 

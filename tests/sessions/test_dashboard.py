@@ -280,6 +280,7 @@ def test_the_front_page_costs_the_same_however_much_was_walked(
     pt = client_of(world)
     now = timezone.now()
     ago(rosa, "positive", strides(2, 1), now)
+    world.add_tablet()
     pt.get("/admin/")
     with django_assert_max_num_queries(15) as first:
         pt.get("/admin/")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.sessions.setup.defaults import FIRST_VISIT, LATER_VISIT
+from rehab.sessions.setup.default_protocols import FIRST_VISIT, LATER_VISIT
 from rehab.sources.recording import read_recording
 from rehab.training.fold import SessionFold
 from rehab.training.measures import A2

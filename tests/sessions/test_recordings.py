@@ -22,6 +22,7 @@ from rehab.sessions.setup.recordings import (
     uploaded_file,
     write_columns,
 )
+from rehab.sources.recording.signals import measure_file
 from tests.support.data import signals
 from tests.support.world import client_of
 
@@ -63,6 +64,62 @@ def test_files_of_one_walk_are_stored_side_by_side():
         uploaded_file(7, ".mot", recordings.FILES_MAX)
 
 
+@pytest.mark.parametrize("at", [0, 5])
+def test_no_part_is_written_through_a_link(tmp_path, at):
+    secret = tmp_path / "secret_key"
+    secret.write_bytes(b"12345")
+    file = uploaded_file(7, ".csv")
+    file.symlink_to(secret)
+    try:
+        add_part(file, b"mine", at)
+    except UploadRefused:
+        assert at
+    assert secret.read_bytes() == b"12345"
+
+
+def upload(client, files):
+    """Send files as the page does, in parts; return what it then sends as their endings."""
+    for place, file in enumerate(files):
+        data = file.read_bytes()
+        for at in range(0, len(data), recordings.PART_BYTES):
+            query = urlencode({"at": at, "ending": file.suffix, "file": place})
+            part = data[at : at + recordings.PART_BYTES]
+            address = f"{reverse('add-recording-part')}?{query}"
+            answer = client.post(address, part, content_type="application/octet-stream")
+            assert answer.status_code == 200
+    return ",".join(file.suffix for file in files)
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize(("is_confirmed", "replayed"), [(True, 3), (False, 1)])
+def test_an_upload_is_stored_with_whether_it_is_overground(
+    world, monkeypatch, folder, is_confirmed, replayed
+):
+    """What the person at the page confirms decides, and goes with the recording."""
+    pytest.importorskip("ezc3d")
+    monkeypatch.setattr(recordings, "close_old_connections", lambda: None)  # it is the test's
+    client = client_of(world, Role.PT)
+    endings = upload(client, [signals("lab_files") / "btk_pig_motion3_ff.c3d"])
+    page = client.post(reverse("check-recording"), {"ending": endings, "mass": ""})
+    found = page.context["found"]
+    assert found["is_overground"]
+    answers = {
+        f"{one['side']}.{one['channel']}.{part}": one[part]
+        for one in found["channels"]
+        for part in ("column", "factor")
+    }
+    answers |= {f"time.{part}": found["time"][part] for part in ("column", "factor")}
+    answers |= {"ending": endings, "mass": "", "name": "floor", "confirm": "yes"}
+    page = client.post(
+        reverse("check-recording"), answers | ({"overground": "on"} if is_confirmed else {})
+    )
+    assert page.context["stored"] == "floor.csv"
+    assert ("--overground" in page.content.decode()) == is_confirmed
+    stored = folder / "recordings" / "floor.csv"
+    strides, _ = measure_file(stored, None, 74.0, None, 0.05, None, is_overground=False)
+    assert sum(not stride.reasons for stride in strides) == replayed
+
+
 @pytest.mark.django_db
 @pytest.mark.parametrize(
     ("names", "mass", "shown"),
@@ -81,16 +138,7 @@ def test_strange_files_in_the_browser(world, monkeypatch, names, mass, shown):
     pytest.importorskip("ezc3d")
     monkeypatch.setattr(recordings, "close_old_connections", lambda: None)  # it is the test's
     client = client_of(world, Role.PT)
-    files = [signals("lab_files") / name for name in names]
-    for place, file in enumerate(files):
-        data = file.read_bytes()
-        for at in range(0, len(data), recordings.PART_BYTES):
-            query = urlencode({"at": at, "ending": file.suffix, "file": place})
-            part = data[at : at + recordings.PART_BYTES]
-            address = f"{reverse('add-recording-part')}?{query}"
-            answer = client.post(address, part, content_type="application/octet-stream")
-            assert answer.status_code == 200
-    endings = ",".join(file.suffix for file in files)
+    endings = upload(client, [signals("lab_files") / name for name in names])
     page = client.post(reverse("check-recording"), {"ending": endings, "mass": mass})
     assert shown in page.content.decode()
 

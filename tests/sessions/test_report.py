@@ -54,6 +54,13 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     assert "Nothing was noted. Robot No robot." in words
 
 
+def test_strides_that_the_lab_sent_late_are_told_apart(world, patient):
+    session = walk(patient, "positive", [HIT, None, "late", "late", "force_lost"])
+    assert "Strides, trained leg 5 2 do not count, of 2 the samples came late" in read(
+        world, session
+    )
+
+
 def test_paper_and_pages_show_the_clinics_clock(world, patient):
     """Late on Saturday in UTC it is Sunday morning in Auckland."""
     world.clinic.time_zone = "Pacific/Auckland"

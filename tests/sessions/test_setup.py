@@ -15,8 +15,8 @@ from rehab.sessions.services import change_session
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
-from rehab.training.cueing import CueTiming
 from rehab.training.measures import InvalidSetting
+from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
 from robot.motion.gesture_spec import parse_gesture

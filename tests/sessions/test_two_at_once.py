@@ -16,7 +16,7 @@ from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.defaults import install_defaults
+from rehab.sessions.setup.default_protocols import install_defaults
 from rehab.stations.models import Station
 from tests.support.forms import session_form
 from tests.support.programs import program_of

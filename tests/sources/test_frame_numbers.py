@@ -96,7 +96,7 @@ def test_stamps_of_seconds_since_1970_and_large_counts_are_kept(table, tmp_path)
     harness.send([row | {"frame": n} for row, n in zip(rows, frames, strict=True)])
     harness.intake.finish()
     harness.intake.close()
-    t_s, _, kept = read_signals(path)
+    t_s, _, kept, _ = read_signals(path)
 
     assert np.abs(t_s - stamps).max() < 1e-5
     assert (kept == frames).all()
@@ -108,7 +108,7 @@ def test_frame_numbers_are_kept(table, tmp_path):
     harness.send(spoil_stamps(table))
     harness.intake.finish()
     harness.intake.close()
-    t_s, legs, frames = read_signals(path)
+    t_s, legs, frames, _ = read_signals(path)
     again = measure_strides(t_s, legs, rate_hz=200, mass_kg=MASS, frame=frames)
 
     assert frames[0] == 7000

@@ -251,7 +251,7 @@ def test_what_is_kept_is_measured_alike(made, table, tmp_path):
     harness.intake.finish()
     harness.intake.close()
 
-    t_s, legs, _ = read_signals(path)
+    t_s, legs, *_ = read_signals(path)
     again = measure_strides(t_s, legs, rate_hz=200, mass_kg=MASS)
     live = [m.value for m in harness.strides() if not m.reasons]
     assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(live, rel=1e-4)

@@ -31,7 +31,7 @@ from tests.support.tablets import (
 )
 from tests.support.world import NOW, World, signed_in
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 CLINIC, HOME = "192.168.7.20", "203.0.113.9"  # addresses
 FIREFOX = "Mozilla/5.0 (Android 14; Tablet; rv:139.0) Gecko/139.0 Firefox/139.0"
@@ -189,7 +189,8 @@ def test_a_tablet_ends_for_good(world, approver, station, end):
 def test_stations_say_that_a_tablet_has_ended_before_it_asks_again(world, approver, station):
     pair_tablet(signed_in(approver), station)
     end_account(world, approver)
-    assert "let it in again" in world.lead.get("/stations/").content.decode()
+    for page in ("/stations/", "/admin/rehab/device/"):
+        assert "let it in again" in world.lead.get(page).content.decode(), page
 
 
 def test_a_tablet_ends_with_its_station(world, pt, station):

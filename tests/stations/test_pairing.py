@@ -12,10 +12,13 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.random_codes import ALPHABET
 from rehab.people.rate_limits import TokenBuckets
+from rehab.people.roles import Role
+from rehab.people.sign_in.tokens import hash_token
+from rehab.sessions.pages.tablet import PAIRING_COOKIE
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
-from tests.support.tablets import enter_code, let_in, pair_tablet, shown_code
-from tests.support.world import World, build_world
+from tests.support.tablets import PAIR, enter_code, is_paired, let_in, pair_tablet, shown_code
+from tests.support.world import World, build_world, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -148,6 +151,26 @@ def test_a_tablet_that_was_let_in_gives_way_to_none(pt, station, monkeypatch):
     let_in(pt, shown_code(tablet), station)
     assert shown_code(Client())
     assert tablet.get("/tablet/state/").json()["paired"] is True
+
+
+def test_no_pairing_is_forged(world, pt, station):
+    tablet, other = Client(), Client()
+    code = shown_code(tablet)
+    form = {"code": code, "station": station.pk, "compared": "yes"}
+    for secret in ("", code, hash_token(code), Pairing.everywhere.get(code=code).secret_hash):
+        other.cookies[PAIRING_COOKIE] = secret
+        assert shown_code(other) != code
+        other.cookies.clear()
+    elsewhere = signed_in(world.people[Role.PT], enforce_csrf_checks=True)
+    assert elsewhere.post(PAIR, form).status_code == 403  # a page of another site sends it
+    pt.get(PAIR, form)
+    tablet.post(PAIR, form)
+    assert not is_paired(tablet)
+    assert not Device.everywhere.filter(station=station).exists()
+    let_in(pt, code, station)
+    other.cookies[PAIRING_COOKIE] = code
+    assert not is_paired(other)
+    assert is_paired(tablet)
 
 
 def test_nobody_pairs_to_a_station_of_another_clinic(pt):

@@ -18,7 +18,7 @@ from rehab.studies.allocation.crossover import VisitPlan, crossover_groups, will
 from rehab.studies.allocation.draws import Draws
 from rehab.studies.allocation.groups import Allocated, Factor, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
-from rehab.studies.arms import ArmRule, Condition, check_arms
+from rehab.studies.arms import ArmRule, Condition, check_arms, check_channels
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
 
@@ -279,6 +279,14 @@ def test_arms_differ_in_anything_or_are_refused():
         check_arms([arm("A"), arm("B", other)], crossover=False)
     with pytest.raises(InvalidSetting, match="Arms A and B do the same"):
         check_arms([arm("A"), arm("B")], crossover=False)
+
+
+def test_worn_sensors_are_never_pooled_with_anything_else():
+    check_channels(["", "heart_rate"])
+    check_channels(["foot_strike_deg", "foot_strike_deg"])
+    for other in ("", "heart_rate", "shank_stance_percent"):
+        with pytest.raises(InvalidSetting, match="the same measure for all arms"):
+            check_channels(["foot_strike_deg", other])
 
 
 def test_arms_that_no_study_could_have_are_refused():

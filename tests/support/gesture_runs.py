@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from robot.base_options import VirtualClock
 from robot.bases.kinematic import Imperfections, KinematicBase
+from robot.motion.base_response import Response
 from robot.motion.gesture import Gesture
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
-from robot.motion.response import Response
 from robot.play_gesture import play_gesture
 
 REST_S = 1.0  # between two gestures; in a session it is longer

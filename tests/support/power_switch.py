@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from rehab.sessions.live.session.writer import Writer
+from rehab.sessions.live.session.group_commit import Writer
 from tests.support import callers
 
 

@@ -21,8 +21,8 @@ HIT, MISS = 2.5, 1.5  # against the goal of 2 W/kg
 GOAL = 2.0
 LEFT, RIGHT = Side.LEFT, Side.RIGHT
 
-# A stride's value, a change between strides, or a stride with its side.
-Walked = float | None | Change | tuple[Side, float]
+# A stride's value, a change between strides, a stride with its side, or why a stride is invalid.
+Walked = float | None | Change | tuple[Side, float] | str
 
 
 def make_patient(clinic: Clinic, nickname: str = "Rosa", **fields: Any) -> Patient:
@@ -72,9 +72,12 @@ def walk(
         if isinstance(each, Change):
             rows += aggregate.change(each, None, at)
             continue
-        side, value = each if isinstance(each, tuple) else (LEFT, each)
+        reasons = (each,) if isinstance(each, str) else ()
+        value = MISS if isinstance(each, str) else each
+        side, value = value if isinstance(value, tuple) else (LEFT, value)
         number = aggregate.fold.last_number + 1
-        rows.append(aggregate.record_step(Measurement(number, float(number), side, value), at))
+        step = Measurement(number, float(number), side, value, reasons)
+        rows.append(aggregate.record_step(step, at))
     if end is not None:
         rows += aggregate.change(Change(end), None, at_end(began, aggregate))
     store(aggregate, rows)

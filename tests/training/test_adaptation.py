@@ -143,14 +143,6 @@ def test_a_share_of_hits_that_no_staircase_keeps_is_refused(wanted):
     assert fold.adaptation_mode is AdaptationMode.SUGGEST
 
 
-@pytest.mark.parametrize(
-    "figures", [{"limit": 0}, {"limit": 0.6}, {"strides": 2}, {"step": 0.1}, {"tolerance": 0.4}]
-)
-def test_figures_of_a_staircase_have_bounds(figures):
-    with pytest.raises(InvalidSetting):
-        GoalAdaptation(**figures)
-
-
 def walk_towards(
     profile: str, seed: int, start_at: float, limit: float, strides: int = 1500
 ) -> tuple[float, SessionFold]:

@@ -16,7 +16,7 @@ from rehab.training.bands import Band, Confetti, bands_to_json
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
-from rehab.training.fold.tallies import Tally
+from rehab.training.fold.tallies import STRIDES, Tally
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import ChartStyle, SessionPlan
@@ -198,12 +198,12 @@ def test_every_figure_follows_from_the_scored_steps(session: tuple[SessionPlan, 
     else:
         assert fold.score is None
         assert all(step.points is None for step in steps)
-    for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "close", "points"):
+    for name in (*STRIDES, "judged", "hits", "close", "points"):
         for index, phase in enumerate(fold.phases):
             parts = [part for block, part in fold.blocks.items() if block.phase == index]
             assert sum(getattr(part, name) for part in parts) == getattr(phase, name)
     for total in (fold.trained, fold.feedback, *fold.phases):
-        assert total.strides == total.valid + total.invalid + total.missing
+        assert total.strides == total.valid + total.invalid + total.missing + total.late
         assert total.hits <= total.judged <= total.valid
         assert total.streak <= total.best_streak <= total.hits
 

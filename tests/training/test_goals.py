@@ -157,22 +157,6 @@ def test_a_baseline_that_gives_no_usable_goal_waits_for_the_pt(value: float, goa
 
 
 @pytest.mark.parametrize(
-    ("wish", "cure"),
-    [
-        ({"hit_rate": 0}, "0.6 for 60 %"),
-        ({"hit_rate": 60}, "0.6 for 60 %"),
-        ({"hit_rate": math.nan}, "0.6 for 60 %"),
-        ({"duration_s": 0}, "more than 0 seconds"),
-        ({"duration_s": math.inf}, "more than 0 seconds"),
-        ({"duration_s": math.nan}, "more than 0 seconds"),
-    ],
-)
-def test_a_wish_that_cannot_come_true_is_refused(wish: dict[str, float], cure: str) -> None:
-    with pytest.raises(InvalidSetting, match=cure):
-        Target(**wish)
-
-
-@pytest.mark.parametrize(
     ("target", "hit_rate", "active_s", "met"),
     [
         (Target(), 1.0, 9999.0, None),

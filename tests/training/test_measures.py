@@ -5,14 +5,21 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from rehab.training.cueing import check_activation_threshold
-from rehab.training.measures import A2, GAIN_MAX, GAIN_MIN, MEASURES, InvalidSetting, check_gain
+from rehab.training.measures import (
+    A2,
+    GAIN_MAX,
+    GAIN_MIN,
+    MEASURES,
+    WORN,
+    WORN_MEASURES,
+    InvalidSetting,
+    check_worn,
+)
 from rehab.training.scoring import judge
 from robot.wire.limits import PERFORMANCE_MAX
 from tests.training.sessions import SWAY
@@ -62,28 +69,6 @@ def test_a_goal_within_bounds_is_a_number(goal: float) -> None:
 def test_a_goal_out_of_bounds_is_refused_with_the_cure(goal: float) -> None:
     with pytest.raises(InvalidSetting, match=r"Give one above 0 and up to 15 W/kg\."):
         A2.check_goal(goal)
-
-
-@pytest.mark.parametrize(
-    ("check", "good", "bad", "cure"),
-    [
-        (check_gain, [0.5, 0.85, 1, 1.5], [0, 0.499, 1.501, -1, math.nan, math.inf], "0.5 to 1.5"),
-        (
-            check_activation_threshold,
-            [0.01, 0.9, 2],
-            [0, -0.9, 2.001, 90, math.nan, math.inf],
-            r"0\.9 for 90 %",
-        ),
-    ],
-)
-def test_settings_have_bounds(
-    check: Callable[[float], float], good: list[float], bad: list[float], cure: str
-) -> None:
-    for setting in good:
-        assert check(setting) == setting
-    for setting in bad:
-        with pytest.raises(InvalidSetting, match=cure):
-            check(setting)
 
 
 @pytest.mark.parametrize(
@@ -145,3 +130,15 @@ def test_a_performance_fits_every_reader(measure, value, gain, goal) -> None:
 @pytest.mark.parametrize(("value", "performance"), [(10, 2.0), (20, 1.0), (40, 0.5), (0, 1000.0)])
 def test_where_lower_is_better_performance_is_the_inverse(value: float, performance: float) -> None:
     assert judge(SWAY, value, 1.0, 20.0).performance == performance
+
+
+@pytest.mark.parametrize("place", WORN)
+def test_a_worn_sensor_measures_its_own_measures_and_never_a2(place: str) -> None:
+    stride = {WORN[place]: 1.0, "stride_s": 1.1}
+    for measure in WORN_MEASURES:
+        assert not measure.sd_channel
+        check_worn(stride, measure)
+    check_worn({"a2_sd_w_kg": 0.1}, A2)
+    for other in (A2, dataclasses.replace(A2, channel="stride_s"), SWAY):
+        with pytest.raises(InvalidSetting, match="does not measure .* one of its own measures"):
+            check_worn(stride, other)

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind, PauseReason, State
-from rehab.training.cueing import CueTiming, check_activation_threshold
 from rehab.training.fold.tallies import Tally
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
+from rehab.training.robot_cueing import CueTiming, check_activation_threshold
 from rehab.training.steps import Side
 from rehab.training.valences import find_valence
 from robot.behavior.cue import Cue

@@ -61,19 +61,6 @@ def test_every_step_is_told_once_or_waits(schedule, values):
     assert hits + fold.delivery.pending.hits == fold.feedback.hits
 
 
-@pytest.mark.parametrize(
-    "figures",
-    [
-        {"interval": 0},
-        {"interval": 101},
-        {"kind": ScheduleKind.SUMMARY, "interval": 1},
-        {"band": 0.0},
-        {"band": 0.6},
-        {"stage": 0},
-    ],
-)
-def test_schedules_have_bounds(figures):
-    with pytest.raises(InvalidSetting):
-        Schedule(**figures)
+def test_an_unknown_schedule_is_refused_with_the_known_ones():
     with pytest.raises(InvalidSetting, match="every, bandwidth, faded, summary"):
         check_schedule_kind("sometimes")

@@ -29,33 +29,35 @@ def test_a_session_worked_out_by_hand() -> None:
     walk(fold, [4.0, None, 5.0, 3.0, 5.0, 5.0, 5.0])
     walk(fold, [5.0], side=Side.RIGHT)
     walk(fold, [3.0], reasons=("flagged",))
+    walk(fold, [3.0], reasons=("late", "moment_lost"))
     fold.change(Change(ChangeKind.PAUSE))
     walk(fold, [5.0])
     figures = summarize_session(fold)
     phases = figures.pop("phases")
     metrics = figures.pop("metrics")
     assert figures == {
-        "strides": 9,
+        "strides": 10,
         "valid": 6,
         "invalid": 2,
         "missing": 1,
+        "late": 1,
         "hits": 3,
         "close": 0,
         "hit_rate": 0.75,
         "score": 2,
         "goal": 4.0,
-        "active_s": 8.0,
+        "active_s": 9.0,
         "target_met": True,
     }
     assert metrics["best_streak"] == 2
     assert [(phase["kind"], phase["strides"], phase["hits"]) for phase in phases] == [
         ("baseline", 2, 1),
-        ("training", 5, 3),
+        ("training", 6, 3),
         ("catch", 1, 1),
     ]
     training = phases[1]
     assert training["mean"] == 4.5
-    assert [(block["phase"], block["strides"]) for block in training["blocks"]] == [(1, 3), (3, 2)]
+    assert [(block["phase"], block["strides"]) for block in training["blocks"]] == [(1, 3), (3, 3)]
 
 
 @pytest.mark.parametrize(

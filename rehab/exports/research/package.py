@@ -21,7 +21,7 @@ from django.db.models import QuerySet
 from rehab.exports.archive import write_csv
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
-from rehab.exports.research.parts import ABOUT, write_part
+from rehab.exports.research.session_files import ABOUT, write_part
 from rehab.exports.research.sinks import has_parquet
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.people.models import User

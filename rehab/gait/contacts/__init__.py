@@ -1,1 +1,1 @@
-"""When a foot meets and leaves the floor: from force plates, or from a gyroscope."""
+"""When a foot meets and leaves the floor: from force plates."""

@@ -102,7 +102,7 @@ def _try_apart(path: Path) -> None:
 def _add_plates(file: Any, table: Table) -> None:
     """Add the vertical force of each leg [N] as ``plates.left`` and ``plates.right``.
 
-    None where the file does not say where its plates are, or has no markers at the ankles.
+    None where the file has no places of its plates, or no markers at the ankles.
     """
     corners = np.asarray(_read_values(file, "FORCE_PLATFORM", "CORNERS"), dtype=np.float64)
     channels = np.asarray(_read_values(file, "FORCE_PLATFORM", "CHANNEL"), dtype=np.int64)
@@ -170,7 +170,7 @@ def _read_rate(file: Any, group: str) -> float:
 
 
 def _read_labels(file: Any, group: str, name: str = "LABELS") -> list[str]:
-    """Return the labels of a group, of which there are more with each 255."""
+    """Return the labels of a group; each parameter holds 255, those after it have numbers."""
     return [
         str(label).strip()
         for number in ("", *range(2, 20))

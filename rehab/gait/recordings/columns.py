@@ -11,11 +11,13 @@ from rehab.gait.strides import GaitInputError
 CHANNELS = ("force", "moment", "angle", "forward", "position")
 REQUIRED = CHANNELS[:3]
 SIDES = ("left", "right")
+# A column of a stored recording that is 1 where people walk over plates in a floor.
+OVERGROUND = "overground"
 
 
 @dataclass(frozen=True, slots=True)
 class SignalColumn:
-    """A column by name, and what takes its numbers to SI units, our signs and the force's time.
+    """A column by name, with what converts its numbers to SI units and our signs, and its delay.
 
     Attributes
     ----------

@@ -5,13 +5,21 @@ from __future__ import annotations
 import csv
 import gzip
 import warnings
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE, getincrementaldecoder
 from collections.abc import Collection, Mapping, Sequence
+from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 
-from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, ColumnMap, SignalColumn
+from rehab.gait.recordings.columns import (
+    CHANNELS,
+    OVERGROUND,
+    SIGNAL_LAYOUTS,
+    ColumnMap,
+    SignalColumn,
+)
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
@@ -20,10 +28,54 @@ MAX_HEADER = 64 * 1024
 
 
 def open_text(path: Path) -> TextIO:
-    """Open a text file, gzipped or not."""
-    if path.suffix == ".gz":
-        return gzip.open(path, "rt", newline="", encoding="utf-8-sig")
-    return path.open(newline="", encoding="utf-8-sig")
+    """Open a text file, gzipped or not, in the encoding that its bytes tell.
+
+    Raises
+    ------
+    GaitInputError
+        For a file that is not text.
+    """
+    with _open_bytes(path) as file:
+        encoding = find_encoding(file)
+    if encoding is None:
+        raise GaitInputError(f"{path.name} is no text. Save it as CSV UTF-8.")
+    return TextIOWrapper(_open_bytes(path), encoding=encoding, errors="replace", newline="")
+
+
+def _open_bytes(path: Path) -> BinaryIO:
+    opened: Any = gzip.open(path) if path.suffix == ".gz" else path.open("rb")  # noqa: SIM115  # the caller closes it
+    return cast(BinaryIO, opened)
+
+
+def find_encoding(file: BinaryIO) -> str | None:
+    """Return the encoding of a text: UTF-8, UTF-16 or, of all others, Windows-1252 (Latin-1).
+
+    None for what is not text: it has zeros, and not those of UTF-16, where every other byte of
+    numbers and names is one.
+    """
+    head = file.read(MAX_HEADER)
+    if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        found = "utf-16-le" if head.startswith(BOM_UTF16_LE) else "utf-16-be"
+        return "utf-16" if _is_utf_16(head[2:], found) else None
+    if b"\0" in head:
+        return next((one for one in ("utf-16-le", "utf-16-be") if _is_utf_16(head, one)), None)
+    decoder, part = getincrementaldecoder("utf-8")(), head
+    try:
+        while part:
+            decoder.decode(part)
+            part = file.read(MAX_HEADER)
+        decoder.decode(b"", final=True)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def _is_utf_16(head: bytes, encoding: str) -> bool:
+    """Return whether most letters of a text are of the Latin alphabet, as those of labs are."""
+    text = head[: len(head) // 2 * 2].decode(encoding, errors="replace")
+    letters = "".join(text.split())
+    latin = sum(letter.isprintable() and letter < "\u0250" for letter in letters)
+    return "\0" not in letters and latin > 0.8 * len(letters)
 
 
 def read_header(path: Path) -> tuple[list[str], str]:
@@ -36,11 +88,8 @@ def read_header(path: Path) -> tuple[list[str], str]:
     OSError
         For a file that cannot be read.
     """
-    try:
-        with open_text(path) as file:
-            first = file.readline(MAX_HEADER)
-    except UnicodeDecodeError:
-        raise GaitInputError(f"{path.name} is no text. Save it as CSV UTF-8.") from None
+    with open_text(path) as file:
+        first = file.readline(MAX_HEADER)
     delimiter = max(",;\t", key=first.count)
     return [name.strip() for name in next(csv.reader([first], delimiter=delimiter), [])], delimiter
 
@@ -71,14 +120,13 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
         raise GaitInputError(
             f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(header)}."
         )
-    with warnings.catch_warnings():
+    with open_text(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of rows that are too short, which are left out
         table = np.genfromtxt(
-            path,
+            file,
             delimiter=delimiter,
             skip_header=1,
             usecols=[header.index(name) for name in wanted],
-            encoding="utf-8-sig",
             invalid_raise=False,
             ndmin=2,
         )
@@ -90,7 +138,7 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
 def apply_columns(
     table: Mapping[str, Floats], columns: ColumnMap
 ) -> tuple[Floats, dict[str, LegSamples]]:
-    """Return times [s] and each leg's channels, in SI units, with our signs and in time.
+    """Return times [s] and each leg's channels, in SI units, with our signs, delays removed.
 
     Parameters
     ----------
@@ -123,18 +171,43 @@ def apply_columns(
 
 
 def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None:
-    """Write samples, shape (n, columns), the first of which is their time.
+    """Write samples as lines of a CSV file.
 
-    Times and ``counts`` have all digits: stamps may be of seconds since 1970, counts of 32 bits.
+    Times and counts have all their digits: stamps may be seconds since 1970, counts 32 bits wide.
+
+    Parameters
+    ----------
+    file
+        A text file, open for writing, behind its header.
+    rows
+        The samples, shape (n, columns); their times come first.
+    counts
+        Which columns, from 0, are counts.
     """
     digits = (15 if place == 0 or place in counts else 9 for place in range(rows.shape[1]))
     np.savetxt(file, rows, [f"%.{most}g" for most in digits], ",")
 
 
 def save_signals(
-    path: Path, time_s: Floats, legs: Mapping[str, LegSamples], frames: Floats | None = None
+    path: Path,
+    time_s: Floats,
+    legs: Mapping[str, LegSamples],
+    frames: Floats | None = None,
+    *,
+    is_overground: bool = False,
 ) -> None:
     """Write signals in SI units to a new CSV file, in the layout ``garry``.
+
+    Parameters
+    ----------
+    path
+        The file, which does not exist yet.
+    time_s
+        Times [s], shape (n,).
+    legs
+        The channels of each leg by its side ("left", "right"), shape (n,) each.
+    frames
+        The samples' numbers, shape (n,), if there are any.
 
     Raises
     ------
@@ -153,6 +226,8 @@ def save_signals(
     if layout.frame is not None and frames is not None:
         counts = {len(columns)}
         columns[layout.frame.name] = frames
+    if is_overground:
+        columns[OVERGROUND] = np.ones(len(time_s))
     rows = np.column_stack(list(columns.values()))
     try:
         with path.open("x", encoding="utf-8") as file:
@@ -165,7 +240,7 @@ def save_signals(
 
 
 def read_mass(path: Path) -> float:
-    """Return the body mass [kg] that moore2013 keeps in ``SubjectInfo.csv`` beside a recording.
+    """Return the body mass [kg] that moore2013 stores in ``SubjectInfo.csv`` beside a recording.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How much a file from a stranger may cost: parsers of binary files fail in ways of their own."""
+"""How much a file from a stranger may cost: parsers of binary files may fail badly."""
 
 from __future__ import annotations
 

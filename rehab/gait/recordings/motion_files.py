@@ -182,11 +182,8 @@ def _name_columns(groups: list[str], names: list[str]) -> list[str]:
 
 
 def _read_lines(path: Path, most: int = LINES_MAX) -> list[str]:
-    try:
-        with open_text(path) as file:
-            lines = [line.rstrip("\n") for line, _ in zip(file, range(most), strict=False)]
-    except UnicodeDecodeError:
-        raise GaitInputError(f"{path.name} is no text. Export it as text.") from None
+    with open_text(path) as file:
+        lines = [line.rstrip("\n") for line, _ in zip(file, range(most), strict=False)]
     return lines + [""] * (5 - len(lines))
 
 

@@ -14,7 +14,7 @@ from rehab.gait.signals.filters import Floats, ZeroPhaseFilter
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError, Stride
 
-# Okabe and Ito's colors, which people tell apart however they see colors; marks differ as well.
+# Okabe and Ito's colors, which color-blind people can distinguish; marks differ as well.
 BLUE, ORANGE, GRAY = "#0072B2", "#D55E00", "#666666"
 CYCLE = np.linspace(0, 1, 101)
 ROWS = ("force [N/kg]", "moment [Nm/kg]", "angular velocity [rad/s]", "power [W/kg]")
@@ -96,10 +96,17 @@ def plot_strides(
 
 
 def compute_curves(leg: LegSamples, rate_hz: float, mass_kg: float) -> list[Floats]:
-    """Return force, moment, angular velocity and power of a leg, shape (n,) each, as drawn.
+    """Return force [N/kg], moment [Nm/kg], angular velocity [rad/s] and power [W/kg], as drawn.
 
-    Moment and angle are filtered over the whole recording, so that the curves differ from what a
-    stride was measured with by a percent.
+    Moment and angle are filtered over the whole recording, so the curves differ by about a percent
+    from what a stride was measured with. Missing moments and angles are interpolated.
+
+    Parameters
+    ----------
+    leg
+        The leg's channels, shape (n,) each, as every curve that is returned.
+    rate_hz, mass_kg
+        Rate of the samples [Hz], and body mass [kg].
     """
     force, moment, angle = (np.asarray(channel, dtype=np.float64) for channel in leg[:3])
     known = np.arange(len(force))

@@ -7,23 +7,24 @@ import gzip
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
-from rehab.gait.recordings.columns import ColumnMap, find_layout, read_column_map
+from rehab.gait.recordings.columns import OVERGROUND, ColumnMap, find_layout, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
 
-# What parsers raise for files that are not what they say.
+# What parsers raise for files whose content does not match their ending.
 DAMAGED = (
     ArithmeticError, AttributeError, EOFError, gzip.BadGzipFile, LookupError, MemoryError,
     RuntimeError, TypeError, ValueError, csv.Error, zlib.error,
 )  # fmt: skip
-LARGEST = 1e30  # of what a sensor sends; beyond, it is damaged
+LARGEST = 1e30  # of a sensor's values; a larger one is damage
 BYTES_MAX = 512 * 1024 * 1024
 
 READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
@@ -36,12 +37,31 @@ READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
 }
 
 
+class RecordedSignals(NamedTuple):
+    """A walk's signals in SI units, with our signs.
+
+    Attributes
+    ----------
+    time_s, legs
+        Times, shape (n,), and ``LegSamples`` of shape (n,) by side.
+    frames
+        The samples' numbers, shape (n,), None where no column has them.
+    is_overground
+        Whether the recording says that it is of steps over plates in a floor.
+    """
+
+    time_s: Floats
+    legs: dict[str, LegSamples]
+    frames: Floats | None
+    is_overground: bool
+
+
 def read_any_table(*paths: Path) -> Table:
     """Return the columns of a walk's files by name, shape (n,) each, at the fastest one's rate.
 
-    Kinds are told by their endings: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
-    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Times are in a column that is called time, in
-    seconds, by which several files are joined.
+    The kind follows from the ending: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
+    OpenSim's .mot, .sto and .trc, Qualisys' .tsv. Several files are joined by their times, in a
+    column ``time`` [s].
 
     Raises
     ------
@@ -73,10 +93,8 @@ def read_any_table(*paths: Path) -> Table:
     return table
 
 
-def read_signals(
-    *paths: Path, pairs: Sequence[str] | None = None
-) -> tuple[Floats, dict[str, LegSamples], Floats | None]:
-    """Return times [s], each leg's channels and the frame numbers of a recording.
+def read_signals(*paths: Path, pairs: Sequence[str] | None = None) -> RecordedSignals:
+    """Return the signals of a recording.
 
     Parameters
     ----------
@@ -84,11 +102,6 @@ def read_signals(
         The file, or those of one walk. A cell that is not a number is a missing sample: NaN.
     pairs
         Which column is which channel, as for ``read_column_map``; None to decide by the header.
-
-    Returns
-    -------
-    Times, shape (n,), ``LegSamples`` of shape (n,) by side, in SI units with our signs, and numbers
-    of shape (n,), None where no column has them.
 
     Raises
     ------
@@ -106,11 +119,26 @@ def read_signals(
     if empty:
         raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
     frames = None if frame is None else table[frame]
-    return (*apply_columns(table, columns), frames)
+    return RecordedSignals(*apply_columns(table, columns), frames, says_overground(table))
+
+
+def says_overground(table: Mapping[str, Floats]) -> bool:
+    """Return whether a stored recording is one of steps over plates in a floor."""
+    return OVERGROUND in table and bool((table[OVERGROUND] > 0).any())
 
 
 def require_columns(path: Path, table: Mapping[str, Floats], columns: ColumnMap) -> None:
-    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map."""
+    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map.
+
+    Parameters
+    ----------
+    path
+        The file, which the message names.
+    table
+        Its columns by name.
+    columns
+        The map.
+    """
     missing = [column.name for column in columns.columns if column.name not in table]
     if missing:
         raise GaitInputError(

@@ -1,4 +1,4 @@
-"""Recorded channels in one table: columns, and what their file says of them."""
+"""Recorded channels in one table: columns, and what their file states about them."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Table(dict[str, Floats]):
     Attributes
     ----------
     units
-        By column, as the file writes them; columns whose unit it does not say are missing.
+        By column, as the file writes them; columns without a unit are missing.
     mass_kg
-        Body mass, None where the file does not say it.
+        Body mass [kg]; None where the file has none.
     notes
         What a person should know of how the columns were made.
     """
@@ -45,7 +45,7 @@ def resample_channel(values: Floats, rate_hz: float, time_s: Floats) -> Floats:
     Parameters
     ----------
     values, rate_hz
-        Shape (n,), and how many a second.
+        The channel, shape (n,), and its rate [Hz].
     time_s
         Wanted times, shape (m,); a channel of as many values has them already.
     """
@@ -56,12 +56,12 @@ def resample_channel(values: Floats, rate_hz: float, time_s: Floats) -> Floats:
 
 
 def join_tables(tables: Mapping[str, Table]) -> Table:
-    """Return the tables of one walk as one, at the times that all have, of the one with most rows.
+    """Return the tables of one walk as one, at the common times of the one with most rows.
 
     Parameters
     ----------
     tables
-        By the name of their file, each with a column ``time`` [s] of the same clock.
+        The tables by file name, each with a column ``time`` [s] of the same clock.
 
     Raises
     ------

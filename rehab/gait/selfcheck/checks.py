@@ -62,7 +62,7 @@ class SignalCheck:
         Median force of both plates by body weight; None with one leg.
     lag_s
         By how much the angles come later than in an earlier check of this person [s] (mean of the
-        legs), to 3 ms; None without one. Nothing else tells a lag: people differ by more.
+        legs), to 3 ms; None without one. Without one, a lag cannot be found: people differ by more.
     deceleration_s
         When each ankle brakes hardest after terminal contact [s] (``find_deceleration_peak``), by
         side. Store that of a session whose synchronization was measured, for later checks.

@@ -1,6 +1,6 @@
 """What to look at where strides are rejected for a reason too often.
 
-A sign, a unit or a delay is named as a question, never as the cure: another person may look so.
+A sign, a unit or a delay is named as a question, never as the cure: people may walk like that.
 """
 
 from __future__ import annotations

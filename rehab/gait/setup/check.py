@@ -67,22 +67,27 @@ class SetupCheck:
         return not self.findings and all(one.is_certain for one in self.proposal.guesses.values())
 
 
-def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> SetupCheck:
+def check_setup(
+    columns: Mapping[str, Floats],
+    mass_kg: float | None = None,
+    *,
+    is_overground: bool | None = None,
+) -> SetupCheck:
     """Return what the columns of a walk are, and whether they are in time.
 
     Parameters
     ----------
     columns
         By name, shape (n,) each.
-    mass_kg
-        Body mass if known.
+    mass_kg, is_overground
+        Body mass, and whether it is a few steps over plates, if known.
 
     Raises
     ------
     GaitInputError
         With the cure, where nothing is recognized.
     """
-    proposal = propose(columns, mass_kg)
+    proposal = propose(columns, mass_kg, is_overground=is_overground)
     found = _make_map(proposal)
     time_s, legs = apply_columns(columns, found)
     strides = _measure(time_s, legs, proposal)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehab.gait.recordings.columns import REQUIRED
+from rehab.gait.recordings.readers import says_overground
 from rehab.gait.recordings.table import Table
 from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ
 from rehab.gait.setup.find_forces import (
@@ -79,7 +80,12 @@ class Proposal:
     notes: tuple[str, ...] = ()
 
 
-def propose(columns: Mapping[str, Floats], mass_kg: float | None = None) -> Proposal:
+def propose(
+    columns: Mapping[str, Floats],
+    mass_kg: float | None = None,
+    *,
+    is_overground: bool | None = None,
+) -> Proposal:
     """Return what columns are thought to be, from walking.
 
     Parameters
@@ -88,6 +94,8 @@ def propose(columns: Mapping[str, Floats], mass_kg: float | None = None) -> Prop
         By name, shape (n,) each; a ``Table`` says more.
     mass_kg
         Body mass if known; else it is the file's, or measured with the plates.
+    is_overground
+        Whether it is a few steps over plates if known; else the file or the steps say it.
 
     Raises
     ------
@@ -102,7 +110,8 @@ def propose(columns: Mapping[str, Floats], mass_kg: float | None = None) -> Prop
     if not forces:
         raise GaitInputError(_describe_no_force(labels))
     sides, doubts = name_sides(table, labels, time_s, forces)
-    is_overground = looks_overground(table, time_s, forces)
+    if is_overground is None:
+        is_overground = says_overground(table) or looks_overground(table, time_s, forces)
     source = "given" if mass_kg is not None else "file"
     mass_kg = mass_kg if mass_kg is not None else table.mass_kg
     units = [read_unit(force.name, table.units) for force in forces]

@@ -20,7 +20,7 @@ class SampleBuffer:
     Parameters
     ----------
     keep
-        How many of the newest samples are certain to be kept; no more may be appended at once.
+        How many of the newest samples are certain to be there; no more may be appended at once.
     legs
         How many legs, one or two; ``legs`` of the buffer then are the views of each.
     """
@@ -58,7 +58,7 @@ class SampleBuffer:
         rows, channels
             The rows of a table as ``ChannelLayout.read`` returns it, shape (rows, count).
         count
-            How many samples, as many as are kept at most.
+            How many samples, up to ``keep``.
 
         Raises
         ------
@@ -92,9 +92,14 @@ class SampleBuffer:
         return table
 
     def append(self, table: Floats, late_s: Floats | None = None) -> None:
-        """Append samples as ``ChannelLayout.read`` returns them, shape (rows, samples).
+        """Append samples, while no others wait to be accepted.
 
-        ``late_s`` is by how much each came late, None where none did. No others may wait.
+        Parameters
+        ----------
+        table
+            Samples as ``ChannelLayout.read`` returns them, shape (rows, n), n up to ``keep``.
+        late_s
+            By how much each came late [s], shape (n,); None where none did.
         """
         rows, count = table.shape
         self.write(rows, table, count)
@@ -104,7 +109,7 @@ class SampleBuffer:
             self._late_end = self.end
 
     def _make_room(self) -> None:
-        """Move the samples that are kept, and those that wait, to the front of the table."""
+        """Move the samples still needed, and those that wait, to the front of the table."""
         end, waiting = self.end - self.first, self.waiting
         self._table[:, : self.keep + waiting] = self._table[:, end - self.keep : self.filled]
         self._late[: self.keep] = self._late[end - self.keep : end]
@@ -113,9 +118,14 @@ class SampleBuffer:
         self.filled = self.keep + waiting
 
     def goes_on(self, start: int, stop: int, most_s: float = math.inf) -> bool:
-        """Return whether time goes on from sample to sample of ``start:stop``.
+        """Return whether time rises from each sample of ``start:stop`` to the next.
 
-        ``most_s`` is by how much at most [s], 0.25 or more.
+        Parameters
+        ----------
+        start, stop
+            Indices of the first sample and of the one behind the last, which are still buffered.
+        most_s
+            By how much it may rise at most [s], ``USUAL_MOST_S`` (0.25) or more.
         """
         if stop > self._judged:
             if not self._steps_are(max(self._judged - 1, self.first), stop, USUAL_MOST_S):
@@ -151,12 +161,36 @@ class LegBuffer:
         return part
 
     def channel(self, row: int, start: int, stop: int) -> Floats:
-        """Return samples ``start:stop`` of one channel, shape (samples,), without copying."""
+        """Return samples ``start:stop`` of one channel, without copying.
+
+        Parameters
+        ----------
+        row
+            The channel's row, such as ``FORCE``.
+        start, stop
+            Indices of the first sample and of the one behind the last, which are still buffered.
+        """
         first = self.samples.first
         return self.rows[row][start - first : stop - first]
 
     def find_crossing(self, row: int, index: int, level: float) -> float:
-        """Return when a channel crossed a level between samples ``index - 1`` and ``index`` [s]."""
+        """Return when a channel crossed a level [s], by linear interpolation between two samples.
+
+        Parameters
+        ----------
+        row
+            The channel's row, such as ``FORCE``.
+        index
+            The first sample after the crossing.
+        level
+            In the channel's unit.
+
+        Returns
+        -------
+        float
+            The time of sample ``index`` itself where it is the first of all, or the one before is
+            NaN or on the same side of the level.
+        """
         if index == 0:
             return self.channel(TIME, 0, 1).item()
         t0, t1 = self.channel(TIME, index - 1, index + 1).tolist()

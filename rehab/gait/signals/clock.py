@@ -29,7 +29,7 @@ SLOWEST_S = 2.0  # between samples; what lies further apart is in milliseconds
 
 
 class SampleClock:
-    """Puts late samples back to when they were taken; the rest keep the times that they have.
+    """Puts late samples back to when they were taken; the rest retain their times.
 
     Samples are held back from a gap on until it is known whether they are late. What comes out
     does not depend on how the samples are cut into chunks.
@@ -66,8 +66,8 @@ class SampleClock:
         Parameters
         ----------
         table
-            Stamps [s] and any channels, shape (rows, n); it is kept, and changed where samples are
-            late.
+            Stamps [s] and any channels, shape (rows, n); the clock retains it, and changes it where
+            samples are late.
         row
             Where the stamps are.
 

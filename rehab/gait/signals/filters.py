@@ -41,7 +41,7 @@ class ZeroPhaseFilter:
         self._response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
 
     def smooth(self, signals: Floats) -> Floats:
-        """Return each row filtered, extended point-symmetrically beyond its ends for the purpose.
+        """Return each row filtered, after a point-symmetric extension at its ends.
 
         Parameters
         ----------
@@ -55,9 +55,15 @@ class ZeroPhaseFilter:
         return self.smooth_extended(np.concatenate((before, signals, after), axis=1), n)
 
     def smooth_extended(self, signals: Floats, padding: int) -> Floats:
-        """Return rows filtered and without the ``padding`` samples that they have at each end.
+        """Return rows filtered, without the samples that extend them, shape (rows, n - 2 padding).
 
-        Beyond these, the first and the last one stand for all others.
+        Parameters
+        ----------
+        signals
+            Shape (rows, n), evenly spaced, all finite. Where the filter reaches beyond them, the
+            first and the last sample stand for all others.
+        padding
+            How many samples at each end only extend the signal.
         """
         more = max(0, self.reach - padding)
         rows, count = signals.shape
@@ -106,7 +112,15 @@ def _find_five_points(rate_hz: float) -> Floats:
 
 
 def average(values: Floats, width: int) -> Floats:
-    """Return the means of each ``width`` neighbors, of which there are as many or more."""
+    """Return the moving average, shape (n - width + 1,).
+
+    Parameters
+    ----------
+    values
+        Shape (n,), n >= ``width``.
+    width
+        How many neighbors each mean is of.
+    """
     means: Floats = np.correlate(values, find_shares(width), "valid")
     return means
 

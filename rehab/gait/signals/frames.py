@@ -33,7 +33,13 @@ IGNORED = "The frame numbers are ignored: {}. Send the device's own count of sam
 
 
 def find_frame_problem(t_s: Floats, frames: Floats | None) -> str:
-    """Return why the frame numbers of a recording are ignored, empty where there is no reason."""
+    """Return why the frame numbers of a recording are ignored; empty where they are used.
+
+    Parameters
+    ----------
+    t_s, frames
+        Times [s], and the samples' numbers or None, shape (n,) each; NaN where one has none.
+    """
     clock = FrameClock()
     if frames is not None:
         clock.add(np.array([t_s]), 0, frames)
@@ -55,7 +61,7 @@ def _find_pace(stamps: Floats, frames: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Newest:
-    """The newest sample: its number in a count that never begins anew, and when it was taken.
+    """The newest sample: its number in a count that never restarts, and when it was taken.
 
     ``shift`` is added to numbers as they come.
     """
@@ -68,6 +74,13 @@ class Newest:
 
 def read_frames(frame: ArrayLike | None, count: int) -> Floats:
     """Return frame numbers as an array of shape (count,), NaN where there are none.
+
+    Parameters
+    ----------
+    frame
+        The numbers as they were sent, None for none.
+    count
+        How many samples they belong to.
 
     Raises
     ------
@@ -163,7 +176,7 @@ class FrameClock:
     def finish(self) -> Floats | None:
         """Return the samples that are still held back, with the times that they have.
 
-        They may be added again, without their numbers, which are kept.
+        They may be added again without their numbers, which the clock retains.
         """
         if self._plain is not None:
             return self._plain.finish()

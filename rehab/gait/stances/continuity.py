@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
 from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT
-from rehab.gait.stances.gaps import GAP_S, StanceClock
+from rehab.gait.stances.gaps import GAP_S, HARMFUL_FROM, StanceClock
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
 from rehab.gait.strides import RejectionReason
@@ -28,8 +28,10 @@ MOMENT_FROZEN_S, ANGLE_FROZEN_S = 0.02, 0.04
 # second squared, in late stance [Nm, rad]; noise, and walkers, bend by a hundred times that.
 STRAIGHT_S = 0.06
 STRAIGHT_TO = np.array([[4.0], [0.02]])
-MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
-ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
+# At once [Nm/kg, rad], and by time: the five people of ``plausibility`` reach 13-23 Nm/kg/s (75
+# from one sample to the next at 1 kHz, which is 0.07 at once) and 4-9 rad/s.
+MOMENT_JUMP = (0.15, 40.0)
+ANGLE_JUMP = (0.05, 15.0)
 
 # Spikes and steps are looked for h = 10 ms apart: in the angle by its fourth difference, to which a
 # push-off adds little however fast it is, a spike six and a step three times its size; in the
@@ -42,7 +44,6 @@ ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 6.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
-CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change it
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
@@ -178,7 +179,7 @@ def check_steps(stance: ResampledStance, push_off: PushOff, gap_s: float) -> lis
     apart_s = apart / stance.rate_hz
     duration_s = stance.end_s - stance.begin_s
     walking = apart_s * max(apart_s, (apart_s + gap_s) / 2) / duration_s**2
-    first = stance.index(CHECK_FROM)
+    first = stance.index(HARMFUL_FROM)
     last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
     angle = stance.signals[ANGLE - FORCE, first:]
     if last - first <= apart or len(angle) <= 4 * apart:

@@ -38,8 +38,9 @@ class Command(BaseCommand):
                 f"GARRY_BACKUP_KEYS. {problem}"
             ) from problem
         new = file.with_name(f".{file.name}.new")
+        flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW  # never through a link
         try:
-            with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as out:
+            with os.fdopen(os.open(new, flags, 0o600), "wb") as out:
                 counts = write_backup(out, recipients, now)
                 out.flush()
                 os.fsync(out.fileno())

@@ -226,7 +226,8 @@ def describe(figures: dict[str, Any]) -> str:
     rate = "–" if figures["hit_rate"] is None else f"{figures['hit_rate']:.1%}"
     lines = [
         f"Session {figures['session']}, {figures['valence']}: {figures['strides']} strides "
-        f"({figures['valid']} valid, {figures['invalid']} invalid, {figures['missing']} missing)",
+        f"({figures['valid']} valid, {figures['invalid']} invalid, {figures['missing']} missing, "
+        f"{figures['late']} late)",
         f"Hits {figures['hits']} ({rate}), score "
         f"{'–' if figures['score'] is None else figures['score']}, "
         f"goal {figures['goal'] or math.nan:.3f}",

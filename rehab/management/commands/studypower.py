@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import threading
 from argparse import ArgumentParser, ArgumentTypeError
 from typing import Any
@@ -81,7 +80,8 @@ def live_with_parent() -> None:
         os.nice(10)
 
     def watch() -> None:
-        sys.stdin.buffer.read()
+        while os.read(0, 4096):  # not sys.stdin: Python aborts where a thread holds its lock
+            pass
         os._exit(0)
 
     threading.Thread(target=watch, daemon=True).start()

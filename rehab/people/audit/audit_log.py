@@ -141,6 +141,11 @@ class AuditEntry(SealableModel):
     def __str__(self) -> str:
         return f"{self.get_act_display()}: {self.about}"
 
+    @property
+    def is_emptied(self) -> bool:
+        """Whether it names nobody and no place."""
+        return self.patient_id is None and not self.about
+
 
 class Recent:
     """The entries of the last minutes, by what they are about. Shared by a process's threads."""

@@ -126,6 +126,11 @@ class HistoryEntry(SealableModel):
     def __str__(self) -> str:
         return f"{self.get_model_name_display()} {self.object_id}: {self.get_kind_display()}"
 
+    @property
+    def is_emptied(self) -> bool:
+        """Whether it has no values."""
+        return not any(self.changes.values())
+
 
 @contextmanager
 def attribute_changes_to(request: HttpRequest) -> Iterator[None]:

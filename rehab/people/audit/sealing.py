@@ -30,10 +30,11 @@ def is_cut(log: str) -> str:
 
 
 class SealableModel(AppendOnlyModel):
-    """A row of a log, with a digest of its values.
+    """A row of a log, with a moment (``at``) and a digest of its values.
 
     The digest outlives the values: an erasure empties these and removes the salt, without which
-    no one can guess what they were. `seals` chains the digests.
+    no one can guess what they were. `seals` chains the digests, of each clinic's rows by their
+    ``scope``.
     """
 
     sealed_fields: ClassVar[tuple[str, ...]]
@@ -62,6 +63,16 @@ class SealableModel(AppendOnlyModel):
         values = {field.name: _plain(getattr(self, field.attname)) for field in fields}
         text = json.dumps(values, sort_keys=True, ensure_ascii=False)
         return hashlib.sha256(f"{self.salt}\n{text}".encode()).hexdigest()
+
+    @property
+    def is_emptied(self) -> bool:
+        """Whether nothing is left of what an erasure empties."""
+        return False
+
+    @property
+    def is_genuine(self) -> bool:
+        """Whether the row is as it was added, or as an erasure left it."""
+        return self.is_emptied if self.erased else self.compute_digest() == self.digest
 
 
 def _plain(value: Any) -> Any:

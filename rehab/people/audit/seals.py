@@ -13,21 +13,20 @@ from datetime import datetime, timedelta
 from itertools import takewhile
 from typing import Any, ClassVar
 
+from django.apps import apps
 from django.db import IntegrityError, models, transaction
 from django.db.models import F, Q
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed, AppendOnlyModel
-from rehab.people.audit.audit_log import AuditEntry
-from rehab.people.audit.history import HistoryEntry
+from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic
 from rehab.people.scope import Scope
 
 # Until then repeats of an entry are counted in it, and rows with a lower key may be committed.
 SEALED_AFTER = timedelta(minutes=10)
 BATCH_ROWS = 1_000
-LOGS: dict[str, type[Any]] = {"AuditEntry": AuditEntry, "HistoryEntry": HistoryEntry}
 
 
 class LogSeal(AppendOnlyModel):
@@ -39,7 +38,7 @@ class LogSeal(AppendOnlyModel):
     scope = Scope(clinic="clinic")
     allowed_changes = (Allowed(("cut_at",), "OLD.cut_at IS NULL AND NEW.cut_at IS NOT NULL"),)
 
-    log = models.CharField(max_length=16, choices=[(name, name) for name in LOGS])
+    log = models.CharField(max_length=16)
     clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="+", null=True)
     number = models.PositiveIntegerField()
     first_id = models.BigIntegerField()
@@ -77,20 +76,38 @@ class LogSeal(AppendOnlyModel):
         return hashlib.sha256((head + "".join(lines)).encode()).hexdigest()
 
 
+def sealed_models() -> dict[str, type[Any]]:
+    """Return the models whose rows are sealed, by their names."""
+    models_ = (model for model in apps.get_models() if issubclass(model, SealableModel))
+    return {model.__name__: model for model in models_}
+
+
 def rows_of(log: str, clinic_id: int | None) -> models.QuerySet[Any]:
     """Return a clinic's rows of a log, in their order; None for those of no clinic."""
-    rows: models.QuerySet[Any] = LOGS[log].everywhere.filter(**_of(clinic_id)).order_by("pk")
-    return rows
+    model = sealed_models()[log]
+    rows: models.QuerySet[Any] = model.everywhere.filter(**_of(clinic_id, model.scope.clinic))
+    return rows.order_by("pk")
 
 
-def _of(clinic_id: int | None) -> dict[str, Any]:
-    return {"clinic__isnull": True} if clinic_id is None else {"clinic": clinic_id}
+def _of(clinic_id: int | None, lookup: str = "clinic") -> dict[str, Any]:
+    return {f"{lookup}__isnull": True} if clinic_id is None else {lookup: clinic_id}
+
+
+def seals_of(log: str, clinic_id: int | None) -> models.QuerySet[LogSeal]:
+    """Return the seals of a clinic's log, in their order."""
+    return LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number")
+
+
+def unsealed_rows(log: str, clinic_id: int | None) -> models.QuerySet[Any]:
+    """Return a clinic's rows of a log that have no seal yet."""
+    last = seals_of(log, clinic_id).last()
+    return rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0)
 
 
 def _chains() -> Iterator[tuple[str, int | None]]:
     """Yield the logs of each clinic, and those of no clinic."""
     keys = [None, *Clinic.everywhere.order_by("pk").values_list("pk", flat=True)]
-    yield from ((log, key) for log in LOGS for key in keys)
+    yield from ((log, key) for log in sealed_models() for key in keys)
 
 
 def seal_logs(now: datetime) -> int:
@@ -110,8 +127,8 @@ def _seal_batch(log: str, clinic_id: int | None, until: datetime, now: datetime)
 
     A row that stands before one of that time was added earlier, whatever the clock said.
     """
-    last = LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number").last()
-    unsealed = rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0)
+    last = seals_of(log, clinic_id).last()
+    unsealed = unsealed_rows(log, clinic_id)
     newest = unsealed.filter(at__lt=until).last()
     if newest is None:
         return 0
@@ -139,55 +156,52 @@ def cut_before(log: str, clinic_id: int, moment: datetime, now: datetime) -> int
     old = LogSeal.everywhere.filter(
         log=log, clinic=clinic_id, last_at__lt=moment, cut_at__isnull=True
     )
-    deleted = 0
+    model, deleted = sealed_models()[log], 0
     for seal in old:
         LogSeal.everywhere.filter(pk=seal.pk).update(cut_at=now)
-        deleted += LOGS[log].everywhere.filter(pk__in=seal.rows().values("pk")).delete()[0]
+        deleted += model.everywhere.filter(pk__in=seal.rows().values("pk")).delete()[0]
     return deleted
 
 
 def find_broken() -> Iterator[str]:
-    """Yield what is wrong with the logs: where a chain or a row is not what was sealed."""
+    """Yield what is wrong with the logs: where a chain or a row is not what was sealed or added."""
     for log, clinic_id in _chains():
-        previous, number = "", 0
-        for seal in LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number"):
-            where = f"{log}, clinic {clinic_id or 'none'}, rows {seal.first_id} to {seal.last_id}"
-            if (seal.previous, seal.number) != (previous, number + 1):
-                yield f"{where}: the seal before is another one"
-            previous, number = seal.digest, seal.number
-            if seal.cut_at is not None:
-                continue
-            rows = list(seal.rows())
-            if seal.compute_digest(rows) != seal.digest:
-                yield f"{where}: rows were added, removed or counted anew"
-            for row in rows:
-                if not _is_genuine(row):
-                    yield f"{where}: row {row.pk} was changed"
+        yield from find_broken_of(log, clinic_id)
 
 
-def _is_genuine(row: Any) -> bool:
-    if not row.erased:
-        return bool(row.compute_digest() == row.digest)
-    if isinstance(row, AuditEntry):
-        return row.patient_id is None and not row.about
-    return not any(row.changes.values())
+def find_broken_of(log: str, clinic_id: int | None) -> Iterator[str]:
+    """Yield what is wrong with a clinic's log."""
+    of = f"{log}, clinic {clinic_id or 'none'}"
+    previous, number = "", 0
+    for seal in seals_of(log, clinic_id):
+        where = f"{of}, rows {seal.first_id} to {seal.last_id}"
+        if (seal.previous, seal.number) != (previous, number + 1):
+            yield f"{where}: the seal before is another one"
+        previous, number = seal.digest, seal.number
+        if seal.cut_at is not None:
+            continue
+        rows = list(seal.rows())
+        if seal.compute_digest(rows) != seal.digest:
+            yield f"{where}: rows were added, removed or counted anew"
+        yield from _find_changed(where, rows)
+    yield from _find_changed(f"{of}, not sealed yet", unsealed_rows(log, clinic_id).iterator())
+
+
+def _find_changed(where: str, rows: Iterable[Any]) -> Iterator[str]:
+    yield from (f"{where}: row {row.pk} was changed" for row in rows if not row.is_genuine)
 
 
 def count_unsealed(before: datetime) -> int:
     """Return how many rows from before a moment have no seal."""
-    unsealed = 0
-    for log, clinic_id in _chains():
-        last = LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number").last()
-        rows = rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0, at__lt=before)
-        unsealed += rows.count()
-    return unsealed
+    return sum(unsealed_rows(*chain).filter(at__lt=before).count() for chain in _chains())
 
 
 def shipped_lines(after: int) -> Iterator[dict[str, Any]]:
     """Yield each seal after a key with its rows, as plain data, oldest first."""
     for seal in LogSeal.everywhere.filter(pk__gt=after, cut_at__isnull=True).order_by("pk"):
-        names = ("id", *LOGS[seal.log].sealed_fields, "salt", "digest", "erased")
-        extra = {"count": F("count")} if seal.log == "AuditEntry" else {}
+        model = sealed_models()[seal.log]
+        names = ("id", *model.sealed_fields, "salt", "digest", "erased")
+        extra = {"count": F("count")} if hasattr(model, "count") else {}
         yield {
             "seal": seal.pk,
             "log": seal.log,

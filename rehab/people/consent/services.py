@@ -13,7 +13,7 @@ from django.utils.translation import override
 
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
-from rehab.people.networks import is_in_networks
+from rehab.people.networks import is_outside
 
 # Sent in the transaction of a withdrawal, with patient, purpose, by and now.
 consent_withdrawn = Signal()
@@ -88,8 +88,7 @@ def offered_purposes(clinic: Clinic) -> list[Purpose]:
 
 def is_remote_view_allowed(patient: Patient, address: str) -> bool:
     """Return whether a person at this address may watch; outside the clinic it needs consent."""
-    networks = patient.clinic.networks
-    if not networks or patient.simulated or is_in_networks(networks, address):
+    if patient.simulated or not is_outside(patient.clinic.networks, address):
         return True
     return Purpose.REMOTE in active_consents(patient)
 

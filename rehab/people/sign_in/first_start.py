@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 from django.conf import settings
 from django.core.management import CommandError, call_command
@@ -50,12 +51,12 @@ def first_clinic() -> Clinic:
 
 
 def first_password() -> str | None:
-    """Return the first account's generated password; None once it has been changed.
+    """Return the first account's generated password; None once somebody has signed in with it.
 
-    Creates clinic and account where there is no account yet. Until the password is changed it is
-    stored in a file that only the server's user can read.
+    Creates clinic and account where there is no account yet. Until the first sign-in the password
+    is stored in a file that only the server's user can read.
     """
-    file: Path = settings.DATA_DIR / "first_password"
+    file = _password_file()
     if not User.everywhere.exists():
         password = random_words(3)
         settings.DATA_DIR.mkdir(parents=True, exist_ok=True)
@@ -75,3 +76,14 @@ def first_password() -> str | None:
         return password
     file.unlink()
     return None
+
+
+def forget_first_password(sender: Any, user: Any, **_: Any) -> None:
+    """Remove the file of the first account's password. A receiver of `user_logged_in`."""
+    if user.get_username() == FIRST_USERNAME:
+        _password_file().unlink(missing_ok=True)
+
+
+def _password_file() -> Path:
+    file: Path = settings.DATA_DIR / "first_password"
+    return file

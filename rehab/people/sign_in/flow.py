@@ -18,6 +18,7 @@ from django.utils.crypto import constant_time_compare
 from rehab.people.models import User
 from rehab.people.sign_in import browser_sessions, lockout
 from rehab.people.sign_in.factors import factors
+from rehab.people.sign_in.known import remember_browser
 
 # Keys of the browser session.
 PENDING = "pending_second_factor"
@@ -102,11 +103,15 @@ class SessionValidationMiddleware:
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
         """Pass the request on."""
-        if request.user.is_authenticated:
+        was_signed_in = request.user.is_authenticated
+        if isinstance(request.user, User):
             data = cast(Mapping[str, Any], request.session)
             if is_session_valid(data, request.user):
                 if WATCHING not in request.headers:
                     browser_sessions.record_activity(request, timezone.now())
             else:
                 logout(request)
-        return self.get_response(request)
+        response = self.get_response(request)
+        if not was_signed_in and isinstance(request.user, User):
+            remember_browser(response, request.user)
+        return response

@@ -20,7 +20,7 @@ from django.utils.module_loading import import_string
 
 from rehab.people.consent.services import is_remote_view_allowed
 from rehab.people.models import Patient, User
-from rehab.people.networks import resolve_client_address
+from rehab.people.networks import is_outside, resolve_client_address
 from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.flow import is_session_valid
 from rehab.people.sign_in.tokens import LAST_SEEN_RESOLUTION
@@ -138,13 +138,14 @@ def find_unauthorized(
     """Return the indexes of clients, given with their scopes, that are no longer authorized.
 
     These are devices whose token was revoked or renewed, tablets whose approver may let none in any
-    more or whose session is not theirs to show any more, and people whose sign-in has ended.
+    more or whose session is not theirs to show any more, people whose sign-in has ended, and who
+    comes to be outside the clinic's networks without the patient's consent to remote view.
     """
     devices = {actor.pk for actor, _ in clients if isinstance(actor, Device)}
     people = {actor.pk for actor, _ in clients if isinstance(actor, User)}
     digests = {browser_session_digest(scope) for actor, scope in clients if isinstance(actor, User)}
     valid = Device.everywhere.filter(is_trusted(), pk__in=devices, revoked_at__isnull=True)
-    hashes = dict(valid.values_list("pk", "token_hash"))
+    rows = valid.select_related("clinic").in_bulk()
     accounts = User.everywhere.select_related("clinic").in_bulk(people)
     live = Session.objects.filter(session_key__in=digests, expire_date__gt=now)
     signed_in = {row.session_key: row.get_decoded() for row in live}
@@ -155,17 +156,21 @@ def find_unauthorized(
     ended_ids = set(ended.values_list("pk", flat=True))
 
     def is_allowed(actor: Actor, scope: Mapping[str, Any]) -> bool:
+        shown = _session_id(scope)
         if isinstance(actor, Device):
+            row = rows.get(actor.pk)
             # The one that this client was given may just have become its device's own.
-            if hashes.get(actor.pk) not in {actor.token_hash, actor.given_hash}:
+            if row is None or row.token_hash not in {actor.token_hash, actor.given_hash}:
                 return False
-            shown = _session_id(scope)
+            actor.clinic = row.clinic
             is_asked = shown in ended_ids or (shown and actor.is_away)
             return not is_asked or _is_visible(actor, shown)
         if actor is None:
             return True
         account, data = accounts.get(actor.pk), signed_in.get(browser_session_digest(scope))
-        return account is not None and data is not None and is_session_valid(data, account)
+        if account is None or data is None or not is_session_valid(data, account):
+            return False
+        return not shown or _may_watch(account, shown, scope)
 
     return [index for index, one in enumerate(clients) if not is_allowed(*one)]
 
@@ -209,10 +214,15 @@ def socket_address(scope: Mapping[str, Any]) -> str:
 @database_sync_to_async
 def may_watch(actor: Actor, session_id: int, scope: Mapping[str, Any]) -> bool:
     """Return whether a person may watch from a socket's address; `may_open` asks for a device."""
-    if not isinstance(actor, User):
+    return not isinstance(actor, User) or _may_watch(actor, session_id, scope)
+
+
+def _may_watch(user: User, session_id: int, scope: Mapping[str, Any]) -> bool:
+    address = socket_address(scope)
+    if user.clinic is None or not is_outside(user.clinic.networks, address):
         return True
     patients = Patient.everywhere.filter(sessions=session_id).select_related("clinic")
-    return is_remote_view_allowed(patients.get(), socket_address(scope))
+    return is_remote_view_allowed(patients.get(), address)
 
 
 @database_sync_to_async

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.live.devices import Devices
+from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.supervisor import Supervisor
 from rehab.sessions.payloads import Message

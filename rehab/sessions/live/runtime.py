@@ -23,9 +23,9 @@ from rehab.sessions.live.orders import Order, carry_out
 from rehab.sessions.live.recovery import Recovery
 from rehab.sessions.live.routines import Routines
 from rehab.sessions.live.servers.servers import Servers
+from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import Loader
-from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.supervisor import Supervisor, local_address, run_source
 from rehab.sessions.payloads import Message

@@ -96,22 +96,27 @@ def _answer(request: HttpRequest, files: list[Path], mass_kg: float | None) -> d
         for channel in CHANNELS
     }
     time = {part: asked.get(f"time.{part}", "")[:200] for part in ("column", "factor")}
+    is_overground = "overground" in asked
     try:
         columns = write_columns(chosen, time)
     except ValueError as problem:
         problems = [_("%(text)s is no number.") % {"text": problem}]
-        return _describe(check_upload(files, mass_kg), chosen) | {"problems": problems}
+        checked = check_upload(files, mass_kg, is_overground=is_overground)
+        return _describe(checked, chosen) | {"problems": problems}
     name = name_recording(asked.get("name", ""))
     if not settings.HOSTED and not name:
         problems = [_("Give the recording a name.")]
-        return _describe(check_upload(files, mass_kg), chosen) | {"problems": problems}
+        checked = check_upload(files, mass_kg, is_overground=is_overground)
+        return _describe(checked, chosen) | {"problems": problems}
     save = None if settings.HOSTED else recordings_folder() / name
-    checked = check_upload(files, mass_kg, columns, save)
+    checked = check_upload(files, mass_kg, columns, save, is_overground=is_overground)
     shown = _describe(checked, chosen)
     if not shown["problems"]:
         for file in files:
             file.unlink(missing_ok=True)
-        shown |= {"stored": name, "found": None, "command": " ".join(map(_quote, columns))}
+        command = ["--overground"] if is_overground else []
+        command += ["--columns", *map(_quote, columns)]
+        shown |= {"stored": name, "found": None, "command": " ".join(command)}
     return shown
 
 

@@ -76,10 +76,7 @@ def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
         strides=Figure(
             _("Strides"),
             format_number(figures["strides"], 0),
-            ngettext("%(count)s does not count", "%(count)s do not count", not_counted)
-            % {"count": format_number(not_counted, 0)}
-            if not_counted
-            else "",
+            ", ".join(_describe_not_counted(not_counted, figures["late"])),
         ),
     )
 
@@ -107,6 +104,20 @@ def _describe_incident(incident: Incident, session: TrainingSession) -> str:
         seen_at = clinic_time(incident.ended.at, session.clinic)
         parts.append(_("seen %(time)s") % {"time": f"{seen_at:%H:%M}"})
     return ", ".join(parts)
+
+
+def _describe_not_counted(count: int, late: int) -> list[str]:
+    """Return how many strides do not count, and how many do not by the lab's delay."""
+    notes = []
+    if count:
+        about = ngettext("%(count)s does not count", "%(count)s do not count", count)
+        notes.append(about % {"count": format_number(count, 0)})
+    if late:
+        about = ngettext(
+            "of %(count)s the samples came late", "of %(count)s the samples came late", late
+        )
+        notes.append(about % {"count": format_number(late, 0)})
+    return notes
 
 
 def _describe_rate(wanted: float | None, close: int) -> list[str]:

@@ -12,7 +12,7 @@ from rehab.sessions.setup.option import (
 )
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.changes import ChangeKind
-from rehab.training.cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
+from rehab.training.robot_cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
 from rehab.training.schedules import INTERVAL_MAX, Schedule, ScheduleKind
 from robot.wire.cue_limits import (
     COUNT_MAX,

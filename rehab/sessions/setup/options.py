@@ -18,8 +18,8 @@ from rehab.sessions.setup.option import Group, Option, OptionColumn
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.sessions.setup.walking_options import WALKING_OPTIONS
 from rehab.training.adaptation import GoalAdaptation
-from rehab.training.cueing import CueTiming
 from rehab.training.goals import GoalRule, Target
+from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule
 
 # The parts of a session that options build; each other place is a value of its own.

@@ -99,7 +99,12 @@ def add_part(file: Path, part: bytes, at: int) -> None:
         for other in file.parent.glob(f"{person}-*"):
             if int(other.stem.partition("-")[2]) >= int(place):
                 other.unlink(missing_ok=True)
-    with file.open("ab") as opened:
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW  # never through a link
+    try:
+        descriptor = os.open(file, flags, 0o600)
+    except OSError:
+        raise UploadRefused from None
+    with os.fdopen(descriptor, "ab") as opened:
         opened.write(part)
 
 
@@ -108,6 +113,8 @@ def check_upload(
     mass_kg: float | None,
     columns: list[str] | None = None,
     save: Path | None = None,
+    *,
+    is_overground: bool | None = None,
 ) -> Checked:
     """Return what the columns of an upload's files are, compared with those given.
 
@@ -118,18 +125,24 @@ def check_upload(
     if not _one_at_a_time.acquire(timeout=WAIT_S):
         return Checked(None, [gettext("Other files are being checked. Try again in a minute.")])
     try:
-        return _check(files, mass_kg, columns, save)
+        return _check(files, mass_kg, columns, save, is_overground)
     finally:
         _one_at_a_time.release()
 
 
 def _check(
-    files: list[Path], mass_kg: float | None, columns: list[str] | None, save: Path | None
+    files: list[Path],
+    mass_kg: float | None,
+    columns: list[str] | None,
+    save: Path | None,
+    is_overground: bool | None,
 ) -> Checked:
     arguments = ["nice"] if shutil.which("nice") else []  # a training goes first
     arguments += [sys.executable, "-m", "rehab.gait", "check", *map(str, files)]
     arguments += ["--json", "--bounded"]
     arguments += ["--mass", f"{mass_kg:g}"] if mass_kg else []
+    if is_overground is not None:
+        arguments += ["--overground" if is_overground else "--no-overground"]
     arguments += ["--save", str(save)] if save else []
     arguments += ["--columns", *columns] if columns else []
     if save:

@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from rehab.gait import GyroscopeStride, Stride
+from rehab.gait import Stride
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
-from rehab.sources.intake.gyroscopes import GyroscopePipeline
-from rehab.sources.intake.measurements import to_measurement, to_timed_measurement
+from rehab.sources.intake.measurements import from_wearable, to_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.quality import SignalQuality
 from rehab.sources.intake.recorder import SignalRecorder
@@ -27,6 +26,7 @@ from rehab.sources.intake.rows import (
 )
 from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.intake.tables import TablePlans
+from rehab.sources.intake.wearables import Sided, WearablePipeline
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import Measurement, Side
 
@@ -66,7 +66,10 @@ class Intake:
         self._monotonic = monotonic
         self._alignment = Alignment()
         self._pipeline: SignalPipeline | None = None
-        self._recorder = SignalRecorder(settings.keep, notify) if settings.keep else None
+        over = settings.is_overground
+        self._recorder = (
+            SignalRecorder(settings.keep, notify, is_overground=over) if settings.keep else None
+        )
         self._columns = {
             column.name: ((side, channel), column)
             for side, leg in settings.columns.legs.items()
@@ -75,8 +78,8 @@ class Intake:
         self._frame = None if settings.columns.frame is None else settings.columns.frame.name
         self._counted: str | None = None  # the stream whose frame numbers are used
         self._rate_hz = settings.rate_hz
-        self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
-        if settings.gyroscopes:
+        self._wearables = WearablePipeline(settings.wearables, notify)
+        if settings.wearables:
             self._columns = {}
         self._plans = TablePlans(self._columns, self._frame)
         self._problem: SourceError | None = None
@@ -111,14 +114,14 @@ class Intake:
         for row in rows:
             if VALUE in row:
                 self._add_stride(row)
-            elif self._columns.keys() & row.keys() or self._gyroscopes.names & row.keys():
+            elif self._columns.keys() & row.keys() or self._wearables.names & row.keys():
                 if samples and row.keys() != samples[0].keys():
                     self._add_samples(samples)
                     samples = []
                 samples.append(row)
             else:
                 names = ", ".join(list(row)[:4])
-                known = ", ".join([*self._columns, *self._gyroscopes.names][:3])
+                known = ", ".join([*self._columns, *self._wearables.names][:3])
                 self.reject_row(
                     f"A row with {names} is neither a stride nor a sample: a stride has a value, a "
                     f"sample {known} or more. Rename them, or map them with --columns."
@@ -139,7 +142,7 @@ class Intake:
         """End the feed: nothing more will come."""
         if self._pipeline is not None:
             self._put_strides(self._pipeline.finish())
-        self._put_steps(self._gyroscopes.finish())
+        self._put_worn(self._wearables.finish())
         self._feed.finish()
 
     def close(self) -> None:
@@ -179,15 +182,15 @@ class Intake:
             if named is not None:
                 self._put(named, is_timed=False)
 
-    def _put_steps(self, strides: Iterable[tuple[Side, GyroscopeStride]]) -> None:
-        for side, stride in strides:
-            self._put(to_timed_measurement(stride, self._number + 1, side), is_timed=False)
+    def _put_worn(self, strides: Iterable[Sided]) -> None:
+        for stride in strides:
+            self._put(from_wearable(*stride, self._number + 1), is_timed=False)
 
     # --- Samples ---
 
     def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
         """Add rows that have the same cells."""
-        used = {*self._columns, *self._gyroscopes.names, self._frame}
+        used = {*self._columns, *self._wearables.names, self._frame}
         names = [name for name in rows[0] if name in used]
         time = self._settings.columns.time
         times, cells = [], []
@@ -233,9 +236,9 @@ class Intake:
         if (problem := self.quality.frame_problem) and problem not in self._reported_reasons:
             self._reported_reasons.add(problem)
             self._notify(problem)
-        if self._settings.gyroscopes:
-            rates = {n: table[:, p] for p, n in enumerate(names) if n in self._gyroscopes.names}
-            self._put_steps(self._gyroscopes.add(t_s, rates))
+        if self._settings.wearables:
+            columns = {n: table[:, p] for p, n in enumerate(names) if n in self._wearables.names}
+            self._put_worn(self._wearables.add(t_s, columns, frames))
             return
         known, delays_s = plan.places, plan.delays_s
         values = dict(zip(plan.channels, table.T[known] * plan.factors, strict=True))
@@ -262,7 +265,7 @@ class Intake:
     def accepts(self, names: Iterable[str]) -> bool:
         """Return whether rows with these cells are strides or samples."""
         there = set(names)
-        known = self._columns.keys() | self._gyroscopes.names
+        known = self._columns.keys() | self._wearables.names
         return VALUE in there or bool(known & there)
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from rehab.gait import GyroscopeStride, Stride
+from rehab.gait import Stride, WearableStride
+from rehab.gait.wearables import VERSION
+from rehab.training.measures import WORN
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_REASONS
 
@@ -19,20 +21,41 @@ EXTRA = (
 )
 
 
-def to_timed_measurement(stride: GyroscopeStride, number: int, side: Side) -> Measurement:
-    """Return a stride by a gyroscope as a measurement: figures without an A2.
+def from_wearable(
+    side: Side, stride: WearableStride, asymmetry_percent: float | None, number: int
+) -> Measurement:
+    """Return a stride by a worn sensor as a measurement: figures of its own, without an A2.
 
-    A measure with a channel (``stride_s``, ``stance_s``, ``cadence_min``) trains one of them. It
-    ends with the initial contact after it.
+    Measures train one of them by their channel. It ends with the initial contact after it.
     """
-    extra = ("initial_contact_s", "terminal_contact_s", "stride_s", "stance_s", "cadence_min")
+    place = stride.place
+    stance_percent = 100 * stride.stance_share
+    extra = {
+        WORN[place]: VERSION,
+        "initial_contact_s": stride.initial_contact_s,
+        "terminal_contact_s": stride.terminal_contact_s,
+        "stride_s": stride.stride_s,
+        "stance_s": stride.stance_s,
+        "cadence_min": stride.cadence_min,
+        f"{place}_stance_percent": stance_percent,
+        f"{place}_swing_percent": 100 - stance_percent,
+        "step_asymmetry_percent": asymmetry_percent,
+        "foot_strike_deg": _to_degrees(stride.foot_strike_rad),
+        "push_off_deg_s": _to_degrees(stride.push_off_rad_s),
+        "shank_lean_deg": _to_degrees(stride.shank_lean_rad),
+    }
     return Measurement(
         number=number,
-        time_s=stride.initial_contact_s + stride.stride_s,
+        time_s=stride.end_s,
         side=side,
         value=None,
-        extra={name: getattr(stride, name) for name in extra},
+        reasons=tuple(str(reason) for reason in stride.reasons),
+        extra={name: float(value) for name, value in extra.items() if value is not None},
     )
+
+
+def _to_degrees(angle_rad: float | None) -> float | None:
+    return None if angle_rad is None else math.degrees(angle_rad)
 
 
 def to_measurement(stride: Stride, number: int, side: Side) -> Measurement | None:

@@ -7,7 +7,7 @@ from typing import TextIO
 
 import numpy as np
 
-from rehab.gait.recordings.columns import SIGNAL_LAYOUTS
+from rehab.gait.recordings.columns import OVERGROUND, SIGNAL_LAYOUTS
 from rehab.gait.recordings.csv_files import write_rows
 from rehab.sources.intake.alignment import FRAME, Channel, Floats
 from rehab.sources.reporting import Notify, SourceError
@@ -20,8 +20,9 @@ class SignalRecorder:
     ends the file, not the session.
     """
 
-    def __init__(self, path: Path, notify: Notify) -> None:
+    def __init__(self, path: Path, notify: Notify, *, is_overground: bool = False) -> None:
         self.path = path
+        self._marks = [OVERGROUND] if is_overground else []
         self._notify = notify
         self._channels: list[Channel] = []
         self._file: TextIO | None
@@ -46,8 +47,9 @@ class SignalRecorder:
                     name if (side, name) == FRAME else layout.legs[side][name].name
                     for side, name in self._channels
                 ]
-                self._file.write(",".join(["time_s", *names]) + "\n")
+                self._file.write(",".join(["time_s", *names, *self._marks]) + "\n")
             columns = [t_s, *(values.get(channel, nothing) for channel in self._channels)]
+            columns += [np.ones(len(t_s)) for _ in self._marks]
             counts = {1 + place for place, one in enumerate(self._channels) if one == FRAME}
             write_rows(self._file, np.column_stack(columns), counts)
             self._file.flush()

@@ -24,12 +24,16 @@ LOOK_AHEAD_S = 0.05  # reduces the error of A2 from 1.0 to 0.14 % (moore2013)
 
 
 @dataclass(frozen=True, slots=True)
-class Gyroscope:
-    """A gyroscope on a walker: its leg, "foot" or "shank", and the column of its sagittal rate."""
+class Wearable:
+    """A sensor on a walker: its leg, "foot" or "shank", and the columns of its samples.
+
+    These are one rate of rotation about the axis from left to right, three rates, or three
+    accelerations and three rates.
+    """
 
     side: Side
-    segment: str
-    column: SignalColumn
+    place: str
+    columns: tuple[SignalColumn, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +56,8 @@ class IntakeSettings:
         Where the raw signals are written to, if anywhere.
     is_overground
         Whether people walk over plates in a floor, and not on a treadmill.
-    gyroscopes
-        Instead of legs' signals: which column is the rate of rotation of which foot or shank.
+    wearables
+        Instead of legs' signals: sensors on feet or shanks.
     """
 
     mass_kg: float | None = None
@@ -63,7 +67,7 @@ class IntakeSettings:
     side: Side | None = None
     keep: Path | None = None
     is_overground: bool = False
-    gyroscopes: tuple[Gyroscope, ...] = ()
+    wearables: tuple[Wearable, ...] = ()
 
     @classmethod
     def read(cls, options: Namespace) -> Self:
@@ -93,22 +97,25 @@ class IntakeSettings:
             side=Side(options.side) if options.side else None,
             keep=options.keep,
             is_overground=getattr(options, "overground", False),
-            gyroscopes=tuple(
-                _read_gyroscope(text) for text in getattr(options, "gyroscope", None) or ()
+            wearables=tuple(
+                _read_wearable(text) for text in getattr(options, "wearable", None) or ()
             ),
         )
 
 
-def _read_gyroscope(text: str) -> Gyroscope:
+def _read_wearable(text: str) -> Wearable:
     """Return what a text such as ``left.foot=gyro_z*0.01745`` says. Raises SourceError."""
-    place, _, column = text.partition("=")
-    side, _, segment = place.partition(".")
-    if side not in SIDES or segment not in ("foot", "shank") or not column:
+    where, _, names = text.partition("=")
+    side, _, place = where.partition(".")
+    columns = names.split(",")
+    is_known = side in SIDES and place in ("foot", "shank")
+    if not is_known or not all(columns) or len(columns) not in (1, 3, 6):
         raise SourceError(
-            f"'{text}' maps no gyroscope. Write SIDE.SEGMENT=COLUMN with SIDE left or right and "
-            "SEGMENT foot or shank: left.foot=gyro_z*0.01745"
+            f"'{text}' maps no worn sensor. Write SIDE.PLACE=COLUMNS with SIDE left or right, "
+            "PLACE foot or shank, and one rate of rotation, three, or three accelerations and "
+            "three rates: left.foot=gyro_z*0.01745, left.shank=ax,ay,az,gx,gy,gz"
         )
-    return Gyroscope(Side(side), segment, read_column(column))
+    return Wearable(Side(side), place, tuple(read_column(one) for one in columns))
 
 
 def add_signal_arguments(parser: ArgumentParser) -> None:
@@ -134,11 +141,12 @@ def add_signal_arguments(parser: ArgumentParser) -> None:
         "--overground", action="store_true", help="over plates in a floor, a step or two at a time"
     )
     signals.add_argument(
-        "--gyroscope",
+        "--wearable",
         nargs="+",
-        metavar="SIDE.SEGMENT=COLUMN",
-        help="instead of forces: contacts, stride time and cadence by the sagittal rate of a foot "
-        "or shank in rad/s (left.foot=gyro_z*0.01745 for degrees); its sign is found",
+        metavar="SIDE.PLACE=COLUMNS",
+        help="instead of forces: a sensor on a foot or shank, mounted in any way; accelerations in "
+        "m/s² and rates in rad/s (left.foot=ax,ay,az,gx,gy,gz; gx*0.01745 for degrees), or only "
+        "the rate about the axis from left to right (left.foot=gx)",
     )
     signals.add_argument(
         "--keep", type=Path, metavar="FILE", help="write the raw signals to a new file, here only"

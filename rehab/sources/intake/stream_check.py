@@ -42,7 +42,7 @@ class StreamCheck(Intake):
     ) -> None:
         super().__init__(LiveFeed(), settings, notify, monotonic)
         self.is_done = asyncio.Event()
-        self._mass_kg = settings.mass_kg
+        self._mass_kg, self._is_overground = settings.mass_kg, settings.is_overground or None
         self._say, self._clock, self._seconds = notify, monotonic, seconds
         self._first_s: float | None = None
         # By the columns that came together.
@@ -101,7 +101,8 @@ class StreamCheck(Intake):
         names = max(self._rows, key=lambda one: (len(one), len(self._rows[one])))
         others = sorted({name for one in self._rows for name in one} - set(names))
         columns = np.array(self._rows[names], np.float64).T
-        check = check_setup(dict(zip(names, columns, strict=True)), self._mass_kg)
+        table = dict(zip(names, columns, strict=True))
+        check = check_setup(table, self._mass_kg, is_overground=self._is_overground)
         lines = describe_setup(check)
         if others:
             lines.insert(0, f"Left out, as they come in rows of their own: {', '.join(others)}.")

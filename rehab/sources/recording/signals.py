@@ -31,7 +31,7 @@ def measure_file(
     and GaitInputError for signals that nothing can be measured from.
     """
     try:
-        t_s, legs, frames = read_signals(path, pairs=columns)
+        t_s, legs, frames, says_overground = read_signals(path, pairs=columns)
     except OSError as problem:
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
     rate_hz = estimate_rate(t_s) if rate_hz is None else rate_hz
@@ -42,7 +42,7 @@ def measure_file(
         rate_hz=rate_hz,
         mass_kg=mass_kg,
         look_ahead_s=look_ahead_s,
-        is_overground=is_overground,
+        is_overground=is_overground or says_overground,
         frame=frames,
     )
     check = check_signals(

@@ -17,10 +17,9 @@ from rehab.people.roles import Right, Role, rights_of
 from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import renew_token
 from rehab.stations.builtin import first_station
-from rehab.stations.device_trust import is_trusted
 from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import format_device_state
+from rehab.stations.presence import format_device_states
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)
@@ -29,15 +28,11 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     """List the clinic's stations with their devices, and how well each is heard."""
     user, now = user_of(request), timezone.now()
     first_station(clinic_of(user))
-    devices = Device.objects.visible_to(user).annotate(has_approver=is_trusted())
-    devices = devices.select_related("approver").order_by("kind", "name")
+    devices = Device.objects.visible_to(user).select_related("approver").order_by("kind", "name")
     stations = Station.objects.visible_to(user).prefetch_related(Prefetch("devices", devices))
     context = {
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
-        "stations": [
-            (one, [(device, format_device_state(device, now)) for device in one.devices.all()])
-            for one in stations
-        ],
+        "stations": [(one, format_device_states(list(one.devices.all()), now)) for one in stations],
     }
     return render(request, "stations/stations.html", context)
 

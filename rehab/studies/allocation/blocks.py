@@ -13,7 +13,15 @@ MAX_BLOCK = 64
 
 
 def check_block_sizes(groups: Sequence[Group], sizes: Sequence[int]) -> None:
-    """Raise InvalidSetting for block sizes that the ratio does not fit."""
+    """Raise InvalidSetting for block sizes that the ratio does not fit.
+
+    Parameters
+    ----------
+    groups
+        What is allocated; their weights are the ratio.
+    sizes
+        Sizes of blocks: different multiples of the weights' sum, up to ``MAX_BLOCK``.
+    """
     unit = sum(group.weight for group in groups)
     if not sizes or len(set(sizes)) != len(sizes):
         raise InvalidSetting("Give the sizes of blocks, each once, such as “4, 6”.")
@@ -31,7 +39,15 @@ def check_block_sizes(groups: Sequence[Group], sizes: Sequence[int]) -> None:
 
 
 def block_of(groups: Sequence[Group], sizes: Sequence[int], draws: Draws) -> list[str]:
-    """Return the groups' names of the next block."""
+    """Return the next block: names of groups, each as often as its weight asks, in random order.
+
+    Parameters
+    ----------
+    groups, sizes
+        What is allocated, and the sizes of blocks, each drawn equally often.
+    draws
+        Where chance comes from; it goes on from block to block.
+    """
     size = sizes[draws.below(len(sizes))]
     unit = sum(group.weight for group in groups)
     names = [group.name for group in groups for _ in range(group.weight * size // unit)]
@@ -41,7 +57,15 @@ def block_of(groups: Sequence[Group], sizes: Sequence[int], draws: Draws) -> lis
 def sequence_of(
     groups: Sequence[Group], sizes: Sequence[int], seed: str, levels: Sequence[str]
 ) -> Iterator[str]:
-    """Yield the groups of a stratum without end."""
+    """Yield the names of a stratum's groups, block after block, without end.
+
+    Parameters
+    ----------
+    groups, sizes
+        What is allocated, and the sizes of blocks, each drawn equally often.
+    seed, levels
+        The study's secret, and the stratum's level of each factor.
+    """
     draws = Draws(seed, "blocks", *levels)
     while True:
         yield from block_of(groups, sizes, draws)

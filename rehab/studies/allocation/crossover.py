@@ -43,7 +43,7 @@ class PlannedVisit:
 
 @dataclass(frozen=True, slots=True)
 class VisitPlan:
-    """When participants come: in each period so many visits, so many days apart.
+    """When participants come.
 
     Attributes
     ----------
@@ -74,7 +74,15 @@ class VisitPlan:
             )
 
     def plan(self, periods: int, first_day: date) -> tuple[PlannedVisit, ...]:
-        """Return the visits of a participant, from the first day on."""
+        """Return the visits of a participant.
+
+        Parameters
+        ----------
+        periods
+            How many: one for each arm of the participant's group.
+        first_day
+            The day of the first visit.
+        """
         planned: list[PlannedVisit] = []
         day = first_day
         for period in range(periods):

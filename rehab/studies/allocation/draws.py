@@ -1,4 +1,4 @@
-"""Random draws that anybody can repeat from the seed, in any language."""
+"""Random draws that anyone can repeat from the seed, in any programming language."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Draws:
     """
 
     def __init__(self, seed: str, *context: str) -> None:
-        # Lengths keep ("ab", "c") and ("a", "bc") apart.
+        # Lengths distinguish ("ab", "c") from ("a", "bc").
         self._prefix = "|".join(f"{len(part)}:{part}" for part in (seed, *context))
         self._counter = 0
 

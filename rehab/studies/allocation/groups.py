@@ -82,7 +82,20 @@ def check_factors(factors: Sequence[Factor]) -> None:
 
 
 def check_levels(factors: Sequence[Factor], levels: Sequence[str]) -> tuple[str, ...]:
-    """Return the levels of one participant. Raises InvalidSetting for one that is unknown."""
+    """Return the levels of one participant.
+
+    Parameters
+    ----------
+    factors
+        The study's factors.
+    levels
+        The participant's level of each, in the same order.
+
+    Raises
+    ------
+    InvalidSetting
+        For an unknown level, and for too many or too few.
+    """
     for factor, level in zip(factors, levels, strict=False):
         if level not in factor.levels:
             raise InvalidSetting(
@@ -100,7 +113,7 @@ def check_levels(factors: Sequence[Factor], levels: Sequence[str]) -> tuple[str,
 
 
 def find_group(groups: Iterable[Group], name: str) -> Group:
-    """Return the group of that name. Raises InvalidSetting, naming the known ones."""
+    """Return the one of ``groups`` with that name. Raises InvalidSetting, naming the known ones."""
     known = {group.name: group for group in groups}
     try:
         return known[name]

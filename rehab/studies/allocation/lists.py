@@ -24,15 +24,23 @@ class ListEntry:
 def read_list(
     text: str, groups: Sequence[Group], factors: Sequence[Factor]
 ) -> tuple[ListEntry, ...]:
-    """Return the entries of a CSV file, by number.
+    """Return the entries of a CSV file, by stratum and number.
 
     Its columns are `number`, each factor by its name, and `group`: an arm's code, or in a crossover
     the codes in their order with hyphens between them.
 
+    Parameters
+    ----------
+    text
+        The file's text, at most ``MAX_ENTRIES`` lines below its header.
+    groups, factors
+        What is allocated, and the factors whose levels make the strata.
+
     Raises
     ------
     InvalidSetting
-        For missing columns, strangers, numbers that occur twice or are left out, an unused group.
+        For missing columns, unknown groups or levels, numbers that occur twice or are left out, an
+        unused group.
     """
     wanted = ["number", *(factor.name for factor in factors), "group"]
     reader = csv.DictReader(text.removeprefix("\ufeff").splitlines(), skipinitialspace=True)
@@ -91,9 +99,21 @@ def _check_complete(listed: Sequence[ListEntry], groups: Sequence[Group]) -> Non
 
 
 def group_at(listed: Sequence[ListEntry], levels: Sequence[str], index: int) -> str:
-    """Return the group of a stratum's participant; ``index`` counts them from 0.
+    """Return the name of the group of a stratum's participant.
 
-    Raises InvalidSetting where the list has no further line for these ``levels``.
+    Parameters
+    ----------
+    listed
+        All entries of the list, by stratum and number.
+    levels
+        The stratum's level of each factor.
+    index
+        Of the participant within the stratum, from 0.
+
+    Raises
+    ------
+    InvalidSetting
+        Where the list has no further line for the stratum.
     """
     here = [entry.group for entry in listed if entry.levels == tuple(levels)]
     if index >= len(here):

@@ -1,4 +1,4 @@
-"""Minimization: each participant probably joins the group that balances the factors best.
+"""Minimization: each participant most likely joins the group that balances the factors best.
 
 Pocock and Simon, Biometrics 31 (1975) 103-115, with the range as measure of imbalance and every
 factor of the same weight. With unequal ratios, a group's counts are divided by its weight.
@@ -13,13 +13,21 @@ from rehab.studies.allocation.draws import Draws
 from rehab.studies.allocation.groups import Allocated, Group
 from rehab.training.measures import InvalidSetting
 
-# With which the best group is taken: 0.8 keeps near balance, and the next group hard to guess
+# Of taking the best group: with 0.8 groups stay near balance, and the next one is hard to guess
 # (simulations in Pocock and Simon favor 0.75 to 0.8).
 DEFAULT_PROBABILITY = 0.8
 
 
 def check_probability(groups: Sequence[Group], probability: float) -> None:
-    """Raise InvalidSetting for a probability that does not balance, or leaves nothing to chance."""
+    """Raise InvalidSetting for a probability that does not balance, or leaves nothing to chance.
+
+    Parameters
+    ----------
+    groups
+        What is allocated.
+    probability
+        With which the best group is taken: above 1 / number of groups and below 1.
+    """
     if not 1 / len(groups) < probability < 1:
         raise InvalidSetting(
             "The best group is taken with a probability above {least:.2f} and below 1, such as "
@@ -31,9 +39,19 @@ def check_probability(groups: Sequence[Group], probability: float) -> None:
 def imbalance_after(
     groups: Sequence[Group], earlier: Sequence[Allocated], levels: Sequence[str], joined: Group
 ) -> Fraction:
-    """Return the sum over factors of the range of counts, were a participant to join a group.
+    """Return the sum over factors of the range of counts, if a participant joined a group.
 
-    Counts are divided by the groups' weights; ``levels`` are the participant's.
+    Of each factor, those with the participant's level are counted in each group, and the count is
+    divided by the group's weight (Pocock and Simon 1975).
+
+    Parameters
+    ----------
+    groups, earlier
+        What is allocated, and all allocations so far.
+    levels
+        The participant's level of each factor.
+    joined
+        The group to join.
     """
     total = Fraction(0)
     for position, level in enumerate(levels):

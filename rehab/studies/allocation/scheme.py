@@ -1,4 +1,4 @@
-"""How a study allocates: what may be read by all, and what is sealed until its end."""
+"""How a study allocates: what everyone may read, and what is sealed until its end."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from rehab.training.measures import InvalidSetting
 
 
 def get_enrollment(user: User, enrollment_id: int) -> Enrollment:
-    """Return a participant whom a user may see. Raises Http404 for any other."""
+    """Return the enrollment of key ``enrollment_id``. Raises Http404 if ``user`` may not see it."""
     rows = Enrollment.objects.visible_to(user).select_related("study__clinic", "patient__clinic")
     return get_object_or_404(rows, pk=enrollment_id)
 
@@ -35,7 +35,7 @@ def get_enrollment(user: User, enrollment_id: int) -> Enrollment:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
-    """Take a patient into a running study."""
+    """Enroll a patient in a running study."""
     user = user_of(request)
     study = get_study(user, study_id)
     form = EnrollmentForm(request.POST or None, study=study, by=user)
@@ -55,7 +55,7 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_participant(request: HttpRequest, enrollment_id: int) -> HttpResponse:
-    """Show a participant's visits, and what can be done. Only revealing it shows the arm."""
+    """Show a participant's visits, and what can be done. The arm stays hidden until revealed."""
     enrollment = get_enrollment(user_of(request), enrollment_id)
     return render_participant(request, enrollment)
 
@@ -63,7 +63,18 @@ def show_participant(request: HttpRequest, enrollment_id: int) -> HttpResponse:
 def render_participant(
     request: HttpRequest, enrollment: Enrollment, status: int = 200, **more: Any
 ) -> HttpResponse:
-    """Return the page, with a form as it was sent or the arms that were revealed."""
+    """Return a participant's page.
+
+    Parameters
+    ----------
+    enrollment
+        The participant.
+    status
+        The response's HTTP status.
+    more
+        What else the template shows: a form as it was sent, why something was refused, the arms
+        that were revealed.
+    """
     user = user_of(request)
     first_station(enrollment.patient.clinic)
     blind = is_assessor(enrollment.study, user)

@@ -1,4 +1,4 @@
-"""Pages that list, plan, register and close studies, and say who is what in them."""
+"""Pages that list, plan, register and close studies, and give accounts marks in them."""
 
 from __future__ import annotations
 
@@ -39,25 +39,25 @@ from rehab.studies.unblinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 
-# What moves a study on, by the name of its button.
+# What each button of a study's state does, by its name.
 StudyAction = Callable[[Study, User, datetime], Any]
 STEPS: dict[str, StudyAction] = {"register": register, "start": start, "close": close}
 
 
 def get_study(user: User, study_id: int) -> Study:
-    """Return a study that a user may see. Raises Http404 for any other."""
+    """Return the study of key ``study_id``. Raises Http404 if ``user`` may not see it."""
     return get_object_or_404(Study.objects.visible_to(user).select_related("clinic"), pk=study_id)
 
 
 def is_assessor(study: Study, user: User) -> bool:
-    """Return whether the arms are hidden from a user now."""
+    """Return whether the arms of a study are hidden from ``user`` now."""
     return study.state != StudyState.CLOSED and has_mark(study, user, Task.ASSESSOR)
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 @require_safe
 def list_studies(request: HttpRequest) -> HttpResponse:
-    """List the clinic's studies; drafts are a lead's."""
+    """List the clinic's studies; only leads see drafts."""
     user = user_of(request)
     studies = Study.objects.visible_to(user).annotate(count=Count("enrollments"))
     if user.role != Role.LEAD:
@@ -110,7 +110,7 @@ def show_study(request: HttpRequest, study_id: int) -> HttpResponse:
 
 
 def study_context(study: Study, user: User) -> dict[str, Any]:
-    """Return what a user sees of a study."""
+    """Return what the page of a study shows ``user``; from an assessor, the arms are hidden."""
     blind, is_lead = is_assessor(study, user), user.role == Role.LEAD
     by_name, events = may_see_names(user.role), StudyEvent.objects.visible_to(user)
     return {
@@ -188,7 +188,15 @@ def change_marks(request: HttpRequest, study_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 @require_GET
 def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpResponse:
-    """Return the registered study with all its versions, as JSON or as a document on paper."""
+    """Return the registered study with all its versions, as a file.
+
+    Parameters
+    ----------
+    study_id
+        Key of the study.
+    kind
+        ``json``, or ``pdf`` for a document to print.
+    """
     user = user_of(request)
     study = get_study(user, study_id)
     if is_assessor(study, user) or study.is_draft:
@@ -221,7 +229,7 @@ def write_json(study: Study) -> str:
 
 
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:
-    """Do something, or say why it cannot be done."""
+    """Do something, or show why it cannot be done."""
     try:
         act()
     except InvalidSetting as problem:

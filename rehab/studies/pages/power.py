@@ -1,4 +1,4 @@
-"""A study's power by simulation: asked for, watched, gone on with."""
+"""A study's power by simulation: started, watched, continued."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ USUAL = Population()
 
 
 class PowerForm(forms.Form):
-    """What is assumed of a study that is simulated: one effect for each arm."""
+    """What a simulated study assumes: the effect of each arm, and how people differ."""
 
     participants = WholeNumberField(label=_("participants"), least=2, most=2000)
     sd_percent = NumberField(label=_("people differ by (SD, % of baseline)"))
@@ -107,7 +107,7 @@ def show_power(request: HttpRequest, study_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
 @require_POST
 def go_on(request: HttpRequest, run_id: int) -> HttpResponse:
-    """Go on with a run that was broken off."""
+    """Continue a run that was interrupted."""
     user = user_of(request)
     run = get_object_or_404(PowerRun.objects.visible_to(user), pk=run_id)
     begin(run)
@@ -115,7 +115,7 @@ def go_on(request: HttpRequest, run_id: int) -> HttpResponse:
 
 
 def begin(run: PowerRun) -> None:
-    """Let a process of its own simulate, unless one does; it ends with the server."""
+    """Start a process that simulates, unless one does already; it ends with the server."""
     live = runtime.peek()
     if live is None or run.is_done:
         return

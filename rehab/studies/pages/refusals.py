@@ -14,11 +14,11 @@ log = logging.getLogger(__name__)
 
 
 def refuse(request: HttpRequest, problem: InvalidSetting) -> str:
-    """Return why something cannot be done, in the reader's language, and log that it was asked."""
+    """Return why something cannot be done, in the reader's language, and log the attempt."""
     log_refusal(request)
     return format_refusal(problem)
 
 
 def log_refusal(request: HttpRequest) -> None:
-    """Log who was refused what. The words may name a patient or an arm, and stay out of it."""
+    """Log who was refused what, without the reason's words, which may name a patient or an arm."""
     log.warning("Refused to account %s: %s", user_of(request).pk, request.path)

@@ -1,4 +1,4 @@
-"""A study's results: figures and tables, for who may look."""
+"""A study's results: figures and tables, for those who may see them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The document of a study that is registered: all that decides what participants walk.
 
-What was added to GARRY later stands in it only where a study uses it, so that studies that were
-registered before keep their digest.
+What was added to GARRY later is in it only where a study uses it, so that the digest of studies
+registered before does not change.
 """
 
 from __future__ import annotations

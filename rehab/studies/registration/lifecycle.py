@@ -8,11 +8,12 @@ from typing import Any
 from django.db import transaction
 from django.utils.translation import gettext
 
+from rehab.people.audit import seals
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
-from rehab.studies.models import Study, StudyState, StudyVersion
-from rehab.studies.participants import StudyEvent
+from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
+from rehab.studies.participants import Allocation, StudyEvent
 from rehab.studies.registration.document import describe, digest_of
 from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
@@ -32,7 +33,17 @@ def lock(study: Study) -> None:
 
 
 def note(study: Study, kind: Kind, by: User | None, now: datetime, **details: Any) -> StudyEvent:
-    """Store that something happened in a study."""
+    """Store an event of a study, and return it.
+
+    Parameters
+    ----------
+    study, kind
+        The study, and what happened.
+    by, now
+        Who did it (None for a program), and when.
+    details
+        Other fields of ``StudyEvent``, such as ``enrollment``, ``reason`` and ``about``.
+    """
     return StudyEvent.everywhere.create(study=study, kind=kind, by=by, at=now, **details)
 
 
@@ -64,7 +75,20 @@ def check_secret(study: Study) -> Secret:
 
 
 def register(study: Study, by: User | None, now: datetime) -> StudyVersion:
-    """Fix a study's plan, before the first patient. Raises InvalidSetting if it cannot be run."""
+    """Fix a study's plan before the first patient, and return its first version.
+
+    Parameters
+    ----------
+    study
+        A draft.
+    by, now
+        Who registers it (None for a program), and when.
+
+    Raises
+    ------
+    InvalidSetting
+        For a study that is no draft, or cannot be run.
+    """
     with transaction.atomic():
         lock(study)
         _expect(study, StudyState.DRAFT)
@@ -78,7 +102,20 @@ def register(study: Study, by: User | None, now: datetime) -> StudyVersion:
 
 
 def start(study: Study, by: User | None, now: datetime) -> None:
-    """Open a registered study to participants."""
+    """Open a registered study to participants.
+
+    Parameters
+    ----------
+    study
+        A registered study.
+    by, now
+        Who starts it (None for a program), and when.
+
+    Raises
+    ------
+    InvalidSetting
+        For a study that is not registered, or was started already.
+    """
     with transaction.atomic():
         lock(study)
         _expect(study, StudyState.REGISTERED)
@@ -90,8 +127,7 @@ def start(study: Study, by: User | None, now: datetime) -> None:
 def current_version(study: Study) -> StudyVersion:
     """Return the version that sessions are created from. Raises InvalidSetting if it is outdated.
 
-    Measures and protocols are rows that a clinic edits: where one was, the study does not silently
-    go on with something else.
+    A clinic edits its measures and protocols: a study does not silently go on with changed ones.
     """
     version = study.versions.last()
     if version is None:
@@ -107,10 +143,22 @@ def current_version(study: Study) -> StudyVersion:
 
 
 def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVersion:
-    """Make a new version of a study that was changed after its registration.
+    """Store the changes of a study after its registration, and return its new version.
 
-    Raises InvalidSetting without a reason or without a change, and where groups, ratio or factors
-    would be others: what was allocated cannot be allocated again.
+    Parameters
+    ----------
+    study
+        A registered or running study, with changes that are not stored yet.
+    reason
+        Why it is changed; part of the version.
+    by, now
+        Who changes it (None for a program), and when.
+
+    Raises
+    ------
+    InvalidSetting
+        Without a reason or a change, and for other groups, another ratio or other factors: what was
+        allocated cannot be allocated again.
     """
     with transaction.atomic():
         stored = Study.everywhere.select_for_update(no_key=True).get(pk=study.pk)
@@ -138,9 +186,19 @@ def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVe
 
 
 def close(study: Study, by: User | None, now: datetime) -> None:
-    """Close a study: no one enrolls or walks any more, and nothing is hidden from here on.
+    """Close a study: no one is enrolled or walks any more, and nothing is hidden from here on.
 
-    Raises InvalidSetting while a session of a participant is open.
+    Parameters
+    ----------
+    study
+        A running study.
+    by, now
+        Who closes it (None for a program), and when.
+
+    Raises
+    ------
+    InvalidSetting
+        For a study that is not running, and while a participant's session is open.
     """
     with transaction.atomic():
         lock(study)
@@ -148,13 +206,35 @@ def close(study: Study, by: User | None, now: datetime) -> None:
         check_no_open_session(study)
         study.state, study.closed_at = StudyState.CLOSED, now
         study.save(update_fields=["state", "closed_at"])
-        note(study, Kind.CLOSED, by, now)
+        note(study, Kind.CLOSED, by, now, about=_look_over(study))
         for enrollment in study.enrollments.select_related("patient"):
             set_blinded(enrollment.patient)
 
 
+def _look_over(study: Study) -> str:
+    """Return whether what was recorded of the clinic's studies is as it was sealed.
+
+    A study is closed all the same: what is broken is found by `manage.py doctor`, and mended by
+    nobody.
+    """
+    logs = [model.__name__ for model in (Allocation, StudyEvent, StudyMark)]
+    broken = [one for log in logs for one in seals.find_broken_of(log, study.clinic_id)]
+    if broken:
+        return f"not as sealed, {len(broken)}: {broken[0]}"[:120]
+    head = seals.seals_of(StudyEvent.__name__, study.clinic_id).last()
+    return f"as sealed: {head.digest}" if head else "nothing sealed yet"
+
+
 def check_no_open_session(study: Study, patient: Patient | None = None) -> None:
-    """Raise InvalidSetting while a participant, or a patient who is to be one, has a session."""
+    """Raise InvalidSetting while someone has an open session.
+
+    Parameters
+    ----------
+    study
+        The study, of whose participants none may have one.
+    patient
+        The only one to be checked, who need not be a participant yet; None for all participants.
+    """
     states = [state.value for state in OPEN_STATES]
     of_whom = {"patient__enrollments__study": study} if patient is None else {"patient": patient}
     if TrainingSession.everywhere.filter(state__in=states, **of_whom).exists():
@@ -162,10 +242,10 @@ def check_no_open_session(study: Study, patient: Patient | None = None) -> None:
 
 
 def set_blinded(patient: Patient) -> None:
-    """Let a patient's boards and scores follow the enrollments: none during a study.
+    """Hide a patient's boards and scores while the patient is in a running study, else show them.
 
-    It is saved where it stays the same, too: boards follow who saves it, and have those again who
-    left the study before its end.
+    The patient is saved even if nothing changes: boards follow each save, and then show
+    again those who left the study before its end.
     """
     patient.lock()
     blinded = patient.enrollments.filter(

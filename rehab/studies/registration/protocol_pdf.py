@@ -54,7 +54,7 @@ def _text(words: object, style: str = "BodyText") -> Paragraph:
 
 
 def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
-    """Yield what stands on paper of one version."""
+    """Yield the parts of the document for one version."""
     document = version.document
     yield _text(f"{document['code']}: {document['title']}", "Title")
     made = gettext("Version %(number)d of %(moment)s UTC, %(clinic)s")

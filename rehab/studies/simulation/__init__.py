@@ -1,1 +1,1 @@
-"""Simulated studies: patients that answer feedback, with an effect of each arm put in."""
+"""Simulated studies: patients who respond to feedback, with a known effect of each arm."""

@@ -34,7 +34,20 @@ PHASES: tuple[Phase, ...] = (
 def example_trial(
     participants: int = 60, visits: int = 1, population: Population | None = None
 ) -> Trial:
-    """Return the study. Raises InvalidSetting for numbers that cannot be."""
+    """Return the study, allocated to four arms of equal weight.
+
+    Parameters
+    ----------
+    participants, visits
+        How many people, and visits of each.
+    population
+        How people differ; None for the usual ``Population``.
+
+    Raises
+    ------
+    InvalidSetting
+        For numbers out of bounds.
+    """
     plans = {
         code: SessionPlan(
             measure=A2,

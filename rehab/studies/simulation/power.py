@@ -90,7 +90,7 @@ def _power(group: str, reference: str, found: Sequence[SimulatedDifference]) -> 
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share (Wilson 1927)."""
+    """Return the 95 % interval of the share ``hits`` / ``count`` (Wilson 1927, JASA 22:209-212)."""
     from scipy.stats import binomtest  # takes half a second, which each start of a server would
 
     interval = binomtest(hits, count).proportion_ci(CONFIDENCE, method="wilson")

@@ -9,7 +9,7 @@ from functools import partial
 
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.live.headless import Pace, run_session
-from rehab.sessions.setup.defaults import install_defaults
+from rehab.sessions.setup.default_protocols import install_defaults
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.models import Arm, Study, StudyState
@@ -33,8 +33,21 @@ PROTOCOL = "Simulated study"
 def find_or_plan(clinic: Clinic, trial: Trial, seed: int, now: datetime) -> Study:
     """Return the simulated study of a seed, planned, registered and started where it is new.
 
-    Raises InvalidSetting for a seed out of bounds, and where the clinic has simulated another study
-    from it.
+    Parameters
+    ----------
+    clinic
+        Where it is stored.
+    trial
+        What is simulated.
+    seed
+        0 to ``SEED_MAX``; part of the study's code, which is unique in a clinic.
+    now
+        The time of its registration and start.
+
+    Raises
+    ------
+    InvalidSetting
+        For a seed out of bounds, and where the clinic has simulated another study from it.
     """
     if not 0 <= seed <= SEED_MAX:
         raise InvalidSetting("A seed is a whole number from 0 to {most}.", most=SEED_MAX)
@@ -102,7 +115,14 @@ def _find_protocol(clinic: Clinic) -> Protocol:
 def walk_study(study: Study, trial: Trial, seed: int, now: datetime) -> Iterator[int]:
     """Enroll and walk the participants who are missing, and yield how many are done.
 
-    What was walked before stays: a study that was broken off goes on.
+    Sessions of an interrupted run are not repeated: it is continued.
+
+    Parameters
+    ----------
+    study, trial, seed
+        The study that ``find_or_plan`` returned for this trial and seed.
+    now
+        The time of enrollments and withdrawals.
     """
     for number, (person, _group) in enumerate(trial.allocate(seed), start=1):
         if study.state == StudyState.RUNNING:
@@ -137,7 +157,7 @@ def _walk_all(enrollment: Enrollment, trial: Trial, person: Person, now: datetim
 
 
 def finish_study(study: Study, now: datetime) -> Results:
-    """Close a study that was walked, and return its results."""
+    """Close a study whose participants have walked at ``now``, and return its results."""
     if study.state == StudyState.RUNNING:
         close(study, None, now)
     return read_results(study, now)

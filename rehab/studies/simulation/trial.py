@@ -40,7 +40,7 @@ class Trial:
     Attributes
     ----------
     plans
-        What each arm's sessions are scored with, by the arm's code.
+        The plan of each arm's sessions, by the arm's code.
     effects
         What each arm truly adds to training [% of the baseline].
     groups
@@ -91,7 +91,7 @@ class Trial:
         return Scheme(self.groups, Method.BLOCKS)
 
     def secret(self, seed: int) -> Secret:
-        """Return what a seed's participants are allocated by."""
+        """Return the secret by which a seed's participants are allocated."""
         share = sum(group.weight for group in self.groups)
         return Secret(f"simulated {seed:012}", self.block_sizes or (share,))
 
@@ -112,7 +112,15 @@ def walkable(plan: SessionPlan) -> SessionPlan:
 
 
 def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> AnalyzedSession:
-    """Return one session, scored by the rules alone."""
+    """Return one session, scored by the rules alone.
+
+    Parameters
+    ----------
+    plan
+        What it is scored with.
+    walker
+        Who walks it; the strides depend on phase and goal.
+    """
     fold = SessionFold(plan)
     fold.change(Change(ChangeKind.START))
     steps = [fold.step(stride) for stride in walk_through(walker, fold)]
@@ -125,7 +133,7 @@ def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> AnalyzedSession:
 
 
 def simulate(trial: Trial, seed: int) -> list[Participant]:
-    """Return a study's participants with all that they walked. The same seed gives the same."""
+    """Return the participants of ``trial`` with their sessions. A seed always gives the same."""
     visit_plan = VisitPlan(trial.visits)
     participants = []
     for number, (person, group) in enumerate(trial.allocate(seed), start=1):
@@ -151,7 +159,14 @@ def differences(
 ) -> list[Difference]:
     """Return the differences between all pairs of arms in an outcome.
 
-    ``slug``: the outcome's; of the primary one where it is empty.
+    Parameters
+    ----------
+    trial
+        The study.
+    participants
+        Those that ``simulate`` returned.
+    slug
+        The outcome's; empty for the primary one.
     """
     groups = by_arm(participants, list(trial.plans), slug or trial.outcome)
     return compare(groups, paired=trial.is_crossover)

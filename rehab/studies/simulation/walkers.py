@@ -1,4 +1,4 @@
-"""Simulated participants: synthetic walkers who differ, and to whom arms do what was put in."""
+"""Simulated participants: synthetic walkers who differ, and on whom each arm has a known effect."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Population:
     Raises
     ------
     InvalidSetting
-        For what could not be.
+        For values out of bounds.
     """
 
     sd_percent: float = 10.0
@@ -55,7 +55,7 @@ class Population:
 
 
 class SimulatedParticipant(SyntheticWalker):
-    """A synthetic walker to whom an arm does exactly what was put in.
+    """A synthetic walker on whom an arm has exactly the given effect.
 
     It learns, tires and answers goal, gain and hits as any other; what the arm adds comes on top,
     so that the true difference between arms is known.
@@ -101,7 +101,19 @@ class Person:
     def at_visit(
         self, visit: int, effect_percent: float, kept: float, side: Side = Side.LEFT
     ) -> SimulatedParticipant:
-        """Return the walker of a visit, counted from 1, in an arm with an effect."""
+        """Return the walker of one visit.
+
+        Parameters
+        ----------
+        visit
+            Number of the visit, from 1.
+        effect_percent
+            What the arm adds to training [% of the baseline].
+        kept
+            Share of what training adds that remains without feedback (ratio).
+        side
+            The leg that is trained.
+        """
         draw = random.Random(f"{self.seed}/{visit}")  # noqa: S311 (chance for walking)
         return SimulatedParticipant(
             draw.getrandbits(48),
@@ -114,7 +126,17 @@ class Person:
 
 
 def draw_person(seed: int, number: int, population: Population, visits: int) -> Person:
-    """Return the participant of a number: the same seed and number give the same person."""
+    """Return a participant, drawn so that the same arguments always give the same person.
+
+    Parameters
+    ----------
+    seed, number
+        Of the study, and of the participant in it, from 1.
+    population
+        How people differ.
+    visits
+        How many are planned, each of which the person may leave before.
+    """
     name = f"{seed}/{number}"
     draw = random.Random(name)  # noqa: S311 (chance for walking)
     baseline_w_kg = round(2.0 + 2.5 * draw.random(), 3)  # HEBB_03 has 3.9, HEBB_91 2.2
@@ -124,9 +146,19 @@ def draw_person(seed: int, number: int, population: Population, visits: int) -> 
 
 
 def walk_through(walker: SyntheticWalker, fold: SessionFold) -> Iterator[Measurement]:
-    """Yield strides, each made for the session's phase and goal, until the plan is walked.
+    """Yield strides, each made for the session's phase and goal, until the plan is completed.
 
-    Raises InvalidSetting for a plan without an end.
+    Parameters
+    ----------
+    walker
+        Who walks.
+    fold
+        The session, to which the caller adds each stride before asking for the next.
+
+    Raises
+    ------
+    InvalidSetting
+        For a plan that has not ended after ``STRIDES_MAX`` strides.
     """
     for _ in range(STRIDES_MAX):
         if fold.completed:

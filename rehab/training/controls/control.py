@@ -103,7 +103,7 @@ class ControlledSession(Protocol):
         """Note that walking stopped, and why."""
 
     def resume(self) -> None:
-        """Forget why the session was paused."""
+        """Clear why the session was paused."""
 
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback."""
@@ -139,8 +139,8 @@ class ChartMark:
 class Control:
     """One thing that can be changed of a session.
 
-    A control without ``apply`` and ``current`` is a setting: the session keeps its value in
-    ``settings``, from ``initial`` on.
+    A control without ``apply`` and ``current`` is a setting: the session has its value in
+    ``settings``, at first ``initial``.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class Control:
     allowed_in, leads_to
         The states it may come in; the state it leads to, None where the state stays.
     value, check
-        What its value is. ``check`` returns the value that is kept, or raises InvalidSetting.
+        What its value is. ``check`` returns the value to store, or raises InvalidSetting.
     initial
         A setting's value at the beginning of a plan.
     apply, current
@@ -215,7 +215,7 @@ class Control:
         return self.leads_to or state
 
     def put_into_force(self, session: ControlledSession, value: ChangeValue) -> None:
-        """Check a value and apply it. Raises InvalidSetting; the session is then as it was."""
+        """Check a value and apply it to a session. Raises InvalidSetting, changing nothing."""
         if self.value is ValueKind.NUMBER:
             value = self._check_number(value)
         checked = value if self.check is None else self.check(value)
@@ -239,7 +239,7 @@ class Control:
         return session.settings.get(self.kind)
 
     def value_for_log(self, session: ControlledSession) -> float | str | None:
-        """Return the value in force as the log keeps it: a number or a name."""
+        """Return the value in force as the log stores it: a number or a name."""
         value = self.value_in_force(session)
         if isinstance(value, str):
             return str(value)

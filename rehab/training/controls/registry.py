@@ -21,7 +21,6 @@ from rehab.training.controls.control import (
     ValueFormat,
     ValueKind,
 )
-from rehab.training.cueing import check_activation_threshold
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.plans import (
     ROBOT_LEVELS,
@@ -29,6 +28,7 @@ from rehab.training.plans import (
     check_chart_style,
     check_robot_intensity,
 )
+from rehab.training.robot_cueing import check_activation_threshold
 from rehab.training.valences import VALENCES
 from robot.marking import gettext_noop
 

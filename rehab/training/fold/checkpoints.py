@@ -64,7 +64,15 @@ def fold_to_json(fold: SessionFold) -> dict[str, Any]:
 
 
 def fold_from_json(plan: SessionPlan, data: Mapping[str, Any]) -> SessionFold | None:
-    """Return the fold of ``fold_to_json``'s data; None where another version wrote it."""
+    """Return the fold that a checkpoint describes; None where another version wrote it.
+
+    Parameters
+    ----------
+    plan
+        The session's plan, with which the checkpoint was made.
+    data
+        What ``fold_to_json`` returned.
+    """
     if data.get("version") != CHECKPOINT_VERSION:
         return None
     fold = SessionFold(plan)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from rehab.training.schedules import FeedbackSummary, Schedule
 from rehab.training.steps import ScoredStep
 
-# Strides of which it is known whether the patient got feedback: as many as a page begins with.
+# Latest strides of which it is known whether they got feedback: as many as a page begins with.
 REPORTED_MAX = 60
 
 
@@ -39,7 +39,12 @@ class FeedbackDelivery:
     def add(self, step: ScoredStep, judged: int) -> None:
         """Count a step, and give feedback where the schedule asks for it.
 
-        ``judged``: how many steps were judged so far, this one included.
+        Parameters
+        ----------
+        step
+            The step; one without a verdict is not counted.
+        judged
+            How many steps of feedback phases were judged so far, this one included.
         """
         if step.performance is None or step.hit is None or step.shown is None:
             return

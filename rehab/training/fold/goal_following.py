@@ -17,7 +17,7 @@ from rehab.training.steps import ScoredStep
 
 @dataclass(slots=True)
 class GoalFollowing:
-    """The strides that goals may follow.
+    """The goal's rules, with the strides that they look back on.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class GoalFollowing:
 
     @property
     def wanted_hit_rate(self) -> float:
-        """The share of hits that goals are to give."""
+        """The share of hits that goals aim at (ratio)."""
         wanted = self.plan.target.hit_rate
         return DEFAULT_HIT_RATE if wanted is None else wanted
 

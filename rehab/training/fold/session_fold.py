@@ -35,8 +35,8 @@ from rehab.training.steps import (
 from rehab.training.valences import Valence
 from robot.marking import Marked, gettext_noop
 
-# Strides further apart than this were not walked without a break, or a clock jumped: no more than
-# so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
+# A longer gap between two strides is a break or a jump of the clock: only this much of it counts as
+# walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
 # (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
 ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
@@ -68,12 +68,12 @@ class SessionFold:
             if control.initial is not None
         }
         self.trained = Tally()  # every step of the trained leg
-        self.feedback = Tally()  # those in feedback phases: what score and hit rate count
+        self.feedback = Tally()  # those in feedback phases, for score and hit rate
         self.phases = tuple(Tally() for _ in plan.phases)
-        self.blocks: dict[Block, Tally] = {}  # the same strides, apart where gain or type changed
+        self.blocks: dict[Block, Tally] = {}  # the same strides, by phase, gain and type
         self.valences = ValenceCourse(plan)
         self.pause_reason: PauseReason | None = None
-        self.rest_s: float | None = None  # how long the rest should be that is under way
+        self.rest_s: float | None = None  # planned length of the present rest
         self.was_walking = False  # whether the time since the last step was walked
         self.following = GoalFollowing(plan)
         self.delivery = FeedbackDelivery(plan.schedule)
@@ -102,7 +102,7 @@ class SessionFold:
 
     @property
     def adaptation_mode(self) -> AdaptationMode:
-        """What becomes of the goal while the patient walks."""
+        """How the goal changes while the patient walks."""
         mode: AdaptationMode = self.settings[ChangeKind.GOAL_ADAPTATION]
         return mode
 
@@ -281,7 +281,7 @@ class SessionFold:
         self.was_walking, self.pause_reason = False, reason
 
     def resume(self) -> None:
-        """Forget why the session was paused."""
+        """Clear why the session was paused."""
         self.pause_reason = self.rest_s = None
 
     @property

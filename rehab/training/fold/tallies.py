@@ -8,18 +8,21 @@ from typing import NamedTuple
 
 from rehab.training.steps import InvalidReason, ScoredStep
 
+STRIDES = ("strides", "valid", "invalid", "missing", "late")  # all, and of what kind they are
+
 
 @dataclass(slots=True)
 class Tally:
     """Counts and sums over steps of the trained leg.
 
-    ``strides = valid + invalid + missing``. A streak is a run of hits among judged steps: an
+    ``strides = valid + invalid + missing + late``. A streak is a run of hits among judged steps: an
     invalid stride and a close step neither break nor extend it.
 
     Attributes
     ----------
-    strides, valid, invalid, missing
-        A missing stride had no value and no other fault.
+    strides, valid, invalid, missing, late
+        A missing stride had no value and no other fault; a late one's samples came late from the
+        lab, which is no fault of the walker's.
     judged, hits, points
         ``judged`` counts valid steps for which a goal was known, ``hits`` those at the goal that
         were not close.
@@ -46,6 +49,7 @@ class Tally:
     best_streak: int = 0
     value_squares: float = 0.0
     close: int = 0
+    late: int = 0
 
     def add(self, step: ScoredStep) -> None:
         """Count one more step. An invalid one only adds to the counts of strides."""
@@ -53,6 +57,8 @@ class Tally:
         if not step.valid:
             if step.reasons == (InvalidReason.MISSING,):
                 self.missing += 1
+            elif InvalidReason.LATE in step.reasons:
+                self.late += 1
             else:
                 self.invalid += 1
             return
@@ -78,13 +84,13 @@ class Tally:
             self.streak = 0
 
     def merge(self, other: Tally) -> None:
-        """Add the sums of another tally; streaks do not reach across."""
+        """Add the sums of another tally; no streak continues from one to the other."""
         if self.valid and other.valid:  # Chan, Golub & LeVeque 1983
             apart = other.value_sum / other.valid - self.value_sum / self.valid
             share = self.valid * other.valid / (self.valid + other.valid)
             self.value_squares += apart * apart * share
         self.value_squares += other.value_squares
-        for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "close", "points"):
+        for name in (*STRIDES, "judged", "hits", "close", "points"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.value_sum += other.value_sum
         self.performance_sum += other.performance_sum

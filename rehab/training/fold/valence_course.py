@@ -15,18 +15,18 @@ from rehab.training.valences import Valence
 
 @dataclass(slots=True)
 class ValenceCourse:
-    """Which valence a session is walked with, in its course.
+    """Which valence a session is walked with, step by step.
 
     Attributes
     ----------
     plan
         The session's, with the valences that are possible.
     known
-        By slug what may be in force, as it is worded now.
+        The valences that may be in force, by slug, with their present words.
     current
-        The one that is.
+        The one in force.
     next_slug
-        The one that will be with the next phase that has feedback; empty for the same.
+        The one that the next phase with feedback begins with; empty for no change.
     switches
         After which step it changed to which.
     """
@@ -45,7 +45,7 @@ class ValenceCourse:
     def changed_to(self) -> tuple[str, ...]:
         """The valences that the session was changed to, in that order, each once.
 
-        One that was changed again before a step came is none of them: no step was walked with it.
+        One that was replaced before a step came is left out: no step was walked with it.
         """
         steps = [after for after, _ in self.switches]
         others = dict.fromkeys(
@@ -67,9 +67,19 @@ class ValenceCourse:
             self.switch(self.next_slug, after_number)
 
     def switch(self, slug: object, after_number: int) -> None:
-        """Put a valence into force after a step, which cancels a scheduled one.
+        """Change the valence from the next step on, which cancels a scheduled one.
 
-        Raises InvalidSetting.
+        Parameters
+        ----------
+        slug
+            The new valence: the plan's own or one of its alternatives.
+        after_number
+            Number of the last step that the old valence judges; 0 before the first step.
+
+        Raises
+        ------
+        InvalidSetting
+            For a valence that the plan does not have.
         """
         wanted = self._check(slug)
         self.next_slug = ""
@@ -80,7 +90,19 @@ class ValenceCourse:
     def schedule(self, slug: object, *, is_possible: bool) -> None:
         """Schedule the valence of the next phase with feedback; the current one cancels that.
 
-        ``is_possible``: whether such a phase follows. Raises InvalidSetting and NotAllowed.
+        Parameters
+        ----------
+        slug
+            The valence: the plan's own or one of its alternatives.
+        is_possible
+            Whether a phase with feedback follows.
+
+        Raises
+        ------
+        InvalidSetting
+            For a valence that the plan does not have.
+        NotAllowed
+            Where no phase with feedback follows.
         """
         wanted = self._check(slug)
         if wanted == self.current.slug:

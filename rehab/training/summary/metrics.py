@@ -23,7 +23,7 @@ class Metric:
     Attributes
     ----------
     slug, label, unit
-        For programs, for people (translated by pages), and of the figure; "" for ratios.
+        Its name in programs, its name for people (translated by pages), its unit, "" for ratios.
     compute
         Returns the figure of a session, None where it has none.
     higher_is_better
@@ -65,7 +65,7 @@ def _improvement_over_baseline(fold: SessionFold) -> float | None:
 
 
 def _retention_in_washout(fold: SessionFold) -> float | None:
-    """Share of the training gain that the washout keeps, in percent.
+    """Share of the training gain that remains in the washout, in percent.
 
     (washout − baseline) / (training − baseline) of the mean values; may leave 0-100 %. None where
     training gained less than MIN_TRAINED_GAIN of the baseline.
@@ -78,7 +78,7 @@ def _retention_in_washout(fold: SessionFold) -> float | None:
 
 
 def _attended(fold: SessionFold) -> float | None:
-    """1 for a session in which something was walked; sums count sessions."""
+    """1 for a session with a valid stride, else None: sums count sessions."""
     return 1.0 if fold.trained.valid else None
 
 

@@ -5,17 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from rehab.training.fold import SessionFold
-from rehab.training.fold.tallies import Block, Tally
+from rehab.training.fold.tallies import STRIDES, Block, Tally
 from rehab.training.summary.metrics import compute_metrics
 
 
 def summarize_tally(tally: Tally) -> dict[str, Any]:
     """Return the counts of some steps, their hit rate (ratio), and their means."""
     return {
-        "strides": tally.strides,
-        "valid": tally.valid,
-        "invalid": tally.invalid,
-        "missing": tally.missing,
+        **{name: getattr(tally, name) for name in STRIDES},
         "hits": tally.hits,
         "close": tally.close,
         "hit_rate": tally.hit_rate,
@@ -27,16 +24,15 @@ def summarize_tally(tally: Tally) -> dict[str, Any]:
 def summarize_session(fold: SessionFold) -> dict[str, Any]:
     """Return the figures of a session.
 
-    ``strides``, ``valid``, ``invalid`` and ``missing`` count the trained leg in every phase;
-    ``hits``, ``close``, ``hit_rate`` and ``score`` only feedback phases
-    (docs/reference/scoring.md#totals).
+    ``strides`` and their kinds (``STRIDES``) count the trained leg in every phase; ``hits``,
+    ``close``, ``hit_rate`` and ``score`` only feedback phases (docs/reference/scoring.md#totals).
     ``phases`` has one entry for all that are alike in name, kind, feedback, gain and valence (of
     feedback), with its single blocks: a phase in which the gain was changed has as many entries as
     it had gains.
     """
     whole, feedback = summarize_tally(fold.trained), summarize_tally(fold.feedback)
     return {
-        **{name: whole[name] for name in ("strides", "valid", "invalid", "missing")},
+        **{name: whole[name] for name in STRIDES},
         "hits": feedback["hits"],
         "close": feedback["close"],
         "hit_rate": feedback["hit_rate"],

@@ -82,7 +82,15 @@ class AvatarBase(KinematicBase):
         return ordered
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
-        """Show its state by its face and color; its voice belongs to its answers."""
+        """Show its state by its face and color.
+
+        Parameters
+        ----------
+        indication
+            The state; any but moving also ends its answer.
+        aloud
+            Has no effect: its voice belongs to its answers.
+        """
         if self._pages is not None:
             self._pages.show(state=str(indication))
             if indication is not Indication.MOVING:

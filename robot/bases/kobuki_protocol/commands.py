@@ -60,7 +60,15 @@ class Sound(NamedTuple):
 
     @classmethod
     def at(cls, frequency_hz: float, duration_s: float) -> Self:
-        """Return the note of a frequency [Hz] and a duration of up to 0.255 s."""
+        """Return the nearest note, by the unit of frequency in docs/reference/kobuki.md#commands.
+
+        Parameters
+        ----------
+        frequency_hz
+            From 6 Hz: slower ones do not fit into two bytes.
+        duration_s
+            Up to 0.255 s, which is what one byte of milliseconds holds.
+        """
         return cls(round(1 / (frequency_hz * 2.75e-6)), round(duration_s * 1000))
 
 

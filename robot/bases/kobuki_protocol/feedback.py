@@ -90,7 +90,7 @@ class CliffRaw(NamedTuple):
 
 
 class MotorCurrent(NamedTuple):
-    """Currents of the wheels [10 mA]; one byte each, whatever the table says.
+    """Currents of the wheels [10 mA]; one byte each, unlike in the protocol's table.
 
     Source: docs/reference/kobuki.md#feedback.
     """

@@ -19,7 +19,7 @@ FRAME_S = 0.02  # between two feedback frames (docs/reference/kobuki.md#feedback
 HEADER = b"\xaa\x55"
 # Bytes of a payload: id, length and one byte of data (docs/reference/kobuki.md#framing).
 SHORTEST = 3
-# Everything a base can say in one frame is 175 bytes (docs/reference/kobuki.md#feedback). A longer
+# All that a base can send in one frame is 175 bytes (docs/reference/kobuki.md#feedback). A longer
 # one is a false header, and waiting for its end would hold up the true frames behind it.
 LONGEST = 192
 
@@ -113,7 +113,15 @@ class FrameReader(Generic[T]):
 
 
 def sub_payload(number: int, data: bytes) -> bytes:
-    """Return a sub-payload: its id, its length and its data."""
+    """Return a sub-payload: its id, its length and its data.
+
+    Parameters
+    ----------
+    number
+        Its id, 0 to 255.
+    data
+        At most 255 bytes.
+    """
     return bytes((number, len(data))) + data
 
 
@@ -129,7 +137,22 @@ def split(payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def unpack(layout: Struct, number: int, data: bytes) -> tuple[Any, ...]:
-    """Return the fields of a sub-payload. Raises Malformed where its length is wrong."""
+    """Return the fields of a sub-payload.
+
+    Parameters
+    ----------
+    layout
+        Its fields, little-endian.
+    number
+        Its id, which the error names.
+    data
+        Its bytes.
+
+    Raises
+    ------
+    Malformed
+        Where its length is wrong.
+    """
     if len(data) != layout.size:
         raise Malformed(f"Sub-payload {number} has {layout.size} bytes, not {len(data)}.")
     return layout.unpack(data)

@@ -92,7 +92,15 @@ class RosbridgeBase(MobileBase):
             self._client.odometry.set_home()
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
-        """Show its state by its light, and by a short sound."""
+        """Show its state by its light.
+
+        Parameters
+        ----------
+        indication
+            The state.
+        aloud
+            Whether a short sound announces it too, if there is one for it.
+        """
         with self._bridge.sending():
             self._client.show(str(indication), aloud=aloud)
 

@@ -127,7 +127,20 @@ class BaseClient:
                 yield call_service(PUBLISHERS, {"topic": topic.name}, topic.name)
 
     def handle(self, incoming: Incoming, now_s: float) -> None:
-        """Handle a frame of the bridge. Raises BadRosFrame for impossible values."""
+        """Handle a frame of the bridge.
+
+        Parameters
+        ----------
+        incoming
+            A message on one of the topics, or a response of rosapi.
+        now_s
+            When it came, on a monotonic clock [s].
+
+        Raises
+        ------
+        BadRosFrame
+            For impossible values.
+        """
         if isinstance(incoming, ServiceResponse):
             self._handle_response(incoming)
             return

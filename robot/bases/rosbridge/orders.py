@@ -9,7 +9,7 @@ from robot.motion.limits import ORDER_HOLDS_S, WHEEL_LIMITS
 from robot.motion.twist import STILL, Twist
 
 # A stop is repeated this often [s]: one message may be lost, and a mux
-# gives a base to somebody else after 0.2 s without one (docs/reference/kobuki.md#watchdogs).
+# gives a base to another program after 0.2 s without one (docs/reference/kobuki.md#watchdogs).
 STILL_EVERY_S = 0.1
 # Bridges write numbers with 9 digits and more; these are what we order anyhow [m/s, rad/s].
 DIGITS, SAME = 4, 1e-5
@@ -52,7 +52,16 @@ class Orders:
         self.is_confirmed = False
 
     def order(self, twist: Twist, now_s: float) -> Twist:
-        """Store an order in place of the last one, and return what will be sent."""
+        """Store an order in place of the last one, and return what will be sent.
+
+        Parameters
+        ----------
+        twist
+            The velocity; its speeds are clipped and rounded. A motion becomes a stop until a stop
+            has been confirmed and ordered once more.
+        now_s
+            The time [s].
+        """
         clipped = WHEEL_LIMITS.clip(twist)
         twist = Twist(round(clipped.v_m_s, DIGITS), round(clipped.w_rad_s, DIGITS))
         if twist.is_still and self._is_stop_confirmed:

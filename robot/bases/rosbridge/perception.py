@@ -64,7 +64,7 @@ class ReportedOdometry:
         """Do nothing: the base reports how it moves."""
 
     def order(self, twist: Twist, now_s: float) -> None:
-        """Do nothing: the base reports how it follows."""
+        """Do nothing with ``twist`` at ``now_s``: the base reports how it follows."""
 
     def _update_pose(self) -> None:
         here = replace(self._last, heading_rad=self._heading_rad)
@@ -82,7 +82,7 @@ class DeadReckoning:
         self._until_s = self._ordered_s = -math.inf
 
     def order(self, twist: Twist, now_s: float) -> None:
-        """Store what was sent."""
+        """Store that ``twist`` was sent at ``now_s`` [s], after moving up to then."""
         self.move(now_s)
         self.twist, self._ordered_s = twist, now_s
 

@@ -10,11 +10,11 @@ from robot.ros.frames import Topic
 from robot.ros.messages import DOCK, HAZARDS, ODOMETRY, STRING, TWIST, TWIST_STAMPED
 
 BUMP = "bump"
-# What every topic of a Create 3's hazards stands for: all of them come on one.
+# The code of a Create 3's topic of hazards: all of them come on one.
 ALL_HAZARDS = "hazards"
 
-# The relay that stands still for us where we are gone (deploy/ros/garry_watchdog.py): what it
-# listens to, and where it says, ten times a second, for which topic it does so.
+# The relay that stops the base if our orders cease (deploy/ros/garry_watchdog.py): what it listens
+# to, and where it reports, ten times a second, which topic it serves.
 RELAY_INPUT = "/garry/cmd_vel"
 RELAY_ALIVE = Topic("/garry/watchdog", STRING)
 
@@ -34,7 +34,7 @@ class Topics:
     light, sound
         Show and sound its state.
     dock
-        Says whether it stands at its charger.
+        Reports whether it stands at its charger.
     voice, joints
         By which it answers beside its motion.
     own_timeout_s

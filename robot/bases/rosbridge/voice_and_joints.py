@@ -1,4 +1,4 @@
-"""What a base by ROS says, and how it holds its head or arms, beside its motion."""
+"""What a base by ROS says, and how it moves its head or arms, beside its driving."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robot.ros.frames import Frame, Topic, publish
 
 # The tip of an arm of 0.5 m then goes 0.25 m/s, the reduced speed of ISO 10218-1.
 FASTEST_RAD_S = 0.5
-PEAK = 1.5  # of a cubic from rest to rest: its fastest over its mean
+PEAK = 1.5  # peak over mean speed of a cubic from rest to rest
 SHORTEST_S = 0.6
 LONGEST_S = 3.0  # ours: ROS 2 has no message that ends a motion which was begun
 
@@ -22,7 +22,7 @@ HOLD: dict[str, Any] = {"joint_names": [], "points": []}
 
 @dataclass(frozen=True, slots=True)
 class Voice:
-    """Where a base is told what to say (std_msgs/String), and its words; empty: it says nothing."""
+    """Where to send what a base says (std_msgs/String), and its words; empty: it says nothing."""
 
     topic: Topic
     glad: str = ""

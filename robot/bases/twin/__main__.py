@@ -43,9 +43,20 @@ from robot.bases.twin.process import Twin
 
 
 def make_body(name: str, notice: Callable[[str], None]) -> WheeledBody:
-    """Return a body by its name, ``bullet`` or ``kinematic``; ``auto`` prefers physics.
+    """Return a body of the twin.
 
-    Raises ImportError where physics was asked for by name and is not there.
+    Parameters
+    ----------
+    name
+        ``bullet`` (with physics), ``kinematic``, or ``auto`` for the first of them that is
+        installed.
+    notice
+        Called with a line for people where ``auto`` finds no physics.
+
+    Raises
+    ------
+    ImportError
+        For ``bullet`` where pybullet is not installed.
     """
     if name != "kinematic":
         try:

@@ -49,7 +49,7 @@ class WheeledBody(Protocol):
     rolled_m: tuple[float, float]
 
     def roll(self, left_m_s: float, right_m_s: float) -> None:
-        """Turn its wheels for one frame's time at these speeds [m/s]."""
+        """Turn its wheels at ``left_m_s`` and ``right_m_s`` [m/s] for one frame's time."""
 
     def touch(self) -> Touch:
         """Return what it touches now."""
@@ -74,7 +74,7 @@ class KinematicBody:
         self.rolled_m = (0.0, 0.0)
 
     def roll(self, left_m_s: float, right_m_s: float) -> None:
-        """Turn its wheels for one frame's time at these speeds [m/s]."""
+        """Turn its wheels at ``left_m_s`` and ``right_m_s`` [m/s] for one frame's time."""
         twist = Twist.of_wheels(left_m_s, right_m_s)
         self.pose = advance(self.pose, twist, self._frame_s)
         self.turn_rad_s = twist.w_rad_s

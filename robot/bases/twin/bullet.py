@@ -108,7 +108,7 @@ class BulletBody:
         self.carry_home()
 
     def roll(self, left_m_s: float, right_m_s: float) -> None:
-        """Turn its wheels for one frame's time at these speeds [m/s]."""
+        """Turn its wheels at ``left_m_s`` and ``right_m_s`` [m/s] for one frame's time."""
         world = self._world
         if (left_m_s, right_m_s) != self._order:
             self._order = (left_m_s, right_m_s)

@@ -50,9 +50,9 @@ class Faults:
     held
         Share of its speed that something takes from it, 0 to 1: 1 is a foot in its way.
     drop, flip, duplicate
-        How probable it is that a byte of either direction is lost, has a bit flipped, comes twice.
+        Probabilities that a byte of either direction is lost, has a bit flipped, or comes twice.
     false_header
-        How probable it is that AA 55 comes before a frame.
+        Probability that AA 55 comes before a frame.
     """
 
     bumper: int = _fault(0, 0, 7)

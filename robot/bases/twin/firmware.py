@@ -133,7 +133,15 @@ class Firmware:
         self._drifted_deg = 0.0
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Handle bytes of the driver, damaged as the line's faults say."""
+        """Carry out the driver's commands.
+
+        Parameters
+        ----------
+        data
+            Bytes as they were sent; the line's faults damage them first.
+        now_s
+            When they come in [s].
+        """
         for commands in self.reader.feed(self.faults.damage(data, self._chance)):
             for command in commands:
                 self._execute(command, now_s)
@@ -189,7 +197,7 @@ class Firmware:
         rate_deg_s += self._chance.gauss(0.0, 1.0) * faults.gyro_noise_deg_s
         rate_deg_s = max(-GYRO_MAX_DEG_S, min(GYRO_MAX_DEG_S, rate_deg_s))
         angle = math.remainder(100 * (turned_deg + self._drifted_deg), 36_000)
-        # What holds a wheel is not the body's to know.
+        # The body does not know what holds a wheel.
         held_n_m = self.drive_train.force_n * WHEEL_M / 2
         left_n_m, right_n_m = (max(abs(torque), held_n_m) for torque in touch.torque_n_m)
         sample = (0, 0, round(rate_deg_s / GYRO_DIGIT_DEG_S))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-# A pty that nobody reads for this many frames is emptied, so that a driver that opens it reads the
+# A pty that is not read for this many frames is emptied, so that a driver that opens it reads the
 # present: a real port loses what it receives while it is not open, too.
 UNREAD_FRAMES = 10
 READ_SIZE = 4096

@@ -18,7 +18,7 @@ from robot.bases.twin.lines import Line
 from robot.motion.pose import HOME
 from robot.wire.frames import to_number
 
-HELD_BYTES = 4096  # of a stalled line, as many as a pty keeps; the oldest are lost
+HELD_BYTES = 4096  # of a stalled line, as many as a pty holds; the oldest are lost
 LATE_S = 0.1  # a twin that is later than this skips the time instead of catching up
 LONGEST_S = 3600.0
 
@@ -70,7 +70,20 @@ class Twin:
         self._held = self._held[-HELD_BYTES:]
 
     def execute(self, order: Mapping[str, Any], now_s: float) -> dict[str, Any]:
-        """Carry out an order to the twin at a time [s], and return the answer. Raises BadFault."""
+        """Carry out an order to the twin, and return the answer.
+
+        Parameters
+        ----------
+        order
+            A JSON object as in ``python -m robot twin --help``.
+        now_s
+            The time [s].
+
+        Raises
+        ------
+        BadFault
+            For an unknown order or fault, and for values out of bounds.
+        """
         match order:
             case {"do": "set", "name": str(name), "value": value}:
                 for_s = _seconds(order) if "for_s" in order else None

@@ -27,7 +27,7 @@ class Hidden:
 HIDDEN = {
     1: Hidden(
         "moment × gain has the curve, signs and times of a stronger ankle, and its lever on the "
-        "force, 0.10-0.16 m, stays that of a foot",
+        "force, 0.13-0.17 m (five people), stays that of a foot",
         "'lbf·ft would be as likely as Nm'; 'its size is … times off' from a factor of 1.28 on",
         ("moment × 0.7376", "moment × 0.8", "moment × 1.2"),
     ),

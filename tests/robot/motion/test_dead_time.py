@@ -5,12 +5,12 @@ import math
 import pytest
 
 from robot.bases.kinematic import Imperfections
+from robot.motion.base_response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.delay_meter import DelayMeter
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
 from robot.motion.pools import VARIANTS
 from robot.motion.pose import HOME, Pose, advance
-from robot.motion.response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.twist import STILL, Twist
 from tests.support.gesture_runs import play_in_a_row
 

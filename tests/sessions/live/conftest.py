@@ -15,7 +15,7 @@ from django.db import connections
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import commits
-from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import (

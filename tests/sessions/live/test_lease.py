@@ -9,9 +9,12 @@ from typing import Any
 
 import pytest
 from django.db import connection
+from django.test.utils import CaptureQueriesContext
 
 from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.database.lease import AnotherServer, Lease
+from rehab.sessions.models import TrainingSession
+from tests.support.callers import build_place, open_session
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
 
@@ -90,6 +93,21 @@ def test_an_owner_lives_as_long_as_its_lease_whatever_its_host_is_called():
     other.release()
     assert not owners.is_alive(owners.HANDED_ON)
     own.release()
+
+
+def test_what_a_beat_costs_does_not_depend_on_how_many_servers_there_are(two_servers):
+    live, _ = two_servers
+    dead = [f"{number:032}" for number in range(20)]
+    place = build_place("elm")
+    owned_by = {owner: open_session(place, at_station=False).pk for owner in (live.id, *dead)}
+    for owner, key in owned_by.items():
+        row = TrainingSession.everywhere.filter(pk=key)
+        row.update(owner=owner, state="running")
+    del owned_by[live.id]
+    sql("UPDATE rehab_server SET expires_at = clock_timestamp() + interval '9 s'")
+    with CaptureQueriesContext(connection) as asked:
+        assert owners.find_ownerless() == (sorted(owned_by.values()), [])
+    assert len(asked) == 1
 
 
 def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkeypatch):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from rehab.sessions.log import Step
 from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
-from rehab.training.cueing import CueTiming
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
+from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
 from robot.wire.cue_limits import CueRule
 from tests.support.callers import a_step, events_of, restart

@@ -13,7 +13,7 @@ from django.db import OperationalError
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session import commits, loading
-from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.log import RobotEntry, SessionEvent
 from rehab.stations.models import Station
 from tests.support.callers import change, restart, turns

@@ -9,6 +9,8 @@ from asgiref.sync import sync_to_async
 from django.contrib.sessions.models import Session
 from django.utils import timezone
 
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
@@ -88,6 +90,36 @@ async def test_a_tablet_goes_with_the_account_that_let_it_in(place, begun):
     again = await place.tablet(session).dial()
     assert (await again.sent_away())[0] == 4001
     await place.source().open()  # a program has no approver
+
+
+@pytest.mark.postgres
+@pytest.mark.parametrize("who", ["tablet", "monitor"])
+async def test_pages_outside_the_clinics_networks_end_when_they_come_to_be(place, begun, who):
+    session = await begun(place)
+    page = getattr(place, who)(session)
+    await page.watch()
+    agree = sync_to_async(record_consent)
+    await agree(place.patient, Purpose.REMOTE, None, timezone.now())
+    await name_networks(place)
+    await runtimes.current().routines.check_sign_ins()
+    assert page.code is None
+    await sync_to_async(withdraw_consent)(place.patient, Purpose.REMOTE, None, timezone.now())
+    assert (await page.sent_away())[0] == 4001
+    again = await getattr(place, who)(session).dial()
+    assert (await again.sent_away())[0] == 4004
+
+
+@pytest.mark.parametrize("who", ["tablet", "monitor"])
+async def test_pages_inside_the_clinics_networks_stay_open(place, begun, who):
+    page = await getattr(place, who)(await begun(place)).open()
+    await name_networks(place, "0.0.0.0/32")  # where sockets of tests come from
+    await runtimes.current().routines.check_sign_ins()
+    await page.overhear()
+    assert page.code is None
+
+
+async def name_networks(place, networks: str = "192.168.7.0/24") -> None:
+    await Clinic.everywhere.filter(pk=place.clinic.pk).aupdate(networks=networks)
 
 
 async def test_a_new_password_ends_open_sockets(place, begun):

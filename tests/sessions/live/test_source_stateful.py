@@ -14,8 +14,8 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers import source as source_consumers
 from rehab.sessions.live.session import commits
 from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.live.session.writer import Writer
 from rehab.training.steps import Measurement
 from tests.support import callers
 from tests.support.callers import Caller, build_place

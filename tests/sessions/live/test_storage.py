@@ -28,9 +28,9 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import lease
 from rehab.sessions.live.database import own_connection as own_connections
 from rehab.sessions.live.database.own_connection import own_connection
-from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.live.session.commits import Job
-from rehab.sessions.live.session.writer import LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS, Writer
+from rehab.sessions.live.session.group_commit import LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS, Writer
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import a_step, numbers, turns
 

@@ -22,6 +22,7 @@ from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State
+from rehab.training.measures import InvalidSetting, check_worn
 from rehab.training.steps import Measurement, Side
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame
@@ -63,6 +64,7 @@ class SourceConsumer(DeviceSocket):
         self, live: LiveSession, step: Measurement, received_at: datetime, *, is_marked: bool
     ) -> None:
         _check_open_steps(live)
+        _check_worn(step, live)
         # What a source calls late is no measure of its clock, which may be another one by now.
         late = is_marked or self.lateness.is_late(step.time_s, time.monotonic())
         live.record_step(step, received_at, late=late)
@@ -195,3 +197,11 @@ def _check_open_steps(live: LiveSession) -> None:
             "flood",
             f"Wait for acks: at most {MAX_STEPS} steps may be unacknowledged.",
         )
+
+
+def _check_worn(step: Measurement, live: LiveSession) -> None:
+    """Refuse a worn sensor's stride in a session of another measure. Raises BadFrame."""
+    try:
+        check_worn(step.extra, live.aggregate.fold.plan.measure)
+    except InvalidSetting as problem:
+        raise BadFrame(str(problem), "not_measured") from None

@@ -12,7 +12,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import format_device_state
+from rehab.stations.presence import format_device_states
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +29,16 @@ def station_statuses(
     user: User, open_sessions: list[TrainingSession], now: datetime
 ) -> Iterator[StationStatus]:
     """Yield the status of each station that a user sees."""
-    devices: defaultdict[int, list[Device]] = defaultdict(list)
-    for device in Device.objects.visible_to(user).order_by("kind", "name"):
-        devices[device.station_id].append(device)
+    devices: defaultdict[int, list[tuple[Device, str]]] = defaultdict(list)
+    own = list(Device.objects.visible_to(user).order_by("kind", "name"))
+    for device, state in format_device_states(own, now):
+        devices[device.station_id].append((device, state))
     at_station = {session.station_id: session for session in reversed(open_sessions)}
     for station in Station.objects.visible_to(user):
         session = at_station.get(station.pk)
         yield StationStatus(
             station,
-            [(device, format_device_state(device, now)) for device in devices[station.pk]],
+            devices[station.pk],
             session,
             connected_devices(session, now) if session else {},
         )

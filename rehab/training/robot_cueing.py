@@ -50,7 +50,7 @@ class CueTiming:
     window_s
         ``windows``: length of a window, by the source's clock [s].
     count
-        ``streaks``: steps in a row; ``steps``: steps of which each last one is answered.
+        ``streaks``: steps in a row; ``steps``: steps whose mean performance is answered.
     rest_s
         Least time from the start of one gesture to the start of the next [s].
 

@@ -5,7 +5,7 @@ from django.db import migrations, models
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0001_tables"),
+        ("rehab", "0002_trust33"),
     ]
 
     operations = [

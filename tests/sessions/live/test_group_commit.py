@@ -16,10 +16,10 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 
 from rehab.sessions.live.session import commits, instruments
-from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.commits import EarlierWriteFailed, Fenced, Job
-from rehab.sessions.live.session.writer import Writer
+from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind
@@ -167,7 +167,7 @@ async def test_a_fault_of_the_thread_fails_its_jobs_and_does_not_end_it(
         real_sleep(seconds)
 
     one, two = aggregates[:2]
-    monkeypatch.setattr("rehab.sessions.live.session.writer.time.sleep", sleep)
+    monkeypatch.setattr("rehab.sessions.live.session.group_commit.time.sleep", sleep)
     bench.writer._next_commit_s = time.monotonic() + 1000
     bench.walk(one)
     await until_done(bench, 4)
@@ -260,7 +260,7 @@ async def test_commits_keep_a_distance_only_while_several_sessions_walk(
         bench.walk(aggregates[0])
         await until_done(bench, count)
     waited: list[float] = []
-    monkeypatch.setattr("rehab.sessions.live.session.writer.time.sleep", waited.append)
+    monkeypatch.setattr("rehab.sessions.live.session.group_commit.time.sleep", waited.append)
     monkeypatch.setattr(writers, "SPACING_S", 1000.0)
     for count in range(6, 8):  # one session's, one after the other
         bench.walk(aggregates[0])

@@ -1,0 +1,99 @@
+"""The limits of ``plausibility``, measured on the clean strides of five people.
+
+Each lies beyond what all of them reach by the margin that is named here, so that a sixth may differ
+from them by as much again.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rehab.gait.signals.filters import find_last
+from rehab.gait.stances import analysis, plausibility
+from rehab.gait.stances.analysis import StanceAnalyzer
+from tests.gait.corpus import READERS, find_clean, open_corpus
+
+
+def describe(analyzer, contact, stance, push_off) -> dict[str, float]:
+    """Return the figures of a stance that limits judge."""
+    force_n = stance.signals[0] - contact.offset_n
+    moment_nm = stance.signals[1]
+    begin, end, half = stance.begin, stance.end, stance.index(0.5)
+    toes = slice(stance.index(plausibility.LEVER_FROM), end + 1)
+    loaded = force_n[toes] > plausibility.LEVER_FORCE * analyzer._weight_n
+    late_n, late_nm = force_n[half : end + 1], moment_nm[half : end + 1]
+    leaving = find_last(late_n > plausibility.LEAVING_SHARE * late_n.max())
+    swing = np.abs(push_off.moment_nm_kg[: begin - round(plausibility.SWING_S * stance.rate_hz)])
+    angle = push_off.angle_rad[begin : end + 1]
+    last = end - round(plausibility.BACKWARD_S * stance.rate_hz)
+    share = (push_off.a2_time_s - stance.begin_s) / (stance.end_s - stance.begin_s)
+    lever_m = plausibility._find_lever(late_n, late_nm, int(late_nm.argmax()))
+    return {
+        "force": contact.peak_n / analyzer._weight_n,
+        "lever": float((moment_nm[toes][loaded] / force_n[toes][loaded]).max()),
+        "lever change": plausibility._find_lever(late_n, late_nm, leaving) / lever_m,
+        "moment": push_off.moment_peak_nm_kg,
+        "moment in swing": float(swing.max()) / push_off.moment_peak_nm_kg,
+        "drift": float(np.median(swing)),
+        "angle": float(np.ptp(angle)),
+        "peak": share,
+        "a2": push_off.a2_w_kg,
+        "braking": -float(push_off.power_w_kg[push_off.peak : end + 1].min()) / push_off.a2_w_kg,
+        "turning": float(push_off.velocity_rad_s[last : end + 1].min())
+        / push_off.a2_velocity_rad_s,
+    }
+
+
+@cache
+def measure_people() -> dict[str, list[dict[str, float]]]:
+    """Return the figures of each clean stride of the corpus, by walk."""
+    found = defaultdict(list)
+    check = StanceAnalyzer._check_push_off
+    with pytest.MonkeyPatch.context() as patch:
+        for name in READERS:
+            walk = open_corpus(name)
+            ends_s = np.array([one.end_s for one in find_clean(walk)])
+
+            def watch(analyzer, contact, stance, push_off, *rest, name=name, ends_s=ends_s):
+                if np.abs(ends_s - stance.end_s).min() < 0.05:
+                    found[name].append(describe(analyzer, contact, stance, push_off))
+                return check(analyzer, contact, stance, push_off, *rest)
+
+            patch.setattr(analysis.StanceAnalyzer, "_check_push_off", watch)
+            walk.measure()
+    return dict(found)
+
+
+LEAST, MOST = plausibility.LEVER_CHANGE
+LIMITS = {  # the figure, its least and its largest allowed value, and the margin
+    "force": (plausibility.FULL_LOAD, plausibility.FORCE_MAX, 1.25),
+    "lever": (None, plausibility.LEVER_MAX_M, 1.2),
+    "lever change": (LEAST, MOST, 1.1),
+    "moment": (plausibility.MOMENT_MIN, plausibility.MOMENT_MAX, 1.9),
+    "moment in swing": (None, plausibility.MOMENT_SWING, 9),
+    "drift": (None, plausibility.MOMENT_DRIFT, 2.2),
+    "angle": (plausibility.ANGLE_RANGE_MIN, plausibility.ANGLE_RANGE_MAX, 4),
+    "peak": (plausibility.PEAK_FROM, None, 1.4),
+    "a2": (None, plausibility.A2_MAX, 2.5),
+    "braking": (None, plausibility.REVERSED_SHARE, 10),
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_limits_lie_beyond_what_five_people_reach(name):
+    least, most, margin = LIMITS[name]
+    people = measure_people()
+    assert len(people) == len(READERS) == 5
+    values = [one[name] for strides in people.values() for one in strides]
+    assert len(values) > 60
+    assert least is None or min(values) > margin * least
+    assert most is None or max(values) * margin < most
+
+
+def test_no_ankle_turns_back_before_its_foot_leaves():
+    turning = [one["turning"] for strides in measure_people().values() for one in strides]
+    assert min(turning) > plausibility.BACKWARD_SHARE

@@ -1,0 +1,117 @@
+"""A real server shows who must not know an arm the same whichever it is: pages and sockets."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.servers import Server, serve
+from tests.support.trials import AS_ACCOUNT, FAMILY, LEFT_OUT, STALE, TABLETS, VARYING
+from tests.support.visitors import Visitor
+
+pytestmark = pytest.mark.server
+SETTINGS = {"GARRY_PROXIES": "1"}
+SEED = """
+import json, os
+os.environ["GARRY_TEST_CLOCK"] = "{now}"
+from django.test.utils import setup_test_environment
+from tests.support.trials import Trial, become
+
+setup_test_environment()
+trial = Trial(ended={ended})
+actors = become(trial, trial.assessor, trial.earlier)
+entered = {{
+    name: {{
+        "cookies": {{key: one.value for key, one in client.cookies.items()}},
+        "token": client.defaults.get("HTTP_AUTHORIZATION", "").removeprefix("Bearer "),
+    }}
+    for name, client in actors.items()
+}}
+print(json.dumps({{
+    "actors": entered, "addresses": trial.addresses(), "family": trial.family,
+    "sessions": [session.pk for session in trial.sessions],
+}}))
+"""
+EXCHANGE = """
+from rehab.sessions.models import TrainingSession
+from tests.support.trials import Trial
+
+trial = Trial.__new__(Trial)
+trial.sessions = list(TrainingSession.everywhere.filter(pk__in={sessions}).order_by("pk"))
+trial.study = trial.sessions[0].study_visit.enrollment.study
+trial.exchange()
+"""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(True, marks=pytest.mark.long, id="ended"), pytest.param(False, id="open")],
+)
+def seeded(request: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """Return a folder with a blinded trial, and what its assessor can become."""
+    folder = tmp_path_factory.mktemp("data")
+    with serve(folder, settings=SETTINGS) as server:
+        now = datetime.now(UTC).isoformat()
+        said = server.run_shell(SEED.format(now=now, ended=request.param))
+    return folder, json.loads(said.splitlines()[-1])
+
+
+def look(server: Server, trial: dict[str, Any]) -> dict[tuple[str, ...], str]:
+    """Return what pages and sockets of the participants answer each actor."""
+    seen = {}
+    sockets = [
+        f"/ws/session/{session}/{page}/"
+        for session in trial["sessions"]
+        for page in ("patient", "monitor")
+    ]
+    for name, entered in trial["actors"].items():
+        visitor = Visitor(server.url, **entered)
+        family = trial["family"] if name == FAMILY else []
+        for url in [*trial["addresses"], *family]:
+            for method in ("GET", "POST"):
+                answer = visitor.request(method, url)
+                assert answer.status < 500, url
+                place = answer.headers.get("Location", "")
+                seen[name, method, url] = f"{answer.status} {place} {answer.text}"
+        for url in sockets:
+            seen[name, "socket", url] = str(visitor.watch(url))
+    return {key: VARYING.sub("", said) for key, said in seen.items()}
+
+
+def find_differences(
+    folder: Path, trial: dict[str, Any], program: Sequence[str]
+) -> set[tuple[str, ...]]:
+    """Return who is answered otherwise, and where, once the arms are exchanged."""
+    looks = []
+    for _ in range(2):
+        with serve(folder, settings=SETTINGS, program=program) as server:
+            looks.append(look(server, trial))
+            server.run_shell(EXCHANGE.format(**trial))
+    before, after = looks
+    assert before.keys() == after.keys()
+    assert {name for name, *_ in before} == {*AS_ACCOUNT, *TABLETS, FAMILY, STALE}
+    return {key for key, said in before.items() if after[key] != said}
+
+
+def test_whatever_an_assessor_becomes_is_answered_the_same(seeded, tmp_path):
+    folder, trial = seeded
+    assert (
+        find_differences(shutil.copytree(folder, tmp_path / "data"), trial, ["manage.py"]) == set()
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rule", LEFT_OUT)
+def test_a_rule_that_is_left_out_is_found(seeded, tmp_path, rule):
+    folder, trial = seeded
+    leaky = ["-m", "tests.support.leaky_server", rule]
+    found = find_differences(shutil.copytree(folder, tmp_path / "data"), trial, leaky)
+    assert {name for name, *_ in found} == LEFT_OUT[rule][-1]
+    if rule.startswith("an assessor"):
+        assert any(how == "socket" for _, how, _ in found)
