@@ -14,7 +14,7 @@ from robot.marking import gettext_noop
 
 # By language: the longest phrase, and the longest word in it, that the largest words have room for
 # on a tablet (tests/browser/test_word_sizes.py). Of a language that is not here: the last of them.
-LENGTHS = {"en": (24, 12), "de": (26, 13), "es": (26, 13), "fr": (26, 13)}
+LENGTHS = {"en": (24, 12), "de": (30, 13), "es": (30, 13), "fr": (30, 13)}
 APART = 6  # phrases that come before one may come again, where a pool has at least twice as many
 
 
@@ -126,9 +126,9 @@ STRONGEST = join(
 
 FAR_BELOW = join(
     gettext_noop("Far below the goal."),
-    gettext_noop("Well below the goal."),
+    gettext_noop("Clearly below."),
     gettext_noop("Far under the goal."),
-    gettext_noop("Well under the goal."),
+    gettext_noop("Clearly under."),
     gettext_noop("Far from the goal."),
     gettext_noop("A long way below."),
     gettext_noop("Much below the goal."),

@@ -70,7 +70,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(words).to_have_text("You reached the goal!")  # not before the next step
         feet.walk(1.0)
         at_step(tablet, 2)
-        expect(words).to_have_text("Nearly there. Keep walking.")
+        expect(words).to_have_text("Nearly there.")
 
         monitor.locator("[data-gains] [value='0.85']").click()
         expect(monitor.locator("[data-gains] .on")).to_have_text("0.85")

@@ -7,7 +7,7 @@ const INCH_MM = 25.4;
 const USUAL = 4; // pixels a millimeter, to begin with
 // Of a page of words and a number: letters of the longest phrase and word (rehab/training/phrases.py), their width, a
 // line's height and the number's with its label.
-const LETTERS = { phrase: 26, word: 12 };
+const LETTERS = { phrase: 30, word: 12 };
 const LETTER_WIDTH = 0.56;
 const LINE = 1.04;
 const NUMBER = 2.1;
