@@ -48,6 +48,8 @@ PT_PAGES = [
     "/tablets/pair/",
     "/first-steps/?step=station",
     "/stations/",
+    "/incidents/",
+    "/screen-size/",
     "/insight/?goal=any",
     "/help/",
     "/account/",
