@@ -81,7 +81,7 @@ class BandForm(forms.ModelForm):
                 self.initial.setdefault(name, self.instance.words.get(language, ""))
             self.fields[name].widget.attrs |= {
                 "lang": language,
-                "class": "vLargeTextField",
+                "class": "vTextField",
                 "rows": 4,
             }
             if self.instance.pk is not None:  # the words where the clinic writes none
