@@ -38,7 +38,7 @@ MEASURE = """() => {
   const size = (name) => parseFloat(getComputedStyle(document.querySelector(name)).fontSize);
   const box = (name) => { const { left, top, right, bottom } =
     document.querySelector(name).getBoundingClientRect(); return [left, top, right, bottom]; };
-  const shown = (name) => document.querySelector(name).checkVisibility();
+  const shown = (name) => getComputedStyle(document.querySelector(name)).display !== "none";
   const { drop, short } = document.body.dataset;
   const probe = document.body.appendChild(document.createElement("i"));
   probe.style.cssText = "position: absolute; width: var(--degree)";
