@@ -249,7 +249,7 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
             expect(said).to_have_text("There is no connection. Try again in a moment.")
 
         wire.come_up()
-        expect(monitor.locator(".notice.link")).to_be_hidden()
+        expect(monitor.locator("[data-alarm=server]")).to_have_count(0)
         expect(why).to_have_text("")
         stop.click()
         hear(robot, "stop")
