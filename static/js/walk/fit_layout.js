@@ -4,8 +4,8 @@
 
 const CHART = 1;
 const LEVELS = [0, CHART, 2, 3];
-const SMALLER = 0.96;
-const LEAST = 0.2;
+const LEAST = 0.1; // of the promised size
+const HALVINGS = 9; // of the search for what fits
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -42,7 +42,7 @@ export function createFitting(body, scene) {
 
   function set(drop, short) {
     body.dataset.drop = drop;
-    if (short < 1) body.dataset.short = short.toFixed(2);
+    if (short < 1) body.dataset.short = short.toFixed(4);
     else delete body.dataset.short;
     body.style.setProperty("--short", short);
   }
@@ -61,12 +61,21 @@ export function createFitting(body, scene) {
     fitted = wanted;
     const shown = [...samples, words.textContent];
     const levels = isFeedback ? LEVELS.slice(column === "center" ? CHART : 0) : [0, CHART];
-    let [short, level] = [1, levels[0]];
+    let level;
     for (level of levels) {
       set(level, 1);
       if (!tooLarge(shown, number)) break;
     }
-    while (tooLarge(shown, number) && short > LEAST) set(level, (short *= SMALLER));
+    if (tooLarge(shown, number)) {
+      let [fits, not] = [LEAST, 1];
+      for (let i = 0; i < HALVINGS; i++) {
+        const short = (fits + not) / 2;
+        set(level, short);
+        if (tooLarge(shown, number)) not = short;
+        else fits = short;
+      }
+      set(level, fits);
+    }
     scene.layOut(level);
   };
 }
