@@ -35,10 +35,10 @@ ALIKE_IN = {
     "es": "factor robot sensor extra normal plan",
     "de": "arm code codes design feedback hedges minus monitor name normal passkey patient pause "
     "person phase plan plus sensor start tablet tablets training",
-    "fr": "code correction corrections date description effort migrations minutes moment normal "
-    "options pages participant participants patient patients pause performance phase phases plan "
-    "plus point points position questionnaire questionnaires questions robot signature source type "
-    "variation version",
+    "fr": "cadence code correction corrections date description effort incident incidents "
+    "migrations minutes moment normal options pages participant participants patient patients pause "
+    "performance phase phases phrases plan plus point points position questionnaire "
+    "questionnaires questions robot signature source type variation version",
 }
 
 

@@ -100,7 +100,9 @@ class Page(HTMLParser):
             elif given.get("type") == "number" and name in {"min", "max", "step", "value"}:
                 self.numbers += [(f"{tag} {name}", value)] * (value not in {"", "any"})
         self._json = tag == "script" and given.get("type") in {"application/json", "importmap"}
-        silent = tag in {"script", "style", "code", "pre"} or given.get("translate") == "no"
+        silent = (
+            tag in {"script", "style", "code", "pre", "textarea"} or given.get("translate") == "no"
+        )
         if tag == "option" and given.get("lang"):
             silent = True
         if tag not in VOID:

@@ -19,8 +19,8 @@ PLACES = (ROOT, ROOT / "rehab", ROOT / "rehab" / "sessions")
 PATH = re.compile(r"`([\w./<>-]+/|[\w./<>-]+\.(?:py|js|html|css|md))`|\b(docs/[\w.-]+\.md)")
 NAME = re.compile(r"`@?(?:\w+\.)*([A-Za-z_]\w+)(?:\(.*?\))?`")
 DEFINITION = re.compile(
-    r"^\s*(?:(?:async )?def|class|(?:export )?function|const) (\w+)|^\s*(\w+)(?:: [^=\n]+)?(?: =|$)"
-    r"|^\s*(\w+): ",
+    r"^\s*(?:(?:async )?def|class|(?:export )?(?:function|const)) (\w+)"
+    r"|^\s*(\w+)(?:: [^=\n]+)?(?: =|$)|^\s*(\w+): ",
     re.MULTILINE,
 )
 

@@ -624,8 +624,16 @@ class Migration(migrations.Migration):
                         blank=True, editable=False, max_length=32, verbose_name="browser"
                     ),
                 ),
-                ("screen_px_per_mm", models.FloatField(editable=False, null=True)),
-                ("screen_distance_m", models.FloatField(default=1.5, editable=False)),
+                (
+                    "screen_px_per_mm",
+                    models.FloatField(
+                        editable=False, null=True, verbose_name="pixels a millimeter"
+                    ),
+                ),
+                (
+                    "screen_distance_m",
+                    models.FloatField(default=1.5, editable=False, verbose_name="viewing distance"),
+                ),
                 (
                     "approver",
                     models.ForeignKey(

@@ -105,7 +105,7 @@ def describe_cue(fold: SessionFold) -> Message:
         "rest_s": timing.rest_s,
         "intensity": fold.robot_intensity,
         "only_informs": not fold.valence.has_points,
-        "seed": fold.plan.variety_seed,
+        "seed": fold.plan.seed or None,
         "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
     }
 

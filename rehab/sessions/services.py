@@ -32,6 +32,7 @@ from rehab.training.phases import Phase
 from rehab.training.plans import PlanSettings, SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence, find_valence
+from robot.wire.cue_limits import SEED_MAX
 
 
 class StationTaken(InvalidSetting):
@@ -166,14 +167,14 @@ def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPl
         valence=valence,
         phases=tuple(phases),
         trained_side=side,
-        **{one.name: getattr(request, one.name) for one in fields(PlanSettings)},
+        **{one.name: getattr(request, one.name) for one in fields(PlanSettings)}
+        | {"seed": request.seed or 1 + secrets.randbelow(SEED_MAX)},
         close_steps=request.protocol.close_steps(patient.language)
         if request.protocol
         else CloseSteps(),
         gestures=tuple(gestures.values()),
         alternatives=tuple(alternatives),
         language=patient.language,
-        seed=secrets.randbelow(2**31),
     )
 
 

@@ -17,6 +17,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm
 from rehab.people.web.token_admin import TokenAdmin
+from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import PinForm
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_device_state, format_device_states
@@ -67,7 +68,7 @@ class StationAdmin(ScopedAdmin):
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Station]:
         """Return the visible stations with their devices."""
-        devices = Device.objects.visible_to(request.user).order_by("name")
+        devices = with_trust(Device.objects.visible_to(request.user)).order_by("name")
         return super().get_queryset(request).prefetch_related(Prefetch("devices", devices))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
@@ -128,6 +129,10 @@ class DeviceAdmin(TokenAdmin):
     )
     readonly_fields = ("state", *TokenAdmin.readonly_fields, *approval)
     radio_fields = {"kind": admin.HORIZONTAL}
+
+    def get_queryset(self, request: HttpRequest) -> QuerySet[Device]:
+        """Return the visible devices, with what their state follows from."""
+        return with_trust(super().get_queryset(request))
 
     @admin.display(description=_("state"), ordering="last_seen_at")
     def state(self, device: Device) -> str:

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime, timedelta
 
-from django.db.models import F, Q, QuerySet
+from django.db.models import BooleanField, ExpressionWrapper, F, Q, QuerySet
+from django.db.models.functions import Coalesce
 from django.utils.translation import gettext as _
 
 from rehab.people.models import User
@@ -55,14 +56,25 @@ def is_trusted() -> Q:
     return ~Q(kind=Device.Kind.TABLET) | approved
 
 
+def with_trust(devices: QuerySet[Device]) -> QuerySet[Device]:
+    """Return devices that know whether they are trusted, so that a list of them asks once."""
+    condition = ExpressionWrapper(is_trusted(), BooleanField())
+    return devices.annotate(is_trusted=Coalesce(condition, False))
+
+
 def find_ended(devices: Iterable[Device], now: datetime) -> set[int]:
     """Return the keys of those tablets that have lost their approver or were not used for long."""
-    used = {
-        device.pk: device.last_seen_at or device.approved_at or device.created_at
-        for device in devices
-        if device.kind == Device.Kind.TABLET
+    tablets = {device.pk: device for device in devices if device.kind == Device.Kind.TABLET}
+    trusted = {pk for pk, device in tablets.items() if device.is_trusted}
+    if unknown := [pk for pk, device in tablets.items() if device.is_trusted is None]:
+        known = Device.everywhere.filter(is_trusted(), pk__in=unknown)
+        trusted |= set(known.values_list("pk", flat=True))
+
+    def used_at(device: Device) -> datetime:
+        return device.last_seen_at or device.approved_at or device.created_at
+
+    return {
+        pk
+        for pk, device in tablets.items()
+        if pk not in trusted or now - used_at(device) >= UNUSED_FOR
     }
-    if not used:
-        return set()
-    trusted = Device.everywhere.filter(is_trusted(), pk__in=used).values_list("pk", flat=True)
-    return used.keys() - {pk for pk in trusted if now - used[pk] < UNUSED_FOR}

@@ -51,6 +51,7 @@ class Device(TokenModel):
 
     actor_kind = "device"
     scope = Scope(clinic="clinic")
+    is_trusted: bool | None = None  # where a query says it (device_trust.with_trust)
 
     clinic = models.ForeignKey(
         Clinic, on_delete=models.PROTECT, related_name="devices", verbose_name=_("clinic")
@@ -84,8 +85,8 @@ class Device(TokenModel):
     browser = models.CharField(_("browser"), max_length=32, blank=True, editable=False)
 
     # Of a tablet's screen: CSS pixels a millimeter, and from how far the patient reads it.
-    screen_px_per_mm = models.FloatField(null=True, editable=False)
-    screen_distance_m = models.FloatField(default=1.5, editable=False)
+    screen_px_per_mm = models.FloatField(_("pixels a millimeter"), null=True, editable=False)
+    screen_distance_m = models.FloatField(_("viewing distance"), default=1.5, editable=False)
 
     address = ""  # from which this object's holder connects
     given_hash = ""  # of the successor that this object's holder was given

@@ -44,8 +44,8 @@ def next_visit(enrollment: Enrollment) -> StudyVisit | None:
     return None
 
 
-def variety_seed(study_id: int, visit: int) -> int:
-    """Return the seed of the robot's varied answers: the same for all participants at a visit."""
+def seed_of(study_id: int, visit: int) -> int:
+    """Return the seed of phrases and robot's variants: one for all participants at a visit."""
     return (study_id * 1000 + visit) % SEED_MAX
 
 
@@ -118,7 +118,7 @@ def start_session(
                 measure=arm.measure,
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
-                variety_seed=variety_seed(study.pk, visit.number),
+                seed=seed_of(study.pk, visit.number),
                 created_by=by,
                 locked=True,
                 **{part.name: getattr(place, part.name) for part in fields(place)},

@@ -76,8 +76,8 @@ class PlanSettings:
         Whether phrases of a band's pool take turns; else its first one is always the one.
     adaptation
         Whether goals follow the patient.
-    variety_seed
-        What the robot's varied answers follow from; None for the session's number.
+    seed
+        What the order of phrases and of the robot's variants follows from; 0 to have one drawn.
     locked
         Whether what defines the condition stays as it was planned: in a study's session.
     """
@@ -90,7 +90,7 @@ class PlanSettings:
     schedule: Schedule = field(default_factory=Schedule)
     words_vary: bool = True
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
-    variety_seed: int | None = None
+    seed: int = 0
     locked: bool = False
 
 
@@ -112,8 +112,6 @@ class SessionPlan(PlanSettings):
         Which steps are too uncertain to count as hit or miss.
     language
         Of the plan's texts.
-    seed
-        From which the order of phrases follows: with it the log tells which one a step brought.
 
     Raises
     ------
@@ -131,7 +129,6 @@ class SessionPlan(PlanSettings):
     alternatives: tuple[Valence, ...] = ()
     close_steps: CloseSteps = field(default_factory=CloseSteps)
     language: str = "en"
-    seed: int = 0
 
     def __post_init__(self) -> None:
         if not self.phases:
@@ -192,7 +189,6 @@ class SessionPlan(PlanSettings):
             cue_timing=_read_cue_timing(data.get("cue_timing", {})),
             schedule=_read_schedule(data.get("schedule", {})),
             adaptation=_read_adaptation(data.get("adaptation")),
-            variety_seed=data.get("variety_seed"),
             close_steps=CloseSteps(**data.get("close_steps", {})),
             locked=data.get("locked", False),
             language=data.get("language", "en"),

@@ -48,6 +48,7 @@ PLAN = Row(
     activation_threshold=0.83,
     cue_timing=Row(rule="streaks", window_s=6.4, count=7, rest_s=8.5),
     schedule=Row(kind="faded", interval=9, band=0.11),
+    words_vary="<words_vary>",
     adaptation=Row(mode="suggest"),
     close_steps=Row(part=0.12),
 )

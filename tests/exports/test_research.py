@@ -119,7 +119,7 @@ def test_the_words_and_confetti_are_those_that_the_page_was_told(world):
     assert [row["number"] for row in told] == [1, 2, 3, 4, 6]
     plan = session.to_plan()
     bands = plan.valence.band(1.25), plan.valence.band(0.75)
-    assert [row["words"] for row in told[:2]] == [band.words for band in bands]
+    assert [row["words"] for row in told[:2]] == [band.phrases[0] for band in bands]
     assert [row["confetti"] for row in told[:2]] == [band.confetti for band in bands]
     steps = {step.number: step.points for step in Step.everywhere.filter(session=session)}
     assert all(row["points"] == steps[row["number"]] for row in told[:4])

@@ -33,7 +33,7 @@ def missing_parts(valence: Valence) -> Iterator[str]:
     for file, text, part in wanted:
         if text not in (ROOT / file).read_text():
             yield f"{file}: {part}"
-    words = [valence.label, *(band.words for band in valence.bands)]
+    words = [valence.label, *(phrase for band in valence.bands for phrase in band.phrases)]
     for catalog in sorted(ROOT.glob("locale/*/LC_MESSAGES/django.po")):
         known = {entry.msgid for entry in polib.pofile(str(catalog)) if entry.translated()}
         for text in words:

@@ -190,6 +190,7 @@ def test_columns_as_they_are_chosen():
         write_columns(chosen, {"column": "t", "factor": "one"})
 
 
+@pytest.mark.django_db
 def test_one_file_is_checked_at_a_time_and_after_everything_else(monkeypatch):
     """So a person who sends many files takes no processor from a training."""
     began: list[list[str]] = []

@@ -28,7 +28,7 @@ def session(world: World, station: Station) -> TrainingSession:
 
 
 def walk_page(client: Client, session: TrainingSession, query: str = "") -> str:
-    return client.get(f"/sessions/{session.pk}/{query}").content.decode()
+    return " ".join(client.get(f"/sessions/{session.pk}/{query}").content.decode().split())
 
 
 def test_a_tablet_keeps_its_size_and_the_mirror_shows_it(world, station, session):

@@ -255,7 +255,7 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     assert again.to_plan().robot_intensity == 0
     assert again.to_plan().activation_threshold == 0.7
     assert again.to_plan().adaptation.mode == "off"
-    varied = ("goal", "robot_intensity", "activation_threshold", "adaptation")
+    varied = ("goal", "robot_intensity", "activation_threshold", "adaptation", "seed")
     alike = dict.fromkeys(varied)
     assert again.plan | alike == session.plan | alike
 

@@ -19,7 +19,7 @@ from rehab.studies.registration.document import describe, digest_of
 from rehab.studies.registration.lifecycle import close, current_version, register, revise, start
 from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.unblinding import take_mark
-from rehab.studies.visits import Place, start_session, variety_seed
+from rehab.studies.visits import Place, seed_of, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World
@@ -294,8 +294,8 @@ def test_the_robot_s_variants_follow_from_one_seed_for_all_participants_at_a_vis
         start_session(enrolled(study, new_patient(world, number)), Place(), None, NOW).plan
         for number in (1, 2)
     ]
-    assert plans[0]["variety_seed"] == plans[1]["variety_seed"] == variety_seed(study.pk, 1)
-    assert variety_seed(study.pk, 2) != variety_seed(study.pk, 1)
+    assert plans[0]["seed"] == plans[1]["seed"] == seed_of(study.pk, 1)
+    assert seed_of(study.pk, 2) != seed_of(study.pk, 1)
 
 
 def test_a_follow_up_is_registered_planned_and_walked_without_feedback(world):

@@ -17,6 +17,7 @@ from rehab.people.roles import Right, Role, rights_of
 from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import renew_token
 from rehab.stations.builtin import first_station
+from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_device_states
@@ -28,7 +29,11 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     """List the clinic's stations with their devices, and how well each is heard."""
     user, now = user_of(request), timezone.now()
     first_station(clinic_of(user))
-    devices = Device.objects.visible_to(user).select_related("approver").order_by("kind", "name")
+    devices = (
+        with_trust(Device.objects.visible_to(user))
+        .select_related("approver")
+        .order_by("kind", "name")
+    )
     stations = Station.objects.visible_to(user).prefetch_related(Prefetch("devices", devices))
     context = {
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
