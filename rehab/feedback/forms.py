@@ -16,7 +16,10 @@ from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
 from rehab.training.bands import TEXT_MAX, Band
 from rehab.training.measures import InvalidSetting
+from rehab.training.phrases import LENGTHS
 from rehab.training.valences import VALENCES
+
+POOL_MAX = 40  # phrases of a band
 
 
 def word_fields() -> dict[str, str]:
@@ -76,7 +79,11 @@ class BandForm(forms.ModelForm):
         for name, language in word_fields().items():
             if self.instance.pk is not None:
                 self.initial.setdefault(name, self.instance.words.get(language, ""))
-            self.fields[name].widget.attrs |= {"lang": language, "class": "vTextField"}
+            self.fields[name].widget.attrs |= {
+                "lang": language,
+                "class": "vTextField",
+                "rows": 4,
+            }
             if self.instance.pk is not None:  # the words where the clinic writes none
                 placeholder = self.instance.default_words(language)
                 self.fields[name].widget.attrs["placeholder"] = placeholder
@@ -85,15 +92,28 @@ class BandForm(forms.ModelForm):
         """Collect the words of all languages."""
         cleaned: dict[str, Any] = super().clean() or self.cleaned_data
         words = {language: cleaned.get(name, "") for name, language in word_fields().items()}
+        for name, language in word_fields().items():
+            longest, word = LENGTHS.get(language, LENGTHS["fr"])
+            for phrase in words[language].splitlines():
+                if len(phrase) > longest or max(map(len, phrase.split()), default=0) > word:
+                    message = _(
+                        "“%(phrase)s” is too long: at most %(longest)s letters, and %(word)s in a "
+                        "word, fit a tablet in the largest size."
+                    )
+                    values = {"phrase": phrase, "longest": longest, "word": word}
+                    self.add_error(name, message % values)
+                    break
         self.instance.words = {language: text for language, text in words.items() if text}
         return cleaned
 
 
 for _field, _language in word_fields().items():
     BandForm.base_fields[_field] = forms.CharField(
-        label=format_lazy(_("words, {language}"), language=dict(LANGUAGES)[_language]),
-        max_length=TEXT_MAX,
+        label=format_lazy(_("phrases, {language}"), language=dict(LANGUAGES)[_language]),
+        help_text=_("One a line; they take turns."),
+        max_length=POOL_MAX * TEXT_MAX,
         required=False,
+        widget=forms.Textarea,
     )
     BandForm.declared_fields[_field] = BandForm.base_fields[_field]
 

@@ -64,7 +64,7 @@ def _make_step(valence: Valence, band: Band, performance: float) -> PreviewStep:
         begins=f"{100 * band.from_performance:.0f}",
         level=min(performance / SCALE, 1),
         is_hit=hit,
-        words=band.words,
+        words=next(iter(band.phrases), ""),
         emblem=valence.emblem(hit).value,
         sign=f"{'+' if points > 0 else '−'}{abs(points)}" if points else "",
         confetti=band.confetti,

@@ -45,6 +45,6 @@ def pick_words(language: str, own: Mapping[str, str], default: str) -> str:
 
 
 def translate(words: str, language: str) -> str:
-    """Return default words in a language; untranslated where it has none for them."""
+    """Return default words in a language; phrases that it has none for stay as they are."""
     with override(language):
-        return gettext(words)
+        return "\n".join(map(gettext, words.splitlines()))

@@ -27,7 +27,7 @@ LEASES = """
 CREATE TABLE rehab_server (
     id varchar(32) PRIMARY KEY,
     address varchar(200) NOT NULL,
-    shares boolean NOT NULL,
+    ready boolean NOT NULL,
     expires_at timestamp with time zone NOT NULL
 )
 """
@@ -624,6 +624,8 @@ class Migration(migrations.Migration):
                         blank=True, editable=False, max_length=32, verbose_name="browser"
                     ),
                 ),
+                ("screen_px_per_mm", models.FloatField(editable=False, null=True)),
+                ("screen_distance_m", models.FloatField(default=1.5, editable=False)),
                 (
                     "approver",
                     models.ForeignKey(
@@ -720,6 +722,9 @@ class Migration(migrations.Migration):
                         auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
                     ),
                 ),
+                ("salt", models.CharField(blank=True, editable=False, max_length=32)),
+                ("digest", models.CharField(default="", editable=False, max_length=64)),
+                ("erased", models.BooleanField(default=False, editable=False)),
                 ("group", models.CharField(max_length=64)),
                 ("at", models.DateTimeField(default=django.utils.timezone.now)),
                 (
@@ -1362,13 +1367,7 @@ class Migration(migrations.Migration):
                         auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
                     ),
                 ),
-                (
-                    "log",
-                    models.CharField(
-                        choices=[("AuditEntry", "AuditEntry"), ("HistoryEntry", "HistoryEntry")],
-                        max_length=16,
-                    ),
-                ),
+                ("log", models.CharField(max_length=16)),
                 ("number", models.PositiveIntegerField()),
                 ("first_id", models.BigIntegerField()),
                 ("last_id", models.BigIntegerField()),
@@ -1620,11 +1619,13 @@ class Migration(migrations.Migration):
                         choices=[
                             ("right", "on the right (usual)"),
                             ("left", "on the left"),
-                            ("center", "all of it in the middle, smaller"),
+                            ("center", "everything in the middle"),
+                            ("in_right", "everything in the right half, Pause and Stop as well"),
+                            ("in_left", "everything in the left half, Pause and Stop as well"),
                         ],
                         default="right",
                         max_length=8,
-                        verbose_name="thermometer",
+                        verbose_name="where things are",
                     ),
                 ),
                 (
@@ -2598,6 +2599,24 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
+                    "inclusion",
+                    models.TextField(
+                        blank=True,
+                        help_text="One a line. Each is asked when a patient is enrolled, and has to be met.",
+                        max_length=4000,
+                        verbose_name="criteria of inclusion",
+                    ),
+                ),
+                (
+                    "exclusion",
+                    models.TextField(
+                        blank=True,
+                        help_text="One a line. Who meets one of them is not enrolled.",
+                        max_length=4000,
+                        verbose_name="criteria of exclusion",
+                    ),
+                ),
+                (
                     "visits",
                     models.PositiveSmallIntegerField(
                         default=1, verbose_name="visits in each period"
@@ -2611,6 +2630,15 @@ class Migration(migrations.Migration):
                     "washout_days",
                     models.PositiveSmallIntegerField(
                         default=7, verbose_name="days between periods"
+                    ),
+                ),
+                (
+                    "follow_up_days",
+                    models.PositiveSmallIntegerField(
+                        blank=True,
+                        help_text="After the last visit: a baseline, without feedback. Empty: no follow-up.",
+                        null=True,
+                        verbose_name="days to the follow-up",
                     ),
                 ),
                 (
@@ -2634,22 +2662,25 @@ class Migration(migrations.Migration):
                             ("best_streak", "Best streak"),
                             ("points_per_100_steps", "Points per 100 steps"),
                             ("improvement_over_baseline", "Improvement over baseline"),
-                            ("retention_in_washout", "Retention in washout"),
                             ("steps", "Steps"),
                             ("active_minutes", "Active minutes"),
+                            ("training_change", "Change in training"),
                             ("early_change", "Early change (first 50 strides)"),
                             ("late_change", "Late change (last 50 strides)"),
                             ("catch_change", "Change in catch blocks"),
                             ("washout_change", "Change in washout"),
+                            ("washout_loss", "From late training to washout"),
                             ("after_effect", "After-effect (first 20 strides)"),
+                            ("baseline_change", "Change of the baseline since the first visit"),
+                            ("follow_up_change", "Change at the follow-up"),
+                            ("between_visits", "From the last visit’s end to this one’s beginning"),
                             ("strides_to_success", "Strides until 80 % are hits"),
+                            ("savings", "Strides saved since the last visit"),
                             ("percent_of_goal", "Real value of the goal"),
                             ("absolute_error", "Distance from the goal"),
                             ("variation", "Variation (CV)"),
                             ("steadiness", "Variation about the trend"),
                             ("lag_1", "Memory from stride to stride (lag 1)"),
-                            ("kept_between_visits", "Kept since the last visit"),
-                            ("savings", "Strides saved since the last visit"),
                             ("invalid_strides", "Invalid strides"),
                         ],
                         max_length=32,
@@ -2690,6 +2721,55 @@ class Migration(migrations.Migration):
                 "verbose_name": "study",
                 "verbose_name_plural": "studies",
                 "ordering": ["-created_at", "-pk"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="Screening",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("unmet", models.JSONField(default=list)),
+                ("declined", models.BooleanField(default=False)),
+                ("at", models.DateTimeField(default=django.utils.timezone.now)),
+                (
+                    "by",
+                    models.ForeignKey(
+                        null=True,
+                        on_delete=django.db.models.deletion.SET_NULL,
+                        related_name="+",
+                        to=settings.AUTH_USER_MODEL,
+                    ),
+                ),
+                (
+                    "patient",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="screenings",
+                        to="rehab.patient",
+                    ),
+                ),
+                (
+                    "study",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="screenings",
+                        to="rehab.study",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "screening",
+                "ordering": ["pk"],
                 "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
@@ -2868,6 +2948,9 @@ class Migration(migrations.Migration):
                         auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
                     ),
                 ),
+                ("salt", models.CharField(blank=True, editable=False, max_length=32)),
+                ("digest", models.CharField(default="", editable=False, max_length=64)),
+                ("erased", models.BooleanField(default=False, editable=False)),
                 (
                     "kind",
                     models.CharField(
@@ -2896,7 +2979,7 @@ class Migration(migrations.Migration):
                     "by",
                     models.ForeignKey(
                         null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
+                        on_delete=django.db.models.deletion.PROTECT,
                         related_name="+",
                         to=settings.AUTH_USER_MODEL,
                         verbose_name="by",
@@ -2940,6 +3023,9 @@ class Migration(migrations.Migration):
                         auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
                     ),
                 ),
+                ("salt", models.CharField(blank=True, editable=False, max_length=32)),
+                ("digest", models.CharField(default="", editable=False, max_length=64)),
+                ("erased", models.BooleanField(default=False, editable=False)),
                 (
                     "task",
                     models.CharField(
@@ -2957,7 +3043,7 @@ class Migration(migrations.Migration):
                     "by",
                     models.ForeignKey(
                         null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
+                        on_delete=django.db.models.deletion.PROTECT,
                         related_name="+",
                         to=settings.AUTH_USER_MODEL,
                     ),
@@ -3169,11 +3255,6 @@ class Migration(migrations.Migration):
                 ("legacy_row", models.JSONField(editable=False, null=True)),
                 ("last_number", models.PositiveIntegerField(default=0, editable=False)),
                 ("checkpoint", models.JSONField(editable=False, null=True)),
-                ("epoch", models.PositiveIntegerField(default=0, editable=False)),
-                (
-                    "owner",
-                    models.CharField(blank=True, db_index=True, editable=False, max_length=200),
-                ),
                 (
                     "clinic",
                     models.ForeignKey(
@@ -3260,6 +3341,7 @@ class Migration(migrations.Migration):
                 ("number", models.PositiveSmallIntegerField()),
                 ("attempt", models.PositiveSmallIntegerField(default=1)),
                 ("period", models.PositiveSmallIntegerField()),
+                ("follow_up", models.BooleanField(default=False)),
                 ("day", models.DateField(verbose_name="day")),
                 (
                     "enrollment",
@@ -3484,6 +3566,8 @@ class Migration(migrations.Migration):
                             ("fall", "fall"),
                             ("fall_severity", "hurt by the fall"),
                             ("fall_withdrawn", "it was no fall"),
+                            ("fall_acknowledged", "fall seen by a therapist"),
+                            ("stop_acknowledged", "robot’s stop seen by a therapist"),
                             ("handrail", "handrail"),
                             ("verbal_cue", "verbal cue"),
                             ("borg", "borg"),
@@ -3692,6 +3776,33 @@ class Migration(migrations.Migration):
                 "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="ClinicOwner",
+            fields=[
+                (
+                    "clinic",
+                    models.OneToOneField(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        primary_key=True,
+                        related_name="+",
+                        serialize=False,
+                        to="rehab.clinic",
+                    ),
+                ),
+                ("owner", models.CharField(blank=True, max_length=200)),
+                ("epoch", models.PositiveIntegerField(default=0)),
+            ],
+            options={
+                "ordering": ["clinic"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+                "indexes": [models.Index(fields=["owner"], name="clinic_by_owner")],
             },
             managers=[
                 ("everywhere", django.db.models.manager.Manager()),
@@ -4006,6 +4117,14 @@ class Migration(migrations.Migration):
             model_name="trainingsession",
             index=models.Index(fields=["station", "state"], name="session_by_station_and_state"),
         ),
+        migrations.AddIndex(
+            model_name="trainingsession",
+            index=models.Index(
+                condition=models.Q(("state", "running")),
+                fields=["clinic"],
+                name="running_session_by_clinic",
+            ),
+        ),
         migrations.AddConstraint(
             model_name="trainingsession",
             constraint=models.UniqueConstraint(
@@ -4032,6 +4151,26 @@ class Migration(migrations.Migration):
             model_name="sessionmetric",
             constraint=models.UniqueConstraint(
                 fields=("session", "slug"), name="session_metric_once"
+            ),
+        ),
+        migrations.AddIndex(
+            model_name="sessionevent",
+            index=models.Index(
+                condition=models.Q(
+                    (
+                        "kind__in",
+                        (
+                            "fall",
+                            "fall_withdrawn",
+                            "fall_acknowledged",
+                            "stop_acknowledged",
+                            "robot_stop",
+                            "robot_arm",
+                        ),
+                    )
+                ),
+                fields=["at"],
+                name="event_of_alarm",
             ),
         ),
         migrations.AddConstraint(

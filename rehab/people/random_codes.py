@@ -8,6 +8,21 @@ import secrets
 ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 
 
+CONSONANTS, VOWELS = "bdfghjklmnprstvz", "aeiou"
+
+
+def random_words(count: int) -> str:
+    """Return so many words that can be said and typed, without a meaning: "dafo-kimu-tero".
+
+    Each has 12.6 bits; three are enough where attempts are limited (``sign_in.lockout``).
+    """
+
+    def word() -> str:
+        return "".join(secrets.choice(CONSONANTS) + secrets.choice(VOWELS) for _ in range(2))
+
+    return "-".join(word() for _ in range(count))
+
+
 def random_code(length: int) -> str:
     """Return a random code from the operating system's secure source."""
     return "".join(secrets.choice(ALPHABET) for _ in range(length))

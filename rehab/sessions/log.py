@@ -151,7 +151,8 @@ class RuleEntry(StrEnum):
 class Remark(StrEnum):
     """What a PT notes with one tap during a session. It changes no score either.
 
-    How badly the patient was hurt, and that it was no fall after all, refer to the last fall.
+    How badly the patient was hurt, and that it was no fall after all, refer to the last fall. An
+    acknowledgment ends the alarms of its kind (`alarms`); it alone is noted after the end, too.
     """
 
     REST = "rest"
@@ -161,6 +162,8 @@ class Remark(StrEnum):
     FALL = "fall"
     FALL_SEVERITY = "fall_severity"  # in ``value``, a `FallSeverity`
     FALL_WITHDRAWN = "fall_withdrawn"
+    FALL_ACKNOWLEDGED = "fall_acknowledged"
+    STOP_ACKNOWLEDGED = "stop_acknowledged"  # the robot's own
     HANDRAIL = "handrail"
     VERBAL_CUE = "verbal_cue"
     BORG = "borg"  # felt exertion, Borg CR10: 0 to 10 in ``value``
@@ -199,10 +202,23 @@ EVENTS = {
     Remark.FALL: _("fall"),
     Remark.FALL_SEVERITY: _("hurt by the fall"),
     Remark.FALL_WITHDRAWN: _("it was no fall"),
+    Remark.FALL_ACKNOWLEDGED: _("fall seen by a therapist"),
+    Remark.STOP_ACKNOWLEDGED: _("robot’s stop seen by a therapist"),
     Remark.HANDRAIL: _("handrail"),
     Remark.VERBAL_CUE: _("verbal cue"),
     Remark.BORG: _("borg"),
 }
+
+
+# What raises or ends an alarm (`alarms`): rows that pages look for again and again.
+ALARM_KINDS = (
+    Remark.FALL.value,
+    Remark.FALL_WITHDRAWN.value,
+    Remark.FALL_ACKNOWLEDGED.value,
+    Remark.STOP_ACKNOWLEDGED.value,
+    RobotEntry.STOP.value,
+    RobotEntry.ARM.value,
+)
 
 
 def erase_typed_words(patient: Patient, _pseudonym: str) -> None:
@@ -257,6 +273,11 @@ class SessionEvent(ScopedModel):
         verbose_name = _("session event")
         verbose_name_plural = _("session events")
         ordering: ClassVar = ["session", "pk"]
+        indexes: ClassVar = [
+            models.Index(
+                fields=["at"], condition=models.Q(kind__in=ALARM_KINDS), name="event_of_alarm"
+            )
+        ]
 
     def __str__(self) -> str:
         return self.get_kind_display()

@@ -62,6 +62,7 @@ def describe_now(fold: SessionFold) -> Message:
     return {
         "phase": describe_phase(fold.plan, fold.phase_index, fold.valence),
         "has_points": fold.valence.has_points,
+        "longest": fold.valence.longest_words(),
         "score": fold.score,
         **describe_walked(fold),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
@@ -14,8 +15,10 @@ from rehab.feedback.clinic_valences import valences_of
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
 from rehab.people.models.blinding import hidden_patients
+from rehab.sessions.alarms import ACKNOWLEDGMENTS, Alarm, OpenAlarms
 from rehab.sessions.live import runtime
-from rehab.sessions.live.orders import ChangeOrder
+from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder
+from rehab.sessions.log import ALARM_KINDS, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import ask
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
@@ -170,6 +173,7 @@ def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPl
         gestures=tuple(gestures.values()),
         alternatives=tuple(alternatives),
         language=patient.language,
+        seed=secrets.randbelow(2**31),
     )
 
 
@@ -210,14 +214,24 @@ def change_session(
     """
     if kind == ChangeKind.PAUSE and by is not None:
         value = PauseReason.THERAPIST.value
-    async_to_sync(_change)(session.pk, kind, value, by)
+    async_to_sync(_order)(session.pk, ChangeOrder(kind, value, by))
 
 
-async def _change(session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
+def acknowledge(session: TrainingSession, by: User) -> None:
+    """Acknowledge all alarms of a session; committed when this returns.
+
+    Raises NotStored and OwnedElsewhere as `change_session` does.
+    """
+    rows = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS).order_by("pk")
+    for event in OpenAlarms(rows).events:
+        async_to_sync(_order)(session.pk, RemarkOrder(ACKNOWLEDGMENTS[Alarm(event.kind)], None, by))
+
+
+async def _order(session_id: int, order: Order) -> None:
     in_server = runtime.peek() is not None  # else a command, which must not leave anything running
     live = runtime.current()
     try:
-        await live.order(session_id, ChangeOrder(kind, value, by))
+        await live.order(session_id, order)
     finally:
         if not in_server:
             await live.drain()

@@ -4,6 +4,7 @@ from django.urls import path
 
 from rehab.sessions.pages import (
     after_session,
+    alarms,
     history,
     incident,
     insight,
@@ -11,6 +12,7 @@ from rehab.sessions.pages import (
     paper,
     recording,
     replay,
+    screen_size,
     session,
     setup,
     tablet,
@@ -29,6 +31,7 @@ urlpatterns = [
     path("insight/", insight.show_insight, name="insight"),
     path("recordings/check/", recording.check_recording, name="check-recording"),
     path("recordings/part/", recording.add_recording_part, name="add-recording-part"),
+    path("screen-size/", screen_size.set_screen_size, name="screen-size"),
     path("tablet/", tablet.show_tablet, name="tablet"),
     path("tablet/app.webmanifest", tablet.web_app_manifest, name="tablet-app"),
     path("tablet/state/", tablet.tablet_state, name="tablet-state"),
@@ -45,6 +48,13 @@ urlpatterns = [
         name="add-questionnaire",
     ),
     path("sessions/<int:session_id>/replay/", replay.show_replay, name="replay"),
+    path("alarms/", alarms.show_alarms, name="alarms"),
+    path(
+        "sessions/<int:session_id>/alarms/seen/",
+        alarms.acknowledge_alarms,
+        name="acknowledge-alarms",
+    ),
+    path("incidents/", alarms.list_incidents, name="incidents"),
     path("incidents/<int:incident_id>/", incident.show_incident, name="incident"),
     path("incidents/<int:incident_id>/file/", incident.download_incident, name="incident-file"),
     path("sessions/<int:session_id>/correct/", session.correct, name="correct"),

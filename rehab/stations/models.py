@@ -83,6 +83,10 @@ class Device(TokenModel):
     network = models.CharField(_("network"), max_length=45, blank=True, editable=False)
     browser = models.CharField(_("browser"), max_length=32, blank=True, editable=False)
 
+    # Of a tablet's screen: CSS pixels a millimeter, and from how far the patient reads it.
+    screen_px_per_mm = models.FloatField(null=True, editable=False)
+    screen_distance_m = models.FloatField(default=1.5, editable=False)
+
     address = ""  # from which this object's holder connects
     given_hash = ""  # of the successor that this object's holder was given
 

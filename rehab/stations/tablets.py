@@ -10,8 +10,8 @@ from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 
 from rehab.people.networks import client_address
-from rehab.stations.device_trust import UNUSED_FOR
-from rehab.stations.models import Device
+from rehab.stations.device_trust import UNUSED_FOR, find_ended
+from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
 
 COOKIE = "garry_tablet"
@@ -22,6 +22,12 @@ def find_tablet(token: str | None, now: datetime, address: str = "") -> Device |
     """Return the tablet that this token belongs to; None for any other device."""
     device = find_device(token, now, address) if token and token.isascii() else None
     return device if device is not None and device.kind == Device.Kind.TABLET else None
+
+
+def has_tablet(station: Station | None, now: datetime) -> bool:
+    """Return whether a tablet is paired with a station, and may still show its sessions."""
+    paired = Device.everywhere.filter(station=station, kind=Device.Kind.TABLET, revoked_at=None)
+    return bool({one.pk for one in paired} - find_ended(paired, now))
 
 
 def set_secret_cookie(response: HttpResponseBase, name: str, value: str, age_s: float) -> None:

@@ -31,7 +31,7 @@ class Band:
     from_performance
         Where it begins (ratio to the goal).
     words
-        For the patient, at most TEXT_MAX characters.
+        For the patient: a pool of phrases, one a line, each of at most TEXT_MAX characters.
     confetti
         How much of it is released.
     """
@@ -39,6 +39,11 @@ class Band:
     from_performance: float
     words: str
     confetti: Confetti = Confetti.NONE
+
+    @property
+    def phrases(self) -> tuple[str, ...]:
+        """The phrases of its pool."""
+        return tuple(filter(None, map(str.strip, self.words.splitlines())))
 
 
 def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:

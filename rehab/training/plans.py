@@ -7,11 +7,12 @@ from enum import StrEnum
 from typing import Any
 
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
-from rehab.training.bands import bands_from_json
+from rehab.training.bands import Band, bands_from_json
 from rehab.training.closeness import CloseSteps
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
+from rehab.training.phrases import choose_phrase
 from rehab.training.robot_cueing import (
     CueTiming,
     check_activation_threshold,
@@ -71,6 +72,8 @@ class PlanSettings:
         they answer.
     schedule
         After which steps the patient gets feedback.
+    words_vary
+        Whether phrases of a band's pool take turns; else its first one is always the one.
     adaptation
         Whether goals follow the patient.
     variety_seed
@@ -85,6 +88,7 @@ class PlanSettings:
     robot_intensity: float = 1.0
     cue_timing: CueTiming = field(default_factory=CueTiming)
     schedule: Schedule = field(default_factory=Schedule)
+    words_vary: bool = True
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
     variety_seed: int | None = None
     locked: bool = False
@@ -108,6 +112,8 @@ class SessionPlan(PlanSettings):
         Which steps are too uncertain to count as hit or miss.
     language
         Of the plan's texts.
+    seed
+        From which the order of phrases follows: with it the log tells which one a step brought.
 
     Raises
     ------
@@ -125,6 +131,7 @@ class SessionPlan(PlanSettings):
     alternatives: tuple[Valence, ...] = ()
     close_steps: CloseSteps = field(default_factory=CloseSteps)
     language: str = "en"
+    seed: int = 0
 
     def __post_init__(self) -> None:
         if not self.phases:
@@ -148,6 +155,11 @@ class SessionPlan(PlanSettings):
                     "before it. Put one first, or let the goal stay.",
                     name=phase.name,
                 )
+
+    def choose_words(self, band: Band, shown: int) -> str:
+        """Return what a band says after so many answers in the session."""
+        phrases = band.phrases if self.words_vary else band.phrases[:1]
+        return choose_phrase(phrases, self.seed, shown)
 
     def check_phase(self, index: float) -> int:
         """Return the index of a phase as an int. Raises InvalidSetting where there is none."""
@@ -184,6 +196,8 @@ class SessionPlan(PlanSettings):
             close_steps=CloseSteps(**data.get("close_steps", {})),
             locked=data.get("locked", False),
             language=data.get("language", "en"),
+            words_vary=data.get("words_vary", False),
+            seed=data.get("seed", 0),
         )
 
 

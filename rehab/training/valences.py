@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 
+from rehab.training import phrases
 from rehab.training.bands import BANDS_MAX, TEXT_MAX, Band, Confetti
 from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
@@ -92,7 +93,7 @@ class Valence:
             raise InvalidSetting("{type}: one band must begin at 1, the goal.", type=label)
         if len(self.bands) > BANDS_MAX:
             raise InvalidSetting("{type}: at most {most} bands.", type=label, most=BANDS_MAX)
-        if any(len(band.words) > TEXT_MAX for band in self.bands):
+        if any(len(phrase) > TEXT_MAX for band in self.bands for phrase in band.phrases):
             raise InvalidSetting(
                 "{type}: words have at most {most} characters.", type=label, most=TEXT_MAX
             )
@@ -127,6 +128,18 @@ class Valence:
                 found = band
         return found
 
+    def longest_words(self) -> list[str]:
+        """Return the phrases that need the most room: the longest, and that with the longest word.
+
+        A page finds by them which layout has room for all.
+        """
+        pool = [phrase for band in self.bands for phrase in band.phrases]
+        if not pool:
+            return []
+        long = max(pool, key=len)
+        wide = max(pool, key=lambda phrase: max(map(len, phrase.split()), default=0))
+        return [long] if long == wide else [long, wide]
+
     def emblem(self, hit: bool) -> Emblem:
         """Return the drawing for a hit or a miss: it follows the points, not the performance."""
         points = self.points(hit) or 0
@@ -159,11 +172,11 @@ POSITIVE = Valence(
     hit_points=1,
     miss_points=0,
     bands=(
-        Band(0, gettext_noop("On to the next step.")),
-        Band(0.75, gettext_noop("Nearly there. Keep walking.")),
-        Band(1, gettext_noop("You reached the goal!"), Confetti.LITTLE),
-        Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
-        Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
+        Band(0, phrases.ONWARD),
+        Band(0.75, phrases.NEAR),
+        Band(1, phrases.REACHED, Confetti.LITTLE),
+        Band(1.1, phrases.STRONG, Confetti.MUCH),
+        Band(1.25, phrases.STRONGEST, Confetti.MOST),
     ),
     cue=CueGestures(above=VARIED),
 )
@@ -174,9 +187,9 @@ NEGATIVE = Valence(
     hit_points=0,
     miss_points=-1,
     bands=(
-        Band(0, gettext_noop("Far below the goal.")),
-        Band(0.75, gettext_noop("Below the goal.")),
-        Band(1, gettext_noop("No points lost.")),
+        Band(0, phrases.FAR_BELOW),
+        Band(0.75, phrases.BELOW),
+        Band(1, phrases.NOTHING_LOST),
     ),
     cue=CueGestures(below=VARIED),
 )
@@ -187,11 +200,11 @@ BINARY = Valence(
     hit_points=1,
     miss_points=-1,
     bands=(
-        Band(0, gettext_noop("Far below the goal.")),
-        Band(0.75, gettext_noop("Below the goal.")),
-        Band(1, gettext_noop("You reached the goal!"), Confetti.LITTLE),
-        Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
-        Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
+        Band(0, phrases.FAR_BELOW),
+        Band(0.75, phrases.BELOW),
+        Band(1, phrases.REACHED, Confetti.LITTLE),
+        Band(1.1, phrases.STRONG, Confetti.MUCH),
+        Band(1.25, phrases.STRONGEST, Confetti.MOST),
     ),
     cue=CueGestures(above=VARIED, below=VARIED),
 )
@@ -201,7 +214,7 @@ EXPLICIT = Valence(
     hue="graphite",
     hit_points=None,
     miss_points=None,
-    bands=(Band(0, gettext_noop("Your push, this step.")),),
+    bands=(Band(0, phrases.MEASURED),),
     cue=CueGestures(),
 )
 

@@ -22,4 +22,4 @@ TIME_MAX_S = 1e10
 PERFORMANCE_MAX = 1000.0
 
 ROBOT_HEARTBEAT_S = 0.25  # robots stand still after 0.65 s of silence
-PAGE_HEARTBEAT_S = 5.0
+PAGE_HEARTBEAT_S = 1.0  # pages turn gray after 2 s of silence

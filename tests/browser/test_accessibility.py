@@ -50,6 +50,8 @@ PT_PAGES = [
     "/sensor/",
     "/first-steps/?step=station",
     "/stations/",
+    "/incidents/",
+    "/screen-size/",
     "/insight/?goal=any",
     "/help/",
     "/account/",

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 from websockets.sync.client import connect
 
-from tests.support.browsers import Visit, signed_in
+from tests.support.browsers import Visit, picture, signed_in
 from tests.support.servers import Server
 from tests.support.walk_seed import Feet, Walk, feet_of, hear, make_walks, robot_of
 
@@ -181,8 +181,8 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
             begin(monitor, feet)
             expect(readiness).to_be_hidden()
             robot = monitor.locator("[data-alarm=robot]")
-            expect(robot).to_contain_text("The robot stands: somebody stopped it.")
-            monitor.click("[data-robot=arm]")
+            expect(robot).to_contain_text("The robot stands: it was stopped.")
+            monitor.get_by_role("button", name="Let it move").first.click()
             expect(robot).to_have_count(0)
             expect(monitor.locator("[data-presence=robot]")).to_contain_text("✓")
         expect(monitor.locator("[data-alarm=tablet]")).to_contain_text("The tablet is lost")
@@ -222,6 +222,130 @@ def test_a_stop_that_the_sessions_server_does_not_hear_is_told_at_once(
         expect(page.locator("[data-presence=robot]")).to_contain_text("✓")  # it is connected
         page.clock.pause_at(datetime.now(UTC) + timedelta(seconds=5))
         page.locator("[data-robot=stop]:visible").first.click()
-        told = page.get_by_text("No answer. If the robot moves, use its own switch.").first
+        told = page.get_by_text("Stop not heard. Use the robot’s own switch.").first
         expect(told).to_be_visible()
         expect(page.locator("[data-robot=stop].asked")).to_have_count(0)
+
+
+@pytest.mark.essential
+def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
+    server: Server, visit: Visit
+) -> None:
+    (walk,) = make_walks(server, {"name": "Iris", "phases": [{"kind": "training"}]})
+    monitor = visit(walk.monitor_path, walk)
+    start, patient = visit("/start/", walk), visit(walk.path, walk, alone=True)
+    second = visit(walk.monitor_path, walk)
+    with feet_of(server, walk) as feet, robot_of(server, walk):
+        begin(monitor, feet)
+        monitor.click("[data-fall]")
+        for page in (monitor, second):
+            red = page.locator(".alarms .red")
+            expect(red).to_have_count(1)  # its consequences are hidden
+            expect(red).to_contain_text("Iris fell")
+            expect(page.locator("[data-alarm]")).to_have_count(1)
+        told = start.locator(".elsewhere .red", has_text="Iris fell.")
+        expect(told).to_be_visible()
+        expect(patient.locator(".words")).to_have_text("Stand still.")
+        expect(patient.locator(".sub")).to_have_text("Help is coming.")
+        picture(second, "fall-on-the-second-screen")
+        picture(start, "fall-on-the-start-page")
+        picture(patient, "fall-on-the-patients-page")
+        told.get_by_role("button", name="I have seen it").click()
+        expect(told).to_have_count(0)
+        for page in (monitor, second):
+            expect(page.locator(".red[data-alarm]")).to_have_count(0)
+        expect(patient.locator(".words")).to_have_text("Pause.")
+    assert [kind for kind, _ in noted(server, walk)][-1] == "fall_acknowledged"
+    start.goto("/incidents/")
+    listed = start.get_by_role("listitem").filter(has_text="Iris fell.")
+    expect(listed).to_contain_text("by walker")
+    picture(start, "incidents")
+
+
+def test_the_cause_comes_first_and_has_its_button(
+    server: Server, monitor: Page, walk: Walk
+) -> None:
+    """The coach stays below; what follows from a cause has no banner of its own."""
+    with feet_of(server, walk) as feet, robot_of(server, walk) as robot:
+        begin(monitor, feet)
+        robot.send(json.dumps({"type": "report", "report": {"kind": "stop", "reason": "bump"}}))
+        first = monitor.locator("[data-alarm]").first
+        expect(first).to_contain_text("it bumped into something")
+        expect(monitor.locator("[data-alarm]")).to_have_count(1)
+        first.get_by_role("button", name="I have seen it").click()
+        expect(first).to_contain_text("The robot stands: it bumped into something. Clear its way.")
+        first.get_by_role("button", name="Let it move").click()
+        expect(monitor.locator("[data-alarm=robot]")).to_have_count(0)
+        hear(robot, "arm")
+
+
+@pytest.mark.essential
+def test_a_server_that_says_nothing_is_told_first_and_everything_is_gray(
+    server: Server, visit: Visit, walk: Walk
+) -> None:
+    pages = [visit("about:blank", walk), visit("about:blank", walk, alone=True)]
+    held: list[None] = []
+
+    def pass_on(socket: WebSocketRoute) -> None:
+        """As a server that hangs: the connection stays, and nothing comes or is answered."""
+        server_side = socket.connect_to_server()
+        server_side.on_message(lambda text: None if held else socket.send(text))
+        socket.on_message(lambda text: None if held else server_side.send(text))
+
+    for page, path in zip(pages, (walk.monitor_path, walk.path), strict=True):
+        page.route_web_socket(re.compile("/ws/session/"), pass_on)
+        page.goto(path)
+    monitor, patient = pages
+    with feet_of(server, walk) as feet, robot_of(server, walk):
+        begin(monitor, feet)
+        patient.wait_for_selector("body[data-look=feedback]")
+        held.append(None)
+        first = monitor.locator("[data-alarm]")
+        expect(first).to_have_count(1)
+        expect(first).to_contain_text("The server has not answered for")
+        expect(first).to_contain_text("Stored: all up to step 2.")
+        for page in pages:
+            page.wait_for_selector("body.stale")
+        expect(monitor.locator("[data-presence=robot]")).to_contain_text("– not known for")
+        expect(patient.locator(".words")).to_contain_text("No connection for")
+        monitor.click("[data-robot=stop]")
+        expect(monitor.locator(".said")).to_have_text("Stop not heard. Use the robot’s own switch.")
+        picture(monitor, "silent-server")
+        picture(patient, "silent-server-patient")
+        held.clear()
+        expect(monitor.locator("[data-alarm=server]")).to_have_count(0, timeout=20_000)
+        expect(monitor.locator("body.stale")).to_have_count(0)
+
+
+def test_what_took_too_long_to_arrive_is_not_celebrated(
+    server: Server, visit: Visit, walk: Walk
+) -> None:
+    page = visit("about:blank", walk, reduced_motion="reduce")
+    delay_s = [0.0]
+
+    def pass_on(socket: WebSocketRoute) -> None:
+        server_side = socket.connect_to_server()
+        socket.on_message(server_side.send)
+
+        def older(text: str | bytes) -> None:
+            message = json.loads(text)
+            for event in message.get("events", ()):
+                if "at" in event:
+                    event["at"] -= delay_s[0]
+            socket.send(json.dumps(message))
+
+        server_side.on_message(older)
+
+    page.route_web_socket(re.compile("/patient/"), pass_on)
+    page.goto(walk.path)
+    page.click("text=Start")
+    page.wait_for_selector("body:not([data-look=ready])")
+    with feet_of(server, walk) as feet:
+        feet.walk(1.2)
+        page.wait_for_selector("body[data-step='1']")
+        words = page.locator(".words").inner_text()
+        delay_s[0] = 2.5
+        feet.walk(0.3)
+        page.wait_for_selector("body[data-step='2']")
+        expect(page.locator(".words")).to_have_text(words)
+        expect(page.locator(".dots circle:not(.gap)")).to_have_count(2)  # it is in the chart

@@ -22,7 +22,7 @@ SCREENS = ("phone", "tablet-portrait", "tablet-landscape", "low-laptop", "laptop
 CORNERS = SCREENS if EVERYTHING else ("phone", "tablet-portrait", "tablet-landscape")
 TEXTS = ("normal", "large", "largest") if EVERYTHING else ("normal", "largest")
 BUTTONS = "header button, .actions button"
-WORDS = ".words, .phrase, .sub, header .who, header button, .actions button, .key, .label"
+WORDS = ".words, .phrase, .sub, .count, header .who, header button, .actions button, .key, .label"
 # What people read and tap; the horizon, which no words cross where nothing is measured.
 CROSSING = """() => {
   const words = [...document.querySelectorAll(".words, .sub")]
@@ -113,15 +113,3 @@ def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
         assert tablet.locator(".actions button:visible").count() == 0
         page.click("[data-ask=end]")
         look_everywhere(page)
-
-
-def test_words_are_as_large_on_a_wall_as_on_a_laptop(server: Server, visit: Visit) -> None:
-    (walk,) = make_walks(server, {"screen": {"screen_text": "largest", "language": "es"}})
-    fits = []
-    page = visit(walk.path, walk, reduced_motion="reduce")
-    page.wait_for_selector("body[data-look=ready]")
-    for screen in ("low-laptop", "wall"):  # of one shape
-        set_screen(page, screen)
-        page.evaluate(DRAWN)
-        fits.append(page.get_attribute(".phrase", "data-fit"))
-    assert fits[0] == fits[1]

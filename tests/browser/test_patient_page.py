@@ -199,7 +199,7 @@ def test_late_steps_alter_totals_and_nothing_else(server, browser):
         page = open_page(context, walk)
         page.click("text=Start")
         looks(page, "begin")
-        for time_s, words, key in ((1000.0, "", "1"), (1010.0, "Nearly there. Keep walking.", "1")):
+        for time_s, words, key in ((1000.0, "", "1"), (1010.0, "Nearly there.", "1")):
             feet.number += 1
             value = 4.4 if time_s == 1000.0 else 3.5
             step = {"number": feet.number, "time_s": time_s, "side": "left", "value": value}

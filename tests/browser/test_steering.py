@@ -70,7 +70,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(words).to_have_text("You reached the goal!")  # not before the next step
         feet.walk(1.0)
         at_step(tablet, 2)
-        expect(words).to_have_text("Nearly there. Keep walking.")
+        expect(words).to_have_text("Nearly there.")
 
         monitor.locator("[data-gains] [value='0.85']").click()
         expect(monitor.locator("[data-gains] .on")).to_have_text("0.85")
@@ -125,14 +125,14 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         for told in ("goal 4.10", "words on", "line", "robot gentle", "feedback type Binary"):
             expect(legend).to_contain_text(told)
         monitor.locator("[data-main]").click()
-        expect(monitor.locator(".notice.why")).to_have_text("Paused by the therapist.")
+        expect(monitor.locator("[data-alarm=why]")).to_have_text("Paused by the therapist.")
         expect(tablet.locator(".sub")).to_contain_text("Rest now.")
         expect(monitor.locator("[data-presence=source]")).to_contain_text("✓ 14 of 14 valid")
 
 
 def steer_the_robot(server: Server, walk: Walk, monitor: Page) -> None:
     pressed(monitor, "data-levels", "0.5")
-    monitor.get_by_label("Threshold up").click()
+    monitor.get_by_label("Celebrate later").click()
     expect(monitor.locator("[data-show=threshold]")).to_have_text("95 %")
 
 
@@ -185,12 +185,12 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
             feet.hear("start")
             feet.walk(1.2, 1.2)
     with serve(tmp_path) as server, pages(browser, server, walk, where) as (tablet, monitor):
-        expect(monitor.locator(".notice.why")).to_have_text(
+        expect(monitor.locator("[data-alarm=restart]")).to_have_text(
             "The server was restarted; nothing was lost. Go on when ready."
         )
         expect(tablet.locator(".sub")).to_have_text("Rest now. Your score is safe.")
         monitor.locator("[data-main]").click()
-        expect(monitor.locator(".notice.why")).to_be_hidden()
+        expect(monitor.locator("[data-alarm=restart]")).to_have_count(0)
         expect(tablet.locator("body")).not_to_have_attribute("data-look", "paused")
 
 
@@ -225,14 +225,14 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         wire.freeze()  # nothing is closed: the Wi-Fi is just gone
         stop.click()
         expect(stop).to_have_class(re.compile("asked"))
-        unanswered = "No answer. If the robot moves, use its own switch."
+        unanswered = "Stop not heard. Use the robot’s own switch."
         expect(why).to_have_text(unanswered)
         expect(said).to_have_text(unanswered)
         expect(stop).not_to_have_class(re.compile("asked"))
 
         wire.go_down()
         wire.thaw()
-        expect(monitor.locator(".notice.link")).to_be_visible()
+        expect(monitor.locator("[data-alarm=server]")).to_be_visible()
         stop.click()
         unsent = "Not sent: no connection. Use the robot’s own switch."
         expect(why).to_have_text(unsent)
@@ -249,9 +249,9 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
             expect(said).to_have_text("There is no connection. Try again in a moment.")
 
         wire.come_up()
-        expect(monitor.locator(".notice.link")).to_be_hidden()
+        expect(monitor.locator("[data-alarm=server]")).to_have_count(0)
         expect(why).to_have_text("")
         stop.click()
         hear(robot, "stop")
-        expect(why).to_have_text("It stands: somebody stopped it.")
+        expect(why).to_have_text("It stands: it was stopped.")
         expect(monitor.locator(".safety .stop")).to_have_text("Robot stopped")

@@ -69,7 +69,11 @@ def test_a_type_that_is_edited_already_is_not_added_again(world):
         ("positive", {"bands-2-from_percent": "99"}, "begin at 1, the goal"),
         ("positive", {"bands-0-from_percent": "10"}, "begins at 0"),
         ("positive", {"bands-1-from_percent": "0"}, "from, % of the goal"),
-        ("positive", {"bands-0-words_en": "x" * 61}, "at most 60 characters"),
+        (
+            "positive",
+            {"bands-0-words_en": "Go on.\n" + "x" * 25},
+            "is too long: at most 24 letters",
+        ),
         ("positive", {"cue_above": "fly"}, "not one of the available choices"),
         ("binary", {"miss_points": "1"}, "0 to 1000 points"),
     ],

@@ -13,6 +13,7 @@ from django.urls import reverse
 from rehab.patients.visits import plan_visit
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.better_or_worse import Result
+from rehab.sessions.reports.earned import next_mark
 from rehab.sessions.reports.patient_summary import describe_today, is_milestone
 from rehab.training.valences import VALENCES
 from tests.support.boards import tablet_at
@@ -61,6 +62,36 @@ def test_today_stands_beside_last_time(world, patient):
     assert "More steps at the goal than last time." in words
 
 
+@pytest.mark.parametrize(
+    ("valence", "before", "walked", "said"),
+    [
+        ("positive", [], [HIT] * 7 + [MISS] * 3, "7 points Next mark: 10."),
+        ("positive", [HIT] * 5, [HIT] * 7 + [MISS] * 3, "7 points Your best so far!"),
+        ("positive", [HIT] * 9, [HIT] * 7 + [MISS] * 3, "7 points Next mark: 9."),
+        # What was lost is no number to take home.
+        ("binary", [], [HIT] * 2 + [MISS] * 8, "2 steps at the goal Next mark: 10."),
+        ("negative", [], [HIT] * 6 + [MISS] * 4, "6 steps at the goal Next mark: 10."),
+        ("negative", [], [MISS] * 10, "10 steps walked You walked"),
+        ("explicit", [], [HIT] * 6 + [MISS] * 4, "10 steps walked You walked"),
+    ],
+)
+def test_the_one_number_is_earned_and_shames_nobody(world, patient, valence, before, walked, said):
+    if before:
+        walk(patient, valence, before, days_ago=7)
+    words = read(world, walk(patient, valence, walked))
+    assert said in words
+    assert "Goodbye," in words
+    assert "−" not in words.split("Goodbye")[0]
+
+
+@pytest.mark.parametrize(
+    ("number", "best", "mark"),
+    [(7, 0, 10), (10, 0, 20), (99, 0, 100), (710, 732, 732), (710, 900, 800), (460, 460, 500)],
+)
+def test_the_next_mark_is_the_nearest_above(number: int, best: int, mark: int) -> None:
+    assert next_mark(number, best) == mark
+
+
 def test_a_paired_tablet_tells_the_patient_the_same(world, patient):
     walk(patient, "positive", [HIT] * 4 + [MISS] * 6, days_ago=7)
     other = world.add_patient("Omar")
@@ -100,7 +131,7 @@ def test_round_numbers_become_rarer():
 def test_a_type_that_only_takes_points_praises_no_row(world, patient):
     words = read(world, walk(patient, "negative", [HIT] * 9 + [MISS]))
     assert "Today 9 of 10" in words
-    assert "Next time you can compare with today." in words
+    assert "Next mark: " in words
     assert "in a row" not in words
 
 

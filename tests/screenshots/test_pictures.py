@@ -53,6 +53,8 @@ PAGES = {
     "first-steps": "/first-steps/?step=tablet",
     "first-steps-sensor": "/first-steps/?step=sensor",
     "stations-and-devices": "/stations/",
+    "incidents": "/incidents/",
+    "screen-size": "/screen-size/",
     "insight": "/insight/?by=type&goal=any",
     "replay": "/sessions/12/replay/?at=120",
     "help": "/help/#today",

@@ -57,7 +57,7 @@ LIST = reverse("admin:rehab_feedbacktype_changelist")
 
 def words_now(session, performance=1.2):
     valence = SessionAggregate.load(session).fold.valences.known["positive"]
-    return valence.band(performance).words
+    return valence.band(performance).phrases[0]
 
 
 def test_edited_words_reach_open_sessions_and_points_do_not(world, pt):

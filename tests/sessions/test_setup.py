@@ -13,7 +13,7 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
-from rehab.stations.models import Station
+from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import InvalidSetting
 from rehab.training.robot_cueing import CueTiming
@@ -23,8 +23,9 @@ from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
 from robot.wire.cue_limits import CueRule
 from tests.support.page_text import plain
+from tests.support.tablets import approved
 from tests.support.walks import make_patient, make_session
-from tests.support.world import World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -98,6 +99,25 @@ def test_every_choice_reaches_the_plan(pt, patient, station, world):
 
 def test_the_therapist_may_go_on_at_the_own_page(pt, patient, station):
     answer = pt.post(f"/patients/{patient.pk}/new/", choices(station, then="monitor"))
+    assert answer.headers["Location"] == f"/sessions/{newest().pk}/monitor/"
+
+
+def test_start_leads_to_the_therapists_page_where_a_tablet_shows_the_patients(pt, patient, station):
+    """Without one, both pages are offered by name."""
+    url, page = f"/patients/{patient.pk}/new/", f"/patients/{patient.pk}/"
+    tablets = Device.everywhere.filter(station=station, kind=Device.Kind.TABLET)
+    tablets.update(revoked_at=NOW)
+    offered = pt.get(page).content.decode()
+    assert "No tablet is paired with" in offered
+    assert 'value="walk"' in offered
+    assert 'value="monitor"' in offered
+    assert pt.post(url, choices(station)).headers["Location"] == f"/sessions/{newest().pk}/"
+    TrainingSession.everywhere.update(state="finished")
+    approved(station, "tablet")
+    offered = pt.get(page).content.decode()
+    assert 'value="walk"' not in offered
+    assert 'value="monitor"' in offered
+    answer = pt.post(url, choices(station))
     assert answer.headers["Location"] == f"/sessions/{newest().pk}/monitor/"
 
 

@@ -374,7 +374,7 @@ def open_session(
             measure=measure,
             station=place.station if at_station and not beside else None,
             created_by=place.pt,
-            **rules,
+            **{"words_vary": False} | rules,
         )
     )
     if beside:

@@ -2,8 +2,8 @@
 
 JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal" (or
 "goal_percent", of the baseline), "minutes", "screen": {"screen_side", …}, "pin", "close_percent"
-(of the protocol), "measure"}, where anything may be left out. Each gets a station of its own with
-tokens for its devices.
+(of the protocol), "measure", "words_vary"}, where anything may be left out; phrases vary only if
+asked. Each gets a station of its own with tokens for its devices.
 """
 
 from __future__ import annotations
@@ -197,6 +197,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 target=Target(duration_s=60 * wish.get("minutes", 10)),
                 station=station,
                 created_by=person,
+                words_vary=wish.get("words_vary", False),
             )
         )
         made.append({"session": session.pk, "cookie": cookie, **tokens})

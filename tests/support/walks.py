@@ -36,7 +36,11 @@ def make_session(patient: Patient, valence: str = "positive", **settings: Any) -
 
     ``settings``: of its `SessionRequest`.
     """
-    usual: dict[str, Any] = {"goal": GoalRule(value=GOAL), "trained_side": LEFT}
+    usual: dict[str, Any] = {
+        "goal": GoalRule(value=GOAL),
+        "trained_side": LEFT,
+        "words_vary": False,
+    }
     if "protocol" not in settings:
         usual["phases"] = (make_phase("training"),)
     return create_session(SessionRequest(patient=patient, valence=valence, **usual | settings))

@@ -15,6 +15,7 @@ from rehab.people.access import actor_of, for_roles
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time, format_duration
+from rehab.sessions.log import RobotEntry
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.after_session import page_after
 from rehab.sessions.reports.patient_summary import describe_ending
@@ -41,5 +42,6 @@ def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
         "walked": format_duration(session.active_s),
         "visit": next_visit(session.patient_id, midnight),
         "after": page_after(session, actor, tablet=tablet),
+        "with_robot": session.events.filter(kind=RobotEntry.GESTURE.value).exists(),
     } | describe_ending(session)
     return render(request, "patients/ending.html", context)

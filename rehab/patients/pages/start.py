@@ -24,6 +24,7 @@ from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
+from rehab.stations.tablets import has_tablet
 from rehab.training.changes import OPEN_STATES
 
 MAX_PATIENTS = 60  # patients on one page
@@ -94,6 +95,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         "open_here": open_sessions(user).filter(patient=patient),
         "form": SessionForm(initial=initial, patient=patient, by=user),
         "last": initial,
+        "has_tablet": has_tablet(initial["station"], timezone.now()),
         "visits": visits,
         "soon": [
             (days, today + timedelta(days=days))

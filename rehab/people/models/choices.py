@@ -11,11 +11,13 @@ SIDES = [(Side.LEFT.value, _("Left")), (Side.RIGHT.value, _("Right"))]
 
 
 class ScreenSide(models.TextChoices):
-    """Where the thermometer stands on the patient's page; for neglect and visual field loss."""
+    """Where things are on the patient's page; for neglect and visual field loss."""
 
     RIGHT = "right", _("on the right (usual)")
     LEFT = "left", _("on the left")
-    CENTER = "center", _("all of it in the middle, smaller")
+    CENTER = "center", _("everything in the middle")
+    IN_RIGHT = "in_right", _("everything in the right half, Pause and Stop as well")
+    IN_LEFT = "in_left", _("everything in the left half, Pause and Stop as well")
 
 
 class ScreenText(models.TextChoices):

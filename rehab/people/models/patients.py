@@ -107,7 +107,7 @@ class Patient(ClinicModel):
     severity = models.CharField(_("severity"), max_length=8, choices=Severity.choices, blank=True)
     language = models.CharField(_("language"), max_length=8, choices=language_choices, default="en")
     screen_side = models.CharField(
-        _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+        _("where things are"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
     )
     screen_text = models.CharField(
         _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL

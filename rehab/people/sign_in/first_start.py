@@ -12,7 +12,7 @@ from django.db import DatabaseError, connection, transaction
 from django.db.migrations.executor import MigrationExecutor
 
 from rehab.people.models import Clinic, User
-from rehab.people.random_codes import random_code
+from rehab.people.random_codes import random_words
 from rehab.people.roles import Role
 
 FIRST_USERNAME = "pt"
@@ -58,7 +58,7 @@ def first_password() -> str | None:
     """
     file = _password_file()
     if not User.everywhere.exists():
-        password = "-".join(random_code(4) for _ in range(4))
+        password = random_words(3)
         settings.DATA_DIR.mkdir(parents=True, exist_ok=True)
         file.unlink(missing_ok=True)
         with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as out:

@@ -92,6 +92,9 @@ def is_session_valid(data: Mapping[str, Any], user: User) -> bool:
     )
 
 
+WATCHING = "Garry-Watching"  # a page asks by itself (static/js/shared/alarms.js): no activity
+
+
 class SessionValidationMiddleware:
     """Signs out sessions that are no longer valid and records activity. Keeps no state."""
 
@@ -104,7 +107,8 @@ class SessionValidationMiddleware:
         if isinstance(request.user, User):
             data = cast(Mapping[str, Any], request.session)
             if is_session_valid(data, request.user):
-                browser_sessions.record_activity(request, timezone.now())
+                if WATCHING not in request.headers:
+                    browser_sessions.record_activity(request, timezone.now())
             else:
                 logout(request)
         response = self.get_response(request)

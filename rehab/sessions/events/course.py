@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from datetime import datetime
 from typing import NamedTuple
 
 from rehab.sessions.events.change import change_event, phase_event
@@ -66,11 +67,12 @@ def events_of_step(
     before: Before,
     step: ScoredStep,
     audiences: Iterable[Audience],
+    received_at: datetime | None = None,
     *,
     live: bool,
 ) -> list[LiveEvent]:
-    """Return the events of a step that was just scored; see `step_event` for the audiences."""
-    events = [step_event(fold, before.context, step, audiences, live=live)]
+    """Return the events of a step that was just scored; see `step_event`."""
+    events = [step_event(fold, before.context, step, audiences, received_at, live=live)]
     if before.is_still_so(fold):
         return events
     only_adapted = fold.following.moved and fold.phase_index == before.phase_index

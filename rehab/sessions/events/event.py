@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import msgspec
 
+from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.payloads import Message
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
@@ -72,6 +73,12 @@ def remark_event(fold: SessionFold, what: str, value: float | None) -> LiveEvent
     """Return the event that a PT noted something."""
     event = {"kind": "remark", "what": what, "value": value, "number": fold.last_number}
     return event_for(fold, monitor=event)
+
+
+def alarms_event(fold: SessionFold, alarms: OpenAlarms) -> LiveEvent:
+    """Return the event that an alarm was raised or acknowledged. The patient's page stays calm."""
+    patient = {"kind": "alarms", "fell": alarms.has_fallen}
+    return event_for(fold, patient=patient, monitor={"kind": "alarms", **alarms.describe()})
 
 
 def source_goal_event(fold: SessionFold, goal: float) -> LiveEvent:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
 
+from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.events.event import presence_for_patient
 from rehab.sessions.events.step import StepContext, StoredStep, patient_step
 from rehab.sessions.payloads import (
@@ -53,6 +54,7 @@ def snapshot(
     robot: Message,
     robot_stopped: bool,
     marks: Iterable[Message],
+    alarms: OpenAlarms,
 ) -> Message:
     """Return all that a page of this audience shows, as of the last committed step.
 
@@ -79,13 +81,14 @@ def snapshot(
         "steps": [entry for entry in entries if entry is not None],
     }
     if audience is Audience.PATIENT:
-        message["last"] = _last_step(fold, recent)
+        message |= {"last": _last_step(fold, recent), "fell": alarms.has_fallen}
     if audience is Audience.MONITOR:
         message |= {
             **describe_types(fold),
             **describe_coaching(fold),
             "trained_side": plan.trained_side,
             "marks": list(marks),
+            **alarms.describe(),
             **describe_rates(fold.feedback),
             "obstacle": fold.obstacle,
             "robot": dict(robot),
@@ -118,7 +121,8 @@ def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | Non
             continue
         if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
-            context = context._replace(phase=plan.phases[step.phase])
+            phase, before = plan.phases[step.phase], context.told - 1
+            context = context._replace(phase=phase, told=before)
             return patient_step(
                 plan, context, step, score, streak, live=False, answer=FeedbackSummary(steps=1)
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import fields
+from datetime import datetime
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -37,11 +38,12 @@ class StepContext(NamedTuple):
     valence: Valence
     words_shown: bool
     chart_style: str
+    told: int  # answers before it
 
     @classmethod
     def of(cls, fold: SessionFold) -> StepContext:
         """Return the context of the next step."""
-        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style)
+        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style, fold.delivery.told)
 
 
 def step_event(
@@ -49,18 +51,25 @@ def step_event(
     context: StepContext,
     step: ScoredStep,
     audiences: Iterable[Audience],
+    received_at: datetime | None,
     *,
     live: bool,
 ) -> LiveEvent:
     """Return the event of a step that was just scored, for these audiences and no other.
 
-    ``live`` is False for a step that came too late to be shown as one.
+    ``received_at`` lets a page find out how long the event took; None when a session is played
+    back. ``live`` is False for a step that came too late to be shown as one.
     """
     messages = {
         audience: MESSAGES[audience](fold, context, step, live)
         for audience in audiences
         if audience in MESSAGES
     }
+    if received_at is not None:
+        at = received_at.timestamp()
+        for audience, message in messages.items():
+            if message is not None and audience is not Audience.ROBOT:
+                message["at"] = at
     return LiveEvent(step.number, messages.__getitem__)
 
 
@@ -120,7 +129,7 @@ def patient_step(
     if answer is None:
         return {"kind": "calm", "number": step.number}
     if plan.schedule.kind is ScheduleKind.SUMMARY:
-        return _summary(context, step, answer, score, streak, live=live)
+        return _summary(plan, context, step, answer, score, streak, live=live)
     valence, band = context.valence, context.valence.band(step.performance)
     if step.close:
         band = Band(0, plan.close_steps.words)
@@ -131,7 +140,7 @@ def patient_step(
         "performance": round(step.performance, 4),
         "hit": step.hit,
         "close": step.close,
-        "words": band.words if context.words_shown else "",
+        "words": plan.choose_words(band, context.told) if context.words_shown else "",
         "chart": context.chart_style,
         "emblem": Emblem.NEUTRAL if step.close else valence.emblem(step.hit),
         "confetti": band.confetti,
@@ -144,6 +153,7 @@ def patient_step(
 
 
 def _summary(
+    plan: SessionPlan,
     context: StepContext,
     step: StoredStep,
     answer: FeedbackSummary,
@@ -161,7 +171,7 @@ def _summary(
         "live": live,
         "performance": round(mean, 4),
         "hit": mean >= 1,
-        "words": band.words if context.words_shown else "",
+        "words": plan.choose_words(band, context.told) if context.words_shown else "",
         "chart": context.chart_style,
         "emblem": valence.emblem(mean >= 1),
         "confetti": band.confetti,

@@ -76,6 +76,13 @@ class SessionForm(OptionForm):
             row = None
         return A2 if row is None else row.to_rule()
 
+    @property
+    def chosen_station(self) -> Station | None:
+        """The station that the form shows; None where it names none that exists."""
+        field: Any = self.fields["station"]
+        value = self["station"].value()
+        return value if isinstance(value, Station) else field.queryset.filter(pk=value).first()
+
     def clean_measure(self) -> MeasureDefinition:
         """Return the measure, A2 where none is named."""
         return self.cleaned_data["measure"] or usual_measure(self.by)

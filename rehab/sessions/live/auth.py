@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from io import BytesIO
 from typing import Any
@@ -23,6 +23,7 @@ from rehab.people.models import Patient, User
 from rehab.people.networks import is_outside, resolve_client_address
 from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.flow import is_session_valid
+from rehab.people.sign_in.tokens import LAST_SEEN_RESOLUTION
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.stations import tablets
 from rehab.stations.device_trust import is_trusted
@@ -172,6 +173,13 @@ def find_unauthorized(
         return not shown or _may_watch(account, shown, scope)
 
     return [index for index, one in enumerate(clients) if not is_allowed(*one)]
+
+
+@database_sync_to_async
+def note_heard(device_ids: Collection[int], now: datetime) -> None:
+    """Store that these devices are connected, at most once a minute each."""
+    due = now - LAST_SEEN_RESOLUTION
+    Device.everywhere.filter(pk__in=device_ids, last_seen_at__lt=due).update(last_seen_at=now)
 
 
 def _session_id(scope: Mapping[str, Any]) -> int:

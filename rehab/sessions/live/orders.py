@@ -14,6 +14,7 @@ from django.utils import timezone
 from msgspec import Struct
 
 from rehab.people.models import User
+from rehab.sessions.alarms import ACKNOWLEDGMENTS
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import find_newest_open
@@ -53,7 +54,7 @@ async def carry_out(host: Host, session_id: int, order: Order) -> None:
     live = await host.settled_session(session_id)
     if isinstance(order, ChangeOrder):
         await _change(host, live, order)
-    elif live.aggregate.fold.state in ENDED_STATES:
+    elif live.aggregate.fold.state in ENDED_STATES and order.what not in ACKNOWLEDGMENTS.values():
         raise NotAllowed("The session has ended.")
     else:
         await live.remark(order.what, order.value, order.by, timezone.now())

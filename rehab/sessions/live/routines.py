@@ -13,18 +13,20 @@ from django.utils import timezone
 
 from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
-from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
 from rehab.sessions.live.session.instruments import LATE_S
+from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
 log = logging.getLogger(__name__)
 
 # Robot heartbeats between those of pages, sweeps of idle sessions and checks of sign-ins.
-SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
+PAGE_BEATS = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
+SWEEP = 5 * PAGE_BEATS
 CHECKPOINT = 8  # heartbeats
 SEAL = round(600 / ROBOT_HEARTBEAT_S)
 # Of the robots, one after the other: a thousand at once hold up steps (docs/performance.md).
@@ -96,20 +98,25 @@ class Routines:
             live.announce_storage(timezone.now())
 
     async def _send_page_heartbeats(self) -> None:
-        """Send heartbeats to the pages of some sessions: of all of them within an interval."""
+        """Send heartbeats to the pages of some sessions: of all of them within an interval.
+
+        Who is connected, and how long ago it was heard, goes along once a sweep.
+        """
         self._beat = (self._beat + 1) % SWEEP
         for live in self._host.sessions.values():
-            if live.id % SWEEP != self._beat or not live.feed.subscribers:
+            if (live.id - self._beat) % PAGE_BEATS or not live.feed.subscribers:
                 continue
-            presence = live.presence(timezone.now())
-            quality = to_text({"type": "heartbeat", "presence": presence})
+            quality = HEARTBEAT
+            if live.id % SWEEP == self._beat:
+                presence = live.presence(timezone.now())
+                quality = to_text({"type": "heartbeat", "presence": presence})
             for subscriber in live.feed.subscribers:
-                if subscriber.audience is Audience.MONITOR:
-                    subscriber.queue_heartbeat(quality)
-                elif subscriber.audience is Audience.PATIENT and not subscriber.was_sent_something(
-                    within_s=1.0
-                ):  # robots have their own
-                    subscriber.queue_heartbeat(HEARTBEAT)
+                if subscriber.audience is Audience.ROBOT:
+                    continue  # robots have their own
+                text = quality if subscriber.audience is Audience.MONITOR else HEARTBEAT
+                is_silent = not subscriber.was_sent_something(within_s=PAGE_HEARTBEAT_S / 2)
+                if text is not HEARTBEAT or is_silent:
+                    subscriber.queue_heartbeat(text)
 
     async def _close_idle(self) -> None:
         for live in list(self._host.sessions.values()):
@@ -130,6 +137,9 @@ class Routines:
         A few sockets at a time: steps wait while another thread has the interpreter.
         """
         sockets = [socket for socket in self._host.sockets if socket.actor is not None]
+        heard = {one.actor.pk for one in sockets if isinstance(one.actor, Device)}
+        if heard:
+            await note_heard(heard, timezone.now())
         for first in range(0, len(sockets), CHECKED_SOCKETS):
             if first:
                 await asyncio.sleep(CHECK_PAUSE_S)

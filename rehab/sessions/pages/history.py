@@ -18,6 +18,7 @@ from django.views.decorators.http import require_safe
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.alarms import find_incidents
 from rehab.sessions.formatting import (
     clinic_time,
     format_day,
@@ -83,6 +84,9 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
     )
     rows = list(page.object_list)
     figures, noted = metrics_by_session(user, rows), describe_noted(user, rows)
+    since = min((row.created_at for row in rows), default=today)
+    incidents = [one for one in find_incidents(user, since) if one.was_one]
+    marked = {one.raised.session_id: one.raised.kind for one in incidents}
     trend = load_trend(user, mine.filter(simulated=simulated), with_imported=True)
     chart = trend_chart_data(trend, today)
     context = {
@@ -99,6 +103,7 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         "simulated": simulated,
         "totals": summarize_trend(included, trend, simulated=simulated),
         "corrected": sum(group["pk__count"] for group in groups if group["excluded"]),
+        "marked": marked,
         "trend": list(zip(chart["hits"]["days"], trend, strict=True)),
         "chart": chart,
     }

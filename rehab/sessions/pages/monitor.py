@@ -59,6 +59,7 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
         "chart_marks": chart_marks(),
         "session": session,
         "locked": session.to_plan().locked,
+        "alarms_elsewhere": f"?but={session.pk}&station={session.station_id or 0}",
         "remarks": [
             {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
             for what, icon in ICONS.items()

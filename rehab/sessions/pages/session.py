@@ -22,7 +22,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.review import review_session
-from rehab.sessions.reports.summary import format_phases, format_summary
+from rehab.sessions.reports.summary import format_incidents, format_phases, format_summary
 from rehab.training.changes import OPEN_STATES, State
 
 
@@ -62,6 +62,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
             summary.duration,
             summary.strides,
         ],
+        "alarms": format_incidents(review, session),
         "phases": format_phases(review),
         "asked": list_answers(user, session),
         "questionnaires": questionnaire_choices(session.clinic_id) if by_name else (),

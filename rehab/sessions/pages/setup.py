@@ -8,6 +8,7 @@ from django.forms.boundfield import BoundWidget
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
+from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_http_methods
@@ -27,8 +28,10 @@ from rehab.sessions.setup.protocol_outline import outline_protocol, protocol_min
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import SIMULATED
 from rehab.stations.builtin import first_station
+from rehab.stations.tablets import has_tablet
 
-# Where the person who set the session up may go next.
+# Where the person who set the session up may go next; unless asked, to the therapist's page where
+# a tablet shows the patient's.
 NEXT_PAGES = ("walk", "monitor")
 # The headings of the part that says when page and robot answer.
 HEADINGS = {
@@ -65,9 +68,8 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
                 messages.success(request, message % {"name": preset.name})
                 return redirect(f"{reverse('setup', args=[patient.pk])}?preset={preset.pk}")
         elif (session := form.create()) is not None:
-            return redirect(
-                wanted if wanted in NEXT_PAGES else NEXT_PAGES[0], session_id=session.pk
-            )
+            usual = NEXT_PAGES[has_tablet(session.station, timezone.now())]
+            return redirect(wanted if wanted in NEXT_PAGES else usual, session_id=session.pk)
     else:
         initial = initial_choices(patient, user) | (chosen.to_initial(user) if chosen else {})
         form = SessionForm(initial=initial, patient=patient, by=user)
@@ -82,6 +84,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     sources, tried = _part_sources(form)
     context = {
         "patient": patient,
+        "has_tablet": has_tablet(form.chosen_station, timezone.now()),
         "walked_before": TrainingSession.objects.visible_to(user).filter(patient=patient).exists(),
         "protocols": [
             (choice, outlines[choice.data["value"].value]) for choice in form["protocol"]

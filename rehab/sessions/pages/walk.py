@@ -11,12 +11,21 @@ from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
 from rehab.people.consent.services import is_remote_view_allowed
+from rehab.people.models import ScreenSide
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.monitor import redirect_to_consent
+from rehab.sessions.pages.screen_size import screen_of
 from rehab.training.changes import ENDED_STATES, State
+
+# How the page is laid out for a side: as one column, in the middle or in a half of the screen.
+COLUMNS = {
+    ScreenSide.CENTER.value: "center",
+    ScreenSide.IN_RIGHT.value: "right",
+    ScreenSide.IN_LEFT.value: "left",
+}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
@@ -40,6 +49,8 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
         "mirror": mirror,
         "replayed": mirror and "replay" in request.GET,  # in the frame of the replay
         "tablet": alone,
+        "column": COLUMNS.get(session.patient.screen_side, ""),
+        "screen": screen_of(request, session, mirror=mirror),
         "leave_to": reverse("start") if alone else reverse("patient", args=[session.patient_id]),
     }
     return render(request, "sessions/walk.html", context)

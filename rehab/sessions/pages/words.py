@@ -14,6 +14,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_http_methods
 
+from rehab.feedback.forms import POOL_MAX
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
@@ -41,9 +42,11 @@ class WordsForm(forms.Form):
             self.fields[f"words_{number}"] = forms.CharField(
                 label=_("from %(percent)d %% of the goal")
                 % {"percent": round(100 * band.from_performance)},
-                max_length=TEXT_MAX,
+                help_text=_("One a line; they take turns."),
+                max_length=POOL_MAX * TEXT_MAX,
                 initial=band.words,
                 required=False,
+                widget=forms.Textarea(attrs={"rows": 4}),
             )
 
     def clean(self) -> dict[str, Any]:

@@ -10,13 +10,14 @@ from datetime import datetime
 from django.utils.translation import gettext, ngettext
 
 from rehab.people.models import User
+from rehab.sessions.alarms import ACKNOWLEDGMENTS
 from rehab.sessions.formatting import format_number
 from rehab.sessions.log import EVENTS, FallSeverity, Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
 ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
 ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # part of the fall, not of their own
-REMARKS = frozenset(Remark) - frozenset(ABOUT_A_FALL)
+REMARKS = frozenset(Remark) - {*ABOUT_A_FALL, *ACKNOWLEDGMENTS.values()}
 
 
 @dataclass(slots=True, eq=False)

@@ -34,6 +34,7 @@ from rehab.sessions.reports.better_or_worse import (
     judge,
     load_results,
 )
+from rehab.sessions.reports.earned import find_earned
 from rehab.training.measures import A2
 
 MILESTONES = (5, 10, 25, 50)  # sessions, and each further hundred
@@ -65,15 +66,16 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
     last = before.last()
     is_counted = find_counted(TrainingSession.everywhere.filter(pk=session.pk)).exists()
     if session.patient.blinded or not is_counted:
-        return {"title": "", "bars": [], "facts": [], "sentence": ""}
+        return {"title": "", "bars": [], "facts": [], "sentence": "", "earned": None}
     results = load_results(*([last] if last else []), session)
+    earned = find_earned(session, before, plan.valence)
     labels = [_("Today"), _("Last time")]
     labeled = list(zip(labels, reversed(results), strict=False))
     if not plan.valence.has_points:
         is_push = plan.measure.slug == A2.slug
         title = _("Your push, on average") if is_push else _("Your value, on average")
         bars = draw_means(labeled, plan.measure.unit)
-        return {"title": title, "bars": bars, "facts": [], "sentence": ""}
+        return {"title": title, "bars": bars, "facts": [], "sentence": "", "earned": earned}
     return {
         "title": _("Steps at the goal"),
         "bars": [
@@ -86,6 +88,7 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
         ],
         "facts": _find_facts(session, before, rewards=plan.valence.rewards),
         "sentence": describe_today(results[-1], results[0] if len(results) > 1 else None),
+        "earned": earned,
     }
 
 

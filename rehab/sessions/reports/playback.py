@@ -14,16 +14,26 @@ from datetime import datetime
 from typing import Any
 
 from rehab.people.models import User
+from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
     LiveEvent,
+    alarms_event,
     remark_event,
     robot_report_event,
     robot_stopped_event,
 )
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.incidents import RobotIncident
-from rehab.sessions.log import EVENTS, Remark, RobotEntry, RuleEntry, SessionEvent, Step
+from rehab.sessions.log import (
+    ALARM_KINDS,
+    EVENTS,
+    Remark,
+    RobotEntry,
+    RuleEntry,
+    SessionEvent,
+    Step,
+)
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog, log_rows, to_change
@@ -60,7 +70,7 @@ def play_back(user: User, session: TrainingSession) -> Message:
         as it was ordered. ``took_s``: the time of the last moment.
     """
     fold = SessionFold(session.to_plan())
-    rows = list(_rows(session))
+    rows, alarms = list(_rows(session)), OpenAlarms()
     began = start_of(session)
     presence = PRESENCE | {"robot": any(_is_robot(row) for _, row in rows)}
     about = {
@@ -71,7 +81,15 @@ def play_back(user: User, session: TrainingSession) -> Message:
     }
     snapshots = {
         audience.value: snapshot(
-            audience, fold, about, presence, [], robot={}, robot_stopped=False, marks=[]
+            audience,
+            fold,
+            about,
+            presence,
+            [],
+            robot={},
+            robot_stopped=False,
+            marks=[],
+            alarms=alarms,
         )
         for audience in AUDIENCES
     }
@@ -81,7 +99,11 @@ def play_back(user: User, session: TrainingSession) -> Message:
     for at, row in rows:
         # What was noted before the start belongs to it, and a clock may be set back.
         at_s = max(at_s, round((at - began).total_seconds(), 2))
-        for event in _events(fold, row, late):
+        events = _events(fold, row, late)
+        if isinstance(row, SessionEvent) and row.kind in ALARM_KINDS:
+            alarms.apply(row)
+            events.append(alarms_event(fold, alarms))
+        for event in events:
             texts = [event.text(audience) for audience in AUDIENCES]
             if any(texts):
                 messages = [text and json.loads(text) for text in texts]

@@ -24,7 +24,12 @@ from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.noted import ADVERSE, read_noted
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
-from rehab.sessions.reports.summary import Figure, format_phases, format_summary
+from rehab.sessions.reports.summary import (
+    Figure,
+    format_incidents,
+    format_phases,
+    format_summary,
+)
 from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
@@ -46,6 +51,7 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
     phases = format_phases(review)
     return {
         "figures": _list_figures(plan, review, ended[0] if ended else None),
+        "incidents": format_incidents(review, session),
         "goals": _describe_goals(plan, review),
         "phases": phases[:MAX_PHASES],
         "more_phases": max(0, len(phases) - MAX_PHASES),

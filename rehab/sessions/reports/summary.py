@@ -8,7 +8,15 @@ from typing import Any
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
-from rehab.sessions.formatting import MISSING, format_duration, format_number, format_rate
+from rehab.sessions.alarms import Alarm, Incident, fold_incidents
+from rehab.sessions.formatting import (
+    MISSING,
+    clinic_time,
+    format_duration,
+    format_number,
+    format_rate,
+)
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import SessionReview
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
@@ -71,6 +79,31 @@ def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
             ", ".join(_describe_not_counted(not_counted, figures["late"])),
         ),
     )
+
+
+def format_incidents(review: SessionReview, session: TrainingSession) -> list[Figure]:
+    """Return a figure for falls and one for the robot's own stops, where there were any."""
+    found = [one for one in fold_incidents(review.rows) if one.was_one]
+    labels = {Alarm.FALL: _("Falls"), Alarm.ROBOT_STOP: _("Robot stopped by itself")}
+    figures = []
+    for kind, label in labels.items():
+        some = [one for one in found if one.raised.kind == kind]
+        if some:
+            notes = [_describe_incident(one, session) for one in some]
+            figures.append(Figure(label, format_number(len(some), 0), "; ".join(notes)))
+    return figures
+
+
+def _describe_incident(incident: Incident, session: TrainingSession) -> str:
+    parts = [f"{clinic_time(incident.raised.at, session.clinic):%H:%M}"]
+    if incident.severity is not None:
+        parts.append(str(incident.severity.label))
+    if incident.ended is None:
+        parts.append(_("not seen yet"))
+    else:
+        seen_at = clinic_time(incident.ended.at, session.clinic)
+        parts.append(_("seen %(time)s") % {"time": f"{seen_at:%H:%M}"})
+    return ", ".join(parts)
 
 
 def _describe_not_counted(count: int, late: int) -> list[str]:

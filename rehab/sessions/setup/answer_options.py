@@ -102,6 +102,16 @@ ANSWER_OPTIONS = (
         ),
     ),
     Option(
+        name="words_vary",
+        label=_("Phrases take turns"),
+        help="Whether a band's phrases take turns; else its first one is always shown.",
+        kind=bool,
+        default=True,
+        place="words_vary",
+        group=Group.FEEDBACK,
+        column=OptionColumn("words_vary", "", "true: phrases of a band take turns, by the seed."),
+    ),
+    Option(
         name="robot_threshold",
         label=_("Robot acts from, % of the goal"),
         help="Percent of the goal.",

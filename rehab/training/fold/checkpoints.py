@@ -49,6 +49,7 @@ def fold_to_json(fold: SessionFold) -> dict[str, Any]:
         "adapted": following.moved,
         "pending": asdict(delivery.pending),
         "answer": None if delivery.answer is None else asdict(delivery.answer),
+        "told": delivery.told,
         "reported": list(delivery.reported),
         "trained": asdict(fold.trained),
         "feedback": asdict(fold.feedback),
@@ -91,6 +92,7 @@ def fold_from_json(plan: SessionPlan, data: Mapping[str, Any]) -> SessionFold | 
     following.latest.extend(data["latest"])
     delivery.pending = FeedbackSummary(**data["pending"])
     delivery.answer = None if data["answer"] is None else FeedbackSummary(**data["answer"])
+    delivery.told = data["told"]
     delivery.reported.extend(data["reported"])
     fold.trained, fold.feedback = Tally(**data["trained"]), Tally(**data["feedback"])
     fold.phases = tuple(Tally(**tally) for tally in data["phases"])

@@ -36,28 +36,31 @@ function describeSource(isThere, strides, silent_s, isRunning, trouble) {
   return [valid < ENOUGH * count ? "!" : "✓", words];
 }
 
-function describeTablets(count, silent_s) {
+function describeTablets(count, silent_s, isHeard) {
   if (!count) return ["–", _("none; only this mirror")];
   const what = count > 1 ? fill(_("%(count)s connected"), { count }) : _("connected");
   if (silent_s === null) return ["✓", what];
-  if (silent_s > SILENT_S.tablet) return ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];
+  if (!isHeard) return ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];
   return ["✓", fill(_("%(what)s, heard %(ago)s"), { what, ago: ago(silent_s) })];
 }
 
-export function createConnections({ state, show }, robot) {
+export function createConnections({ state, show, socket, robot }) {
   function describeAll({ presence, state: sessionState }) {
-    const silent = (seconds) => (seconds == null ? null : seconds + state.sincePresence_s);
+    if (socket.isStale()) {
+      const unknown = ["–", fill(_("not known for %(count)s s"), { count: Math.floor(socket.silentFor() / 1000) })];
+      return { source: unknown, tablets: unknown, robot: unknown };
+    }
     const strides = state.strides.slice(-LAST);
     const { text, isLow } = robot.connection;
     return {
       source: describeSource(
         presence.source,
         strides,
-        silent(presence.stride_ago_s),
+        state.strideAgo_s,
         sessionState === "running",
         presence.source_trouble,
       ),
-      tablets: describeTablets(presence.tablets, silent(presence.tablet_ago_s)),
+      tablets: describeTablets(presence.tablets, state.tabletAgo_s, state.isTabletHeard),
       robot: presence.robot ? [isLow ? "!" : "✓", text] : ["–", _("none")],
     };
   }
@@ -65,7 +68,7 @@ export function createConnections({ state, show }, robot) {
   return {
     draw(session) {
       const { about, presence } = session;
-      const isSeen = presence.tablets > 0;
+      const isSeen = state.isTabletHeard && !socket.isStale();
       show("mirror", isSeen ? fill(_("%(name)s sees"), { name: about.nickname }) : _("Patient’s page"));
       show("mirrored", isSeen ? _("now") : _("no tablet"));
       const described = describeAll(session);

@@ -5,7 +5,6 @@
 
 import { _ } from "garry/shared/language";
 import { connect } from "garry/shared/session_socket";
-import { soundAlarm } from "garry/monitor/alarm_tone";
 import { createAlarms } from "garry/monitor/alarms";
 import { createConnections } from "garry/monitor/connections";
 import { createActivationThreshold } from "garry/monitor/controls/activation_threshold";
@@ -72,19 +71,16 @@ const socket = connect(root.dataset.socket, {
     if (!frame) frame = requestAnimationFrame(draw);
   },
   onLink(link, reason) {
-    const note = document.querySelector(".notice.link");
-    note.hidden = link === "open";
-    note.textContent =
-      link === "lost"
-        ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.")
-        : reason;
-    if (link === "lost" && state.session) soundAlarm();
+    const note = document.querySelector(".notice.link"); // a lost one is told by its silence (causes.js)
+    note.hidden = link === "open" || (link === "lost" && Boolean(state.session));
+    note.textContent = link === "lost" ? _("No connection to the server. This page tries again by itself.") : reason;
     if (link === "closed" && state.session) leaveWhenEnded();
   },
 });
 
 const page = {
   state,
+  socket,
   show,
   announce,
   onPress,
@@ -95,8 +91,8 @@ const page = {
   driveRobot: (ahead, left) => socket.send({ type: "robot", order: "drive", ahead, left }),
   orderStop: () => robot.order("stop"),
 };
-const robot = new RobotPanel(document.querySelector(".robot"), page);
-const connections = createConnections(page, robot);
+const robot = (page.robot = new RobotPanel(document.querySelector(".robot"), page));
+const connections = createConnections(page);
 const parts = [
   createRunState(page),
   createPhase(page),
@@ -114,7 +110,7 @@ const parts = [
   createFall(page),
   createStrideCharts(page),
   robot,
-  createAlarms(page, robot),
+  createAlarms(page),
   createReadiness(robot),
 ];
 

@@ -7,7 +7,8 @@ import { cureOf, describeDecision, describeReason, describeState } from "garry/m
 import { RobotScene } from "garry/shared/robot_scene";
 
 const KEPT_POSES = 240;
-const ANSWER_MS = 2_000; // after which an open but silent connection counts as lost
+const STOP_MS = 450; // after which a stop that nobody confirmed is told as unheard
+const ANSWER_MS = 2_000; // of any other order
 // Reasons in its status that a therapist should know of; the others are expected.
 const NOTABLE = new Set([
   "unwatched",
@@ -114,13 +115,13 @@ export class RobotPanel {
     if (this.#page.orderRobot(order)) {
       this.#pendingOrder = order;
       this.#button(order).classList.add("asked");
-      this.#timer = setTimeout(() => this.#reportUnanswered(order), ANSWER_MS);
+      this.#timer = setTimeout(() => this.#reportUnanswered(order), order === "stop" ? STOP_MS : ANSWER_MS);
     } else this.#reportUnsent(order);
     this.draw();
   }
 
   #reportUnanswered(order) {
-    const stop = _("No answer. If the robot moves, use its own switch.");
+    const stop = _("Stop not heard. Use the robot’s own switch.");
     this.#reportFailure(order === "stop" ? stop : _("No answer. Try again."));
   }
 
@@ -155,7 +156,10 @@ export class RobotPanel {
     const share = this.#decision?.activated_share;
     show("robot-state", this.#describeState());
     const isOther = this.#isHeld || this.#orderFailure; // than what it decides
-    show("share", share == null || isOther ? "" : fill(_("%(share)s of windows"), { share: percent(share) }));
+    show(
+      "share",
+      share == null || isOther ? "" : fill(_("So far it celebrates %(share)s of the time."), { share: percent(share) }),
+    );
     show("robot-why", this.#orderFailure || this.#describeHold());
     show("robot-cure", this.#describeCure());
     show("robot-last", isOther ? "" : describeDecision(this.#decision, this.#breakReason));
@@ -202,12 +206,12 @@ export class RobotPanel {
 
   #describeHold() {
     const reason = this.#isConnected && this.#status?.reason;
-    if (this.#isHeld) return fill(_("It stands: %(why)s."), { why: describeReason(reason || "stopped") });
+    if (this.#isHeld) return fill(_("It stands: %(why)s."), { why: describeReason(this.#stopReason) });
     return NOTABLE.has(reason) ? fill(_("It would not move: %(why)s."), { why: describeReason(reason) }) : "";
   }
 
   #describeCure() {
-    const parts = [cureOf(this.#status?.reason), this.#describeBattery()];
+    const parts = [cureOf(this.#isHeld ? this.#stopReason : this.#status?.reason), this.#describeBattery()];
     if (this.#isHeld) parts.push(_("Put it on its mark, nobody near it, then:"));
     return parts.filter(Boolean).join(" ");
   }
@@ -224,10 +228,14 @@ export class RobotPanel {
   get alarm() {
     if (!this.#isConnected || this.#isRecovering) return "";
     if (!this.#isStopped && this.#status?.state !== "stopped") return "";
-    const why = describeReason(this.#status?.reason || "stopped");
-    const cure = cureOf(this.#status?.reason);
-    const again = _("“Let it move” is in its panel.");
-    return [fill(_("The robot stands: %(why)s."), { why }), cure, again].filter(Boolean).join(" ");
+    const why = fill(_("The robot stands: %(why)s."), { why: describeReason(this.#stopReason) });
+    return [why, cureOf(this.#stopReason)].filter(Boolean).join(" ");
+  }
+
+  // The server remembers why the robot stopped by itself, also where its program was restarted since.
+  get #stopReason() {
+    const known = this.#isStopped && this.#page.state.session?.stop_reason;
+    return known || this.#status?.reason || "stopped";
   }
 
   // Return [sign, text] of whether it may take part.
@@ -242,7 +250,8 @@ export class RobotPanel {
     if (!this.#isConnected) return { text: _("none"), isLow: false };
     if (this.#isHeld) return { text: this.#describeState(), isLow: true };
     const { battery_share: share, battery_low: low, simulated, open_loop: open, bumpers } = this.#status ?? {};
-    const lacks = simulated === false ? `${open ? _(", open loop") : ""}${bumpers ? "" : _(", no bumper")}` : "";
+    const lacks =
+      simulated === false ? `${open ? _(", cannot tell where it is") : ""}${bumpers ? "" : _(", no bumper")}` : "";
     if (share == null) return { text: _("connected") + lacks, isLow: false };
     const battery = fill(_("battery %(share)s"), { share: percent(share) });
     return { text: battery + (low ? _(": charge it") : "") + lacks, isLow: Boolean(low) };

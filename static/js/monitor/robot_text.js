@@ -13,15 +13,15 @@ const REASONS = {
   resting: _("resting"),
   unknown_gesture: _("it does not know the gesture"),
   bad_gesture: _("it cannot perform the gesture; compose it anew"),
-  base_cannot_move: _("this base does not move"),
-  stopped: _("somebody stopped it"),
+  base_cannot_move: _("this robot cannot move"),
+  stopped: _("it was stopped"),
   disarmed: _("nobody has let it move yet"),
   away_from_home: _("away from its place"),
   no_session: _("no session"),
   not_running: _("the session does not run"),
   unwatched: _("no therapist's page is open"),
-  base_silent: _("the base does not answer"),
-  order_lapsed: _("the order came too late"),
+  base_silent: _("its wheels do not answer"),
+  order_lapsed: _("what it was told came too late"),
   battery_low: _("its battery is low"),
   battery_empty: _("its battery is empty"),
   charging: _("it is charging"),
@@ -30,16 +30,16 @@ const REASONS = {
   wheel_drop: _("a wheel hangs free"),
   over_current: _("a wheel is blocked"),
   stalled: _("a wheel is blocked"),
-  tether: _("it left its place"),
+  tether: _("it went too far from its place"),
   slipped: _("it slipped"),
   button: _("its stop button was pressed"),
-  restarted: _("the base was restarted"),
-  nobody_listens: _("no driver listens to it"),
+  restarted: _("it was switched off and on"),
+  nobody_listens: _("its driver program does not run"),
   feeler_missing: _("a sensor that protects it is missing"),
   nobody_watches: _("nothing would stop it if the connection were lost"),
   other_driver: _("another program drives it"),
-  unordered_motion: _("it moved without an order"),
-  open_loop: _("too long for a base that does not tell where it is"),
+  unordered_motion: _("something moved it"),
+  open_loop: _("too far for a robot that does not know where it is"),
   place_unknown: _("nobody has looked for long whether it is at its place"),
   firmware_unknown: _("the base's version is not known yet"),
   firmware_refused: _("the base's version is too old"),
@@ -50,7 +50,7 @@ const REASONS = {
   bad_odometry: _("it does not know where it is"),
   no_link: _("the connection was lost"),
   replaced: _("another session began"),
-  base_lost: _("the base was lost"),
+  base_lost: _("its wheels were lost"),
   worker_died: _("its program died"),
 };
 
@@ -78,7 +78,7 @@ const STATES = {
   idle: _("waiting"),
   performing: _("moving"),
   stopped: _("stopped"),
-  disarmed: _("not armed"),
+  disarmed: _("waits until you let it move"),
   away: _("away from its place"),
 };
 
@@ -88,11 +88,11 @@ export const describeState = (state) => STATES[state] ?? state;
 
 // What a window came to and what followed; `breakReason`: why the gesture after it did not end as it should.
 export function describeDecision(decision, breakReason) {
-  if (!decision) return _("Decides every five seconds of walking.");
+  if (!decision) return _("It answers each five seconds of walking.");
   const { mean, threshold, gesture, intensity, reason } = decision;
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
-  return fill(_("Last window %(mean)s, acts from %(threshold)s: %(what)s."), {
+  return fill(_("The last five seconds: %(mean)s of the goal, it celebrates from %(threshold)s: %(what)s."), {
     mean: percent(mean),
     threshold: percent(threshold),
     what: gesture ? gesture + size + end : describeReason(reason),

@@ -20,6 +20,8 @@ export function update(target, event, names) {
   for (const name of names) if (event[name] !== undefined) target[name] = event[name];
 }
 
+export const hasStarted = ({ state }) => state === "running" || state === "paused";
+
 // A remark as charts show it: after a stride.
 export const annotationOf = ({ number, what, value }) => ({ after: number, kind: what, value });
 
@@ -28,6 +30,10 @@ export class MonitorState {
   strides = [];
   annotations = []; // changes and remarks, each after a stride
   lastStride = null;
+  fellHere = false; // a fall was tapped on this page
+  hadTablet = false; // since the start, or shortly before it
+  hadRobot = false;
+  #snapshotAt = 0;
   #presenceAt = 0;
   #runningAt = null;
 
@@ -36,8 +42,9 @@ export class MonitorState {
     this.strides = snapshot.steps.slice(-KEPT_STRIDES);
     this.annotations = snapshot.marks;
     this.lastStride ??= this.strides.at(-1) ?? null;
-    this.#presenceAt = performance.now();
+    this.#snapshotAt = this.#presenceAt = performance.now();
     this.#keepRunning();
+    this.#keepDevices();
   }
 
   // Add strides that were walked while the connection was lost.
@@ -56,6 +63,15 @@ export class MonitorState {
       this.session.presence = event.presence;
       this.#presenceAt = performance.now();
     }
+    this.#keepDevices();
+  }
+
+  // Keep which devices have been there: those that were not cannot be lost.
+  #keepDevices() {
+    const { presence } = this.session;
+    const isOn = hasStarted(this.session);
+    this.hadTablet = (isOn && this.hadTablet) || presence.tablets > 0;
+    this.hadRobot = (isOn && this.hadRobot) || presence.robot;
   }
 
   // Keep since when it runs, as far as this page has seen it.
@@ -83,6 +99,27 @@ export class MonitorState {
   get sinceRunning_s() {
     this.#keepRunning();
     return this.#runningAt === null ? 0 : (performance.now() - this.#runningAt) / 1000;
+  }
+
+  // Seconds since the last stride and since the tablet was heard; null for never.
+  get strideAgo_s() {
+    return this.#ago(this.session.presence.stride_ago_s);
+  }
+  get tabletAgo_s() {
+    return this.#ago(this.session.presence.tablet_ago_s);
+  }
+
+  get isTabletHeard() {
+    return this.session.presence.tablets > 0 && !(this.tabletAgo_s > SILENT_S.tablet);
+  }
+
+  #ago(seconds) {
+    return seconds == null ? null : seconds + this.sincePresence_s;
+  }
+
+  // Seconds since this page connected.
+  get sinceSnapshot_s() {
+    return (performance.now() - this.#snapshotAt) / 1000;
   }
 
   // Seconds since the server said who is connected.

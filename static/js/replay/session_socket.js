@@ -10,6 +10,8 @@ export function connect(path, handlers) {
     change: () => Promise.reject(new Error(_("This is a replay."))),
     ask: () => Promise.reject(new Error(_("This is a replay."))),
     send: () => false,
+    silentFor: () => 0,
+    isStale: () => false,
     close() {},
   };
 }

@@ -23,6 +23,8 @@ const REMARKS = {
   fall: _("fall"),
   fall_severity: _("hurt by the fall"),
   fall_withdrawn: _("it was no fall"),
+  fall_acknowledged: _("fall seen by a therapist"),
+  stop_acknowledged: _("robot’s stop seen by a therapist"),
   handrail: _("handrail"),
   verbal_cue: _("verbal cue"),
   borg: _("Borg"),

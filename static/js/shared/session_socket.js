@@ -5,7 +5,7 @@
 // onSnapshot(snapshot): all that the page shows, as of now; after each connection. It replaces what
 //   the page knew: totals come from here and from events, never from counting.
 // onSteps(steps): past steps that this page does not have, oldest first, after a break.
-// onEvent(event): what has just happened.
+// onEvent(event): what has just happened; what took too long to get here is not `live`.
 // onLink(state, reason): "open", "lost" (it comes back by itself) or "closed" (it does not; `reason`
 //   is a text for people).
 //
@@ -16,8 +16,11 @@ import { _ } from "garry/shared/language";
 import { refusal } from "garry/shared/labels";
 
 const wire = JSON.parse(document.getElementById("wire").textContent); // robot/wire/
-const SILENCE_MS = 2.4 * wire.heartbeat_ms;
-const DOUBT_MS = 1.2 * wire.heartbeat_ms; // after which an old socket is not trusted when the tablet wakes up
+const STALE_MS = 2 * wire.heartbeat_ms; // after which nothing on the page counts as present
+const LATE_S = 2; // what was sent so long ago is told, and not shown as live
+const SILENCE_MS = 8 * wire.heartbeat_ms;
+const DOUBT_MS = 4 * wire.heartbeat_ms; // after which an old socket is not trusted when the tablet wakes up
+const SEEN_MS = 4 * wire.heartbeat_ms; // a page confirms that it is there at least so often
 const CONFIRM_MS = 1_000;
 const CONFIRM_FRAMES = 8; // after so many at once: the server waits for its page
 const ANSWER_MS = 8_000;
@@ -32,6 +35,9 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
   let state = "";
   let retryPause = FIRST_PAUSE_MS;
   let receivedAt = 0;
+  let heardAt = performance.now(); // unlike `receivedAt` not when a new connection is tried
+  let confirmedAt = 0;
+  let clockAhead_s = Infinity; // of ours before the server's, by the frame that came quickest
   let lastNumber = null; // the last step that this page has
   let catchUpTo = null; // steps up to this one are being sent after a break
   let confirmedFrame = 0;
@@ -52,9 +58,10 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
   }
 
   function receive(message) {
-    receivedAt = performance.now();
+    receivedAt = heardAt = performance.now();
     switch (message.type) {
       case "snapshot":
+        measureAge(message.now);
         retryPause = FIRST_PAUSE_MS;
         catchUpTo = message.number;
         if (lastNumber === null || lastNumber > catchUpTo) lastNumber = catchUpTo;
@@ -76,12 +83,13 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
             if (event.number <= lastNumber) continue;
             lastNumber = event.number;
           }
+          if (event.at && measureAge(event.at) > LATE_S) event.live = false;
           onEvent?.(event);
         }
         break;
       case "heartbeat":
         caughtUp();
-        confirm(0); // there is a page behind this socket, though it has nothing new to show
+        if (heardAt - confirmedAt > SEEN_MS) confirm(0); // there is a page behind this socket
         if (message.presence) onEvent?.({ kind: "presence", presence: message.presence });
         break;
       case "done":
@@ -105,6 +113,13 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     retryPause = FIRST_PAUSE_MS;
   }
 
+  // Return how old something of this time of the server is [s]; its clock and ours may differ.
+  function measureAge(at_s) {
+    const ahead = Date.now() / 1000 - at_s;
+    clockAhead_s = Math.min(clockAhead_s, ahead);
+    return ahead - clockAhead_s;
+  }
+
   function caughtUp() {
     lastNumber = Math.max(lastNumber, catchUpTo);
   }
@@ -118,7 +133,9 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
 
   function sendConfirmation() {
     const { frame } = forgetConfirmation();
-    if (send({ type: "seen", frame })) confirmedFrame = Math.max(confirmedFrame, frame);
+    if (!send({ type: "seen", frame })) return;
+    confirmedFrame = Math.max(confirmedFrame, frame);
+    confirmedAt = performance.now();
   }
 
   function forgetConfirmation() {
@@ -213,8 +230,12 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     return () => clearTimeout(timer);
   }
 
+  // How long the server has said nothing [ms], and whether that is too long for anything here to count as present.
+  const silentFor = () => performance.now() - heardAt;
+  const isStale = () => state !== "closed" && silentFor() > STALE_MS;
+
   addEventListener("online", reconnectIfStale);
   document.addEventListener("visibilitychange", reconnectIfStale);
   open();
-  return { change, ask, send, close, after };
+  return { change, ask, send, close, after, silentFor, isStale };
 }

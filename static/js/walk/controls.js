@@ -5,7 +5,8 @@ import { _ } from "garry/shared/language";
 
 const GUARD_MS = 700; // a question that just appeared takes no answer: the tap may be a double tap
 const NOTE_MS = 6_000;
-const ANSWER_MS = 2_000; // after which an open but silent connection counts as lost
+const ANSWER_MS = 450; // after which a stop that nobody confirmed is told as unheard
+const UNHEARD = _("Stop not heard. Use the robot’s own switch, or call your therapist.");
 
 export function createControls(body, socket, showQuestion) {
   const note = body.querySelector(".note");
@@ -49,7 +50,7 @@ export function createControls(body, socket, showQuestion) {
   // Show at once that the tap was registered; the server says when the robot is stopped.
   function stopRobot() {
     const sent = socket.send({ type: "robot", order: "stop" });
-    if (!sent) notify(_("No connection. Call your therapist."));
+    if (!sent) notify(UNHEARD);
     showOrder(sent ? _("Stop sent") : _("Not sent"));
     clearTimeout(orderTimer);
     orderTimer = setTimeout(sent ? reportUnanswered : () => showOrder(""), sent ? ANSWER_MS : NOTE_MS);
@@ -58,7 +59,7 @@ export function createControls(body, socket, showQuestion) {
   // Called by the page, too, where another server should have stopped it and did not say so.
   function reportUnanswered() {
     clearTimeout(orderTimer);
-    if (!isStopped) notify(_("No answer. Call your therapist."));
+    if (!isStopped) notify(UNHEARD);
     showOrder("");
   }
 

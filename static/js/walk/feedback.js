@@ -7,7 +7,6 @@ import { describeStep, describeSummary, messageFor, phaseLeft, timeLeft } from "
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
 const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };
-const SIZES = 4; // sizes that a long phrase may shrink through
 
 const rosette = Array.from({ length: 240 }, (_, i) => {
   const angle = (Math.PI * i) / 120;
@@ -17,18 +16,16 @@ const rosette = Array.from({ length: 240 }, (_, i) => {
 
 export function createFeedback(body) {
   const find = (selector) => body.querySelector(selector);
-  const [phrase, words, sub, live] = [".phrase", ".words", ".sub", ".said"].map(find);
+  const [words, sub, live] = [".words", ".sub", ".said"].map(find);
   const [label, key, run, runWords] = [".label", ".key", ".run", ".run span"].map(find);
   const [time, part, bar, partWords] = [".time", ".part", ".part progress", ".part p"].map(find);
   const emblem = find(".emblem svg");
   const signs = emblem.querySelectorAll("text");
   const beads = run.querySelectorAll("i");
   const name = find("header b").textContent.trim();
-  const sizes = new Map(); // of phrases that were fitted before
   let drawnNumber = -1;
   let shownScore = 0; // the score
   find(".gain path").setAttribute("d", `M${rosette}Z`);
-  addEventListener("resize", () => sizes.clear());
 
   function set(element, text) {
     if (element.textContent === text) return false;
@@ -43,24 +40,11 @@ export function createFeedback(body) {
     words.replaceChildren(line);
   }
 
-  // Make a long phrase smaller until it fits its place.
-  function fit(text) {
-    if (!sizes.has(text)) {
-      let size = 0;
-      const tooBig = () => words.scrollHeight > phrase.clientHeight + 2 || words.scrollWidth > phrase.clientWidth + 2;
-      do phrase.dataset.fit = size;
-      while (tooBig() && ++size < SIZES);
-      sizes.set(text, Math.min(size, SIZES - 1));
-    }
-    phrase.dataset.fit = sizes.get(text);
-  }
-
   function drawStep(session) {
     const step = session.last;
     const missing = step?.kind === "missing";
     const text = missing ? _("Step not measured.") : (step?.words ?? "");
     setPhrase(text);
-    fit(text);
     emblem.dataset.emblem = missing ? "none" : (step?.emblem ?? "");
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
@@ -79,7 +63,6 @@ export function createFeedback(body) {
     if (set(key, text) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }
-    key.dataset.long = Math.min(text.length, 6);
     run.dataset.streak = streak ?? "none";
     beads.forEach((bead, i) => bead.classList.toggle("on", streak > i));
     set(
@@ -100,7 +83,7 @@ export function createFeedback(body) {
   }
 
   // Draw a screen of the session.
-  return function draw(screen, session) {
+  return function draw(screen, session, page) {
     if (session) set(time, timeLeft(session));
     if (session) body.dataset.chart = session.chart;
     if (screen === "feedback") {
@@ -108,9 +91,11 @@ export function createFeedback(body) {
       drawTotals(session);
       return;
     }
-    const [text, more] = messageFor(screen, session, name, body.classList.contains("alone"));
+    const [text, more] = messageFor(screen, session, name, {
+      isAlone: body.classList.contains("alone"),
+      silent_s: page.silent_s,
+    });
     setPhrase(text);
-    delete phrase.dataset.fit;
     set(sub, more);
     set(live, `${text} ${more}`);
     if (screen === "calm") drawPart(session);

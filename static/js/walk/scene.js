@@ -8,9 +8,19 @@ const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 94;
 const TICKS = [0.25, 0.5, 0.75, 1.25];
+// `low`: where the scale ends once words take the room above it.
 const LAYOUTS = {
-  portrait: { box: "0 0 800 1280", x: 600, y150: 484, y0: 1068, chart: [60, 476], figure: [400, 930, 1.66] },
-  landscape: { box: "0 0 1280 800", x: 1066, y150: 150, y0: 612, chart: [520, 930], figure: [900, 560, 1.36] },
+  portrait: { box: "0 0 800 1280", x: 600, y150: 484, low: 704, y0: 1068, chart: [60, 476], figure: [400, 930, 1.66] },
+  landscape: {
+    box: "0 0 1280 800",
+    x: 1066,
+    y150: 150,
+    low: 150,
+    y0: 612,
+    chart: [520, 930],
+    figure: [900, 560, 1.36],
+  },
+  column: { box: "0 0 800 1000", x: 600, y150: 456, low: 590, y0: 812, chart: [60, 476], figure: [400, 760, 1.06] },
 };
 
 export function createScene(svg) {
@@ -26,8 +36,11 @@ export function createScene(svg) {
 
   const y = (performance) => layout.y0 - ((layout.y0 - layout.y150) * Math.min(Math.max(performance, 0), TOP)) / TOP;
 
-  function layOut() {
-    layout = LAYOUTS[portrait.matches ? "portrait" : "landscape"];
+  // Place all for the screen's shape, and for how much of the scene has gone (fit_layout.js).
+  function layOut(dropped = 0) {
+    const { column } = document.body.dataset;
+    layout = { ...LAYOUTS[column ? "column" : portrait.matches ? "portrait" : "landscape"] };
+    if (dropped >= 2) layout.y150 = layout.low;
     const { x, y0, y150, figure } = layout;
     const [goal, top, bottom] = [y(1), y150 - 36, y0 + 78];
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - TUBE_RADIUS ** 2);
@@ -75,7 +88,6 @@ export function createScene(svg) {
     dots.draw(entries);
   }
 
-  portrait.addEventListener("change", layOut);
   layOut();
-  return { show };
+  return { show, layOut };
 }

@@ -1,7 +1,7 @@
 // What the patient's page knows: the server's snapshot, kept current by its events. Nothing is counted here.
 
 const KEPT_STRIDES = 60; // as many as a snapshot has
-const TOTALS = ["number", "score", "streak", "active_s", "phase_s", "phase_strides", "has_points", "chart"];
+const TOTALS = ["number", "score", "streak", "active_s", "phase_s", "phase_strides", "has_points", "longest", "chart"];
 
 export function fromSnapshot(snapshot) {
   const last = snapshot.last?.kind === "calm" ? null : snapshot.last;
@@ -31,6 +31,9 @@ export function applyEvent(session, event) {
     case "presence":
       session.presence = event.presence;
       break;
+    case "alarms":
+      session.fell = event.fell;
+      break;
     case "robot_stopped":
       session.robot_stopped = event.stopped;
   }
@@ -43,6 +46,7 @@ export function screenOf(session, page) {
   if (!session) return page.link === "lost" ? "offline" : "connecting";
   if (session.state === "finished" || session.state === "aborted") return "ended";
   if (page.link === "lost") return "offline";
+  if (session.fell) return "fell";
   if (session.state === "ready") return "ready";
   if (session.state === "paused") return page.asking ? "ask" : "paused";
   if (!session.presence.source) return session.number ? "lost" : "waiting";

@@ -7,8 +7,8 @@ const SAFE = _("Your score is safe.");
 const KEEP_WALKING = _("Keep walking if you feel well.");
 
 // Return what a screen without a step says: [the phrase, the line below it].
-// `isAlone`: on a tablet that cannot go on by itself.
-export function messageFor(screen, session, name, isAlone) {
+// `isAlone`: on a tablet that cannot go on by itself; `silent_s`: how long the server has said nothing.
+export function messageFor(screen, session, name, { isAlone, silent_s }) {
   const safe = session?.has_points === false ? "" : SAFE;
   switch (screen) {
     case "ready":
@@ -34,7 +34,9 @@ export function messageFor(screen, session, name, isAlone) {
     case "ask":
       return [_("End this session?"), safe];
     case "offline":
-      return [_("No connection."), `${KEEP_WALKING} ${safe}`];
+      return [fill(_("No connection for %(count)s s."), { count: silent_s }), KEEP_WALKING];
+    case "fell":
+      return [_("Stand still."), _("Help is coming.")];
     case "ended":
       return [_("You have finished."), _("Your scores come next.")];
     case "closed":

@@ -4,17 +4,17 @@ import { fillScreen, keepAwake } from "garry/walk/wake_lock";
 import { createCelebration } from "garry/walk/confetti";
 import { createControls } from "garry/walk/controls";
 import { createFeedback } from "garry/walk/feedback";
-import { createFitting } from "garry/walk/fit_text";
+import { createFitting } from "garry/walk/fit_layout";
 import { guardLeaving } from "garry/walk/leave_guard";
 import { connect } from "garry/shared/session_socket";
 import { createScene } from "garry/walk/scene";
 import { applyEvent, fromSnapshot, screenOf } from "garry/walk/state";
 import { createSounds } from "garry/walk/sounds";
 
-const PATIENCE_MS = 2_000; // a shorter break of the connection is not shown
+const WATCH_MS = 250; // silence sends no event
 const STILL_MS = 4_000; // after so long without a step the last one is no longer shown as current
 const LEAVE_MS = 1_500;
-const NOT_WALKING = new Set(["presence", "robot_stopped", "robot_unheard"]); // events that are no sign of walking
+const NOT_WALKING = new Set(["presence", "robot_stopped", "robot_unheard", "alarms"]); // events that are no sign of walking
 
 const { body } = document;
 const isMirror = body.classList.contains("mirrored"); // in a frame on the therapist's page
@@ -22,9 +22,9 @@ const scene = createScene(body.querySelector(".scene"));
 const { celebrate, clear } = createCelebration(body.querySelector(".confetti"));
 const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
-const fitCalm = createFitting(body);
-const page = { link: "", asking: false, still: false };
-let session, linkTimer, frame, leaveTimer;
+const fit = createFitting(body, scene);
+const page = { link: "", silent_s: 0, asking: false, still: false };
+let session, frame, leaveTimer;
 let stopWaiting = () => {};
 let confetti = "none";
 
@@ -44,14 +44,10 @@ const socket = connect(body.dataset.socket, {
     else awaitStep();
   },
   onLink(state, reason) {
-    clearTimeout(linkTimer);
-    const note = () => {
-      page.link = state;
-      if (state === "closed") tellTherapist(reason);
-      redraw();
-    };
-    if (state === "lost") linkTimer = setTimeout(note, PATIENCE_MS);
-    else note();
+    if (state === "lost") return; // told by its silence: a short break is not shown
+    page.link = state;
+    if (state === "closed") tellTherapist(reason);
+    redraw();
   },
 });
 const { showRobot, keepFocus, tellTherapist, reportUnanswered } = createControls(body, socket, (asking) => {
@@ -82,10 +78,10 @@ function draw() {
   const hasChanged = body.dataset.look !== screen;
   if (hasChanged) body.dataset.look = screen;
   if (screen !== "paused" && screen !== "ask") page.asking = false;
-  drawFeedback(screen, session);
+  drawFeedback(screen, session, page);
   if (session) showRobot(session);
   if (hasChanged) keepFocus();
-  if (screen !== "feedback") fitCalm();
+  fit(screen, session);
   if (screen === "feedback") {
     const { last, steps } = session;
     scene.show({
@@ -100,6 +96,18 @@ function draw() {
   if (session) body.dataset.step = session.number;
   if (screen === "ended" && !isMirror) leaveTimer ??= setTimeout(() => location.replace(body.dataset.ending), LEAVE_MS);
 }
+
+// Nothing that is old counts as present: the page says since when, and turns gray.
+function watchServer() {
+  if (page.link === "closed") return;
+  const silent_s = socket.isStale() ? Math.floor(socket.silentFor() / 1000) : 0;
+  if (silent_s === page.silent_s) return;
+  page.silent_s = silent_s;
+  page.link = silent_s ? "lost" : "open";
+  body.classList.toggle("stale", silent_s > 0);
+  redraw();
+}
+setInterval(watchServer, WATCH_MS);
 
 addEventListener("resize", redraw); // words fit another place
 redraw();

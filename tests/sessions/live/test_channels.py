@@ -39,7 +39,7 @@ async def test_a_patient_hears_no_values_where_there_is_no_feedback(place, begun
     heard = [e for e in tablet.events if e["kind"] not in ("presence", "phase")]
     assert [(e["kind"], e["number"]) for e in heard] == [("calm", 1), ("calm", 2), ("calm", 4)]
     assert [e["phase_strides"] for e in heard] == [1, 2, 0]
-    assert set(heard[0]) == {"kind", "number", "active_s", "phase_s", "phase_strides"}
+    assert set(heard[0]) == {"kind", "number", "at", "active_s", "phase_s", "phase_strides"}
     await source.walk(4.0, side="right")
     await source.walk(25.0)
     await source.walk(3.3)

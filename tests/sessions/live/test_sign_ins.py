@@ -16,6 +16,7 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
 from rehab.sessions.live import auth, routines
 from rehab.sessions.live import runtime as runtimes
+from rehab.stations.models import Device
 from tests.support.callers import sign_in
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -160,3 +161,17 @@ async def test_all_sign_ins_are_checked_a_few_at_a_time(place, begun, monkeypatc
     await end_in(sign_in(place.pt), -1)
     for page in pages:
         assert (await page.sent_away())[0] == 4001
+
+
+async def test_a_device_that_stays_connected_was_heard_just_now(place, begun):
+    """It is heard for hours by one connection; its station's page must not count from the first."""
+    session = await begun(place)
+    robot, tablet = await place.robot().open(), await place.tablet(session).open()
+    long_ago = timezone.now() - timedelta(minutes=11)
+    await Device.everywhere.filter(station=place.station).aupdate(last_seen_at=long_ago)
+    await runtimes.current().routines.check_sign_ins()
+    seen = Device.everywhere.filter(station=place.station).order_by("kind")
+    heard = {one.kind: one.last_seen_at > long_ago async for one in seen}
+    assert (heard["robot"], heard["tablet"], heard["source"]) == (True, True, False)
+    await robot.hang_up()
+    await tablet.hang_up()

@@ -9,7 +9,15 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from rehab.people.models import User
-from rehab.sessions.log import Remark, RobotEntry, RuleEntry, SessionEvent, SessionMetric
+from rehab.sessions.alarms import OpenAlarms
+from rehab.sessions.log import (
+    ALARM_KINDS,
+    Remark,
+    RobotEntry,
+    RuleEntry,
+    SessionEvent,
+    SessionMetric,
+)
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import change_mark
 from rehab.sessions.replay import fold_log
@@ -57,6 +65,7 @@ class SessionAggregate:
         if session.legacy_id is not None:
             self.fold.state = State.FINISHED  # imported, without a log
         self.marks: deque[dict[str, Any]] = deque(maxlen=MARKS)  # what a PT's chart points out
+        self.alarms = OpenAlarms()
 
     @classmethod
     def load(cls, session: TrainingSession) -> SessionAggregate:
@@ -65,6 +74,8 @@ class SessionAggregate:
         aggregate.fold = fold_log(aggregate.fold, session)
         marked = SessionEvent.everywhere.filter(session=session, kind__in=kinds_with_marks())
         aggregate.add_marks(reversed(marked.order_by("-pk")[:MARKS]))
+        alarms = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS)
+        aggregate.alarms = OpenAlarms(alarms.order_by("pk"))
         return aggregate
 
     @classmethod
@@ -156,6 +167,7 @@ class SessionAggregate:
             data=data,
         )
         self._add_mark(event)
+        self.alarms.apply(event)
         return event
 
     def summary(self, *, with_checkpoint: bool = False) -> Summary:

@@ -13,6 +13,7 @@ from rehab.sessions.events.change import source_message
 from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
     LiveEvent,
+    alarms_event,
     presence_event,
     remark_event,
     robot_state_event,
@@ -26,7 +27,7 @@ from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.robot_orders import RobotOrders
-from rehab.sessions.log import Remark, RuleEntry, Step
+from rehab.sessions.log import ALARM_KINDS, Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State
 from rehab.training.controls import Audience
@@ -116,7 +117,9 @@ class LiveSession:
         fold = self.aggregate.fold
         before = Before.of(fold)
         row = self.aggregate.record_step(measurement, received_at, late=late)
-        events = events_of_step(fold, before, row.step, self.feed.audiences, live=not late)
+        events = events_of_step(
+            fold, before, row.step, self.feed.audiences, received_at, live=not late
+        )
         rows: list[Row] = [row]
         changed = before.changed_by_step(fold)
         if fold.following.moved:
@@ -153,8 +156,11 @@ class LiveSession:
         """Log a remark; the future is done when it is committed."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         row = self.aggregate.log_event(what, by, at, {}, value)
-        event = remark_event(self.aggregate.fold, what.value, value)
-        self._submit([row], [event], [], stored=stored)
+        fold, alarms = self.aggregate.fold, self.aggregate.alarms
+        events = [remark_event(fold, what.value, value)]
+        if what in ALARM_KINDS:
+            events.append(alarms_event(fold, alarms))
+        self._submit([row], events, [], stored=stored)
         return stored
 
     def _submit(
@@ -264,7 +270,9 @@ class LiveSession:
                 robot=self.robot_orders.reports,
                 robot_stopped=self.robot_orders.is_stopped,
                 marks=self._marks(),
+                alarms=self.aggregate.alarms,
             )
+            shown["now"] = now.timestamp()
             subscriber = Subscriber(self.feed, audience, send, write)
             self.feed.subscribers.add(subscriber)
             return shown, subscriber

@@ -13,10 +13,11 @@ from typing import NamedTuple
 from asgiref.sync import sync_to_async
 from django.db.models import QuerySet
 
+from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import MARKS, SessionAggregate, kinds_with_marks
 from rehab.sessions.live.session.live_session import RECENT_STEPS
-from rehab.sessions.log import RobotEntry, SessionEvent, Step
+from rehab.sessions.log import ALARM_KINDS, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.sessions.replay import (
     MEASURED,
@@ -163,6 +164,7 @@ def _load(epochs: Mapping[int, int]) -> dict[int, LoadResult]:
         steps = list(_read_steps(key, after))  # once, for the fold and for pages
         _fold_rest(aggregate, steps, events)
         aggregate.add_marks([event for event in events if event.kind in marked][-MARKS:])
+        aggregate.alarms = OpenAlarms(events)
         found[key] = LoadedSession(
             aggregate=aggregate,
             recent=steps[-RECENT_STEPS:],
@@ -192,7 +194,7 @@ def _read_steps(session_id: int, after: int) -> QuerySet[Step]:
 
 def _read_events(session_ids: Collection[int]) -> dict[int, list[SessionEvent]]:
     """Return of each session the events that change it, leave a mark or concern its robot."""
-    kinds = {*CONTROLS, *kinds_with_marks(), RobotEntry.STOP, RobotEntry.ARM}
+    kinds = {*CONTROLS, *kinds_with_marks(), *ALARM_KINDS}
     events = SessionEvent.everywhere.filter(session__in=session_ids, kind__in=kinds)
     ordered = events.order_by("session_id", "pk")
     return {key: list(some) for key, some in groupby(ordered, attrgetter("session_id"))}

@@ -8,7 +8,12 @@ from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
-from rehab.sessions.events.event import robot_report_event, robot_stopped_event
+from rehab.sessions.events.event import (
+    LiveEvent,
+    alarms_event,
+    robot_report_event,
+    robot_stopped_event,
+)
 from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.hub import EventFeed
@@ -72,8 +77,7 @@ class RobotOrders:
                 self.unlogged_stop = None
 
         row = self._live.aggregate.log_event(RobotEntry.STOP, by, at, data)
-        event = robot_stopped_event(self._live.aggregate.fold, True)
-        self._submit([row], [event], [], on_stored=forget)
+        self._submit([row], self._events(), [], on_stored=forget)
 
     def arm(self, by: User | None, at: datetime) -> asyncio.Future[None]:
         """Let the robot move again once that is committed; then the future is done."""
@@ -87,9 +91,13 @@ class RobotOrders:
 
         stored.add_done_callback(notify_robot)
         row = self._live.aggregate.log_event(RobotEntry.ARM, by, at, {})
-        event = robot_stopped_event(self._live.aggregate.fold, False)
-        self._submit([row], [event], [], stored=stored)
+        self._submit([row], self._events(), [], stored=stored)
         return stored
+
+    def _events(self) -> list[LiveEvent]:
+        """Return the events of a stop or an arming."""
+        fold, alarms = self._live.aggregate.fold, self._live.aggregate.alarms
+        return [robot_stopped_event(fold, self.is_stopped), alarms_event(fold, alarms)]
 
     def record_report(self, report: Message, at: datetime) -> None:
         """Publish a report of the robot; decisions and gestures are logged first."""

@@ -7,7 +7,7 @@ import { openDialog } from "garry/monitor/controls/open_dialog";
 const WITHDRAWN_WITHIN_MS = 10_000;
 const REFRESH_MS = 250;
 
-export function createFall({ show, announce, onPress, change, note, remark, orderStop }) {
+export function createFall({ state: told, show, announce, onPress, change, note, remark, orderStop }) {
   const button = document.querySelector("[data-fall]");
   const dialog = document.getElementById("fall");
   const withdraw = dialog.querySelector("[data-withdraw]");
@@ -45,6 +45,7 @@ export function createFall({ show, announce, onPress, change, note, remark, orde
 
   onPress("[data-fall]", (_button, { state }) => {
     orderStop();
+    told.fellHere = true;
     if (state === "running") change("pause");
     if (dialog.open) return; // tapped twice: one fall
     store();

@@ -1,4 +1,4 @@
-// Start, pause, go on, end (which is asked twice), why the session pauses, and the clock beside the planned time.
+// Start, pause, go on, end (which is asked twice), and the clock beside the planned time.
 
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
@@ -11,18 +11,11 @@ const MAIN = {
   running: ["pause", _("Pause"), "pause"],
   paused: ["resume", _("Go on"), "play"],
 };
-const PAUSE_REASONS = {
-  restart: _("The server was restarted; nothing was lost. Go on when ready."),
-  patient: _("Paused on the patient’s page. Go on when ready."),
-  rest: _("The plan has a rest of %(time)s here. Go on when ready."),
-  therapist: _("Paused by the therapist."),
-};
 
 export function createRunState({ state, show, onPress, change }) {
   const main = document.querySelector("[data-main]");
   const end = document.querySelector("[data-end]");
   const confirmEnd = document.getElementById("sure");
-  const pauseNote = document.querySelector(".notice.why");
 
   onPress("[data-main]", ({ value }) => change(value));
   onPress("[data-end]", () =>
@@ -40,13 +33,6 @@ export function createRunState({ state, show, onPress, change }) {
     document.querySelector(".end").classList.toggle("over", isOver);
   }
 
-  function drawPause(session) {
-    pauseNote.hidden = session.state !== "paused";
-    const reason = PAUSE_REASONS[session.pause_reason] ?? _("Paused.");
-    const text = fill(reason, { time: clock(session.rest_s ?? 0) });
-    if (pauseNote.textContent !== text) pauseNote.textContent = text; // announced once, not with each drawing
-  }
-
   function drawButtons(session) {
     const [kind, label, iconId] = MAIN[session.state] ?? [""];
     main.disabled = end.disabled = !kind;
@@ -58,7 +44,6 @@ export function createRunState({ state, show, onPress, change }) {
   return {
     draw(session) {
       drawTime(session);
-      drawPause(session);
       drawButtons(session);
     },
   };

@@ -1,0 +1,66 @@
+"""Alarms on the therapist's other pages, and the clinic's list of incidents."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_POST, require_safe
+
+from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.roles import Role
+from rehab.sessions.alarms import Alarm, find_incidents, open_alarms
+from rehab.sessions.formatting import clinic_time
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.services import acknowledge
+
+LISTED = timedelta(days=365)
+MAX_INCIDENTS = 200
+
+
+@for_roles(Role.LEAD, Role.PT)
+@never_cache
+@require_safe
+def show_alarms(request: HttpRequest) -> HttpResponse:
+    """Return what is open in the clinic, or at one station, as a part of a page.
+
+    ``but``: of which session the page itself tells.
+    """
+    station = request.GET.get("station", "")
+    found = open_alarms(
+        user_of(request), timezone.now(), int(station) if station.isdecimal() else None
+    )
+    shown = [one for one in found if str(one.session_id) != request.GET.get("but")]
+    context = {"alarms": [(one, clinic_time(one.at, one.session.clinic)) for one in shown]}
+    return render(request, "sessions/alarms.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def acknowledge_alarms(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Note that a therapist has seen a session's alarms."""
+    user = user_of(request)
+    session = get_object_or_404(TrainingSession.objects.visible_to(user), pk=session_id)
+    try:
+        acknowledge(session, user)
+    except NotStored as problem:
+        return HttpResponse(str(problem), status=503)
+    return HttpResponse(status=204)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_safe
+def list_incidents(request: HttpRequest) -> HttpResponse:
+    """List falls and robots that stopped by themselves: how they ended, and who saw them when."""
+    user, now = user_of(request), timezone.now()
+    clinic = clinic_of(user)
+    rows = [
+        (one, clinic_time(one.raised.at, clinic), one.ended and clinic_time(one.ended.at, clinic))
+        for one in find_incidents(user, now - LISTED)[:MAX_INCIDENTS]
+    ]
+    context = {"rows": rows, "now": clinic_time(now, clinic), "fall": Alarm.FALL.value}
+    return render(request, "sessions/incidents.html", context)

@@ -1,0 +1,185 @@
+"""What patients read after a step: pools of phrases, so that words do not wear out.
+
+Each of a band's phrases means the same and is of one length class, so that variety changes nothing
+that a study compares. Where a type neither rewards nor takes, its words state: no praise for a miss
+or under the negative type, no blame anywhere (docs/reference/scoring.md#bands).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+
+from robot.marking import gettext_noop
+
+# By language: the longest phrase, and the longest word in it, that the largest words have room for
+# on a tablet (tests/browser/test_word_sizes.py). Of a language that is not here: the last of them.
+LENGTHS = {"en": (24, 12), "de": (30, 13), "es": (30, 13), "fr": (30, 13)}
+APART = 6  # phrases that come before one may come again, where a pool has at least twice as many
+
+
+@lru_cache(maxsize=1024)
+def _shuffled(seed: int, cycle: int, start: int, end: int) -> tuple[int, ...]:
+    """Return the numbers from start to before end in an order that follows from the seed."""
+
+    def rank(index: int) -> bytes:
+        return hashlib.sha256(f"{seed}/{cycle}/{index}".encode()).digest()
+
+    return tuple(sorted(range(start, end), key=rank))
+
+
+def choose_phrase(phrases: tuple[str, ...], seed: int, shown: int) -> str:
+    """Return the phrase that comes next, after so many that were shown; "" of none.
+
+    Each half of the pool is shuffled anew in each round, and the halves take turns: so a phrase
+    comes again after half of the others at the earliest.
+    """
+    if not phrases:
+        return ""
+    size = len(phrases)
+    cycle, position = divmod(shown, size)
+    half = size // 2
+    if position < half:
+        return phrases[_shuffled(seed, cycle, 0, half)[position]]
+    return phrases[_shuffled(seed, cycle, half, size)[position - half]]
+
+
+def join(*phrases: str) -> str:
+    """Return a pool as a band has it: one phrase a line."""
+    return "\n".join(phrases)
+
+
+ONWARD = join(
+    gettext_noop("On to the next step."),
+    gettext_noop("And the next step."),
+    gettext_noop("Keep walking."),
+    gettext_noop("Step by step."),
+    gettext_noop("On we go."),
+    gettext_noop("One more step."),
+    gettext_noop("Walk on."),
+    gettext_noop("The next one."),
+    gettext_noop("Go on walking."),
+    gettext_noop("On you go."),
+    gettext_noop("Another step."),
+    gettext_noop("Further on."),
+)
+
+NEAR = join(
+    gettext_noop("Nearly there."),
+    gettext_noop("Close to the goal."),
+    gettext_noop("Almost at the goal."),
+    gettext_noop("Very near."),
+    gettext_noop("A little more."),
+    gettext_noop("The goal is near."),
+    gettext_noop("Not far now."),
+    gettext_noop("Near the goal."),
+    gettext_noop("Almost."),
+    gettext_noop("A bit more push."),
+    gettext_noop("Only a little short."),
+    gettext_noop("Just a touch more."),
+)
+
+REACHED = join(
+    gettext_noop("You reached the goal!"),
+    gettext_noop("Goal!"),
+    gettext_noop("At the goal!"),
+    gettext_noop("You did it!"),
+    gettext_noop("Goal reached!"),
+    gettext_noop("That is the goal!"),
+    gettext_noop("Well done!"),
+    gettext_noop("Good push!"),
+    gettext_noop("A good step!"),
+    gettext_noop("Yes!"),
+    gettext_noop("You made it!"),
+    gettext_noop("Good step!"),
+)
+
+STRONG = join(
+    gettext_noop("Strong push!"),
+    gettext_noop("Above the goal!"),
+    gettext_noop("Very good!"),
+    gettext_noop("Strong step!"),
+    gettext_noop("More than the goal!"),
+    gettext_noop("Powerful!"),
+    gettext_noop("A strong one!"),
+    gettext_noop("Great push!"),
+    gettext_noop("Very strong!"),
+    gettext_noop("Great step!"),
+    gettext_noop("Over the goal!"),
+    gettext_noop("Nicely pushed!"),
+)
+
+STRONGEST = join(
+    gettext_noop("What a push!"),
+    gettext_noop("Excellent!"),
+    gettext_noop("Superb!"),
+    gettext_noop("Fantastic!"),
+    gettext_noop("Marvelous!"),
+    gettext_noop("Wonderful push!"),
+    gettext_noop("Far above the goal!"),
+    gettext_noop("Brilliant!"),
+    gettext_noop("What a step!"),
+    gettext_noop("Amazing push!"),
+    gettext_noop("Great power!"),
+    gettext_noop("That was strong!"),
+)
+
+FAR_BELOW = join(
+    gettext_noop("Far below the goal."),
+    gettext_noop("Clearly below."),
+    gettext_noop("Far under the goal."),
+    gettext_noop("Clearly under."),
+    gettext_noop("Far from the goal."),
+    gettext_noop("A long way below."),
+    gettext_noop("Much below the goal."),
+    gettext_noop("The goal is far up."),
+    gettext_noop("A wide gap below."),
+    gettext_noop("Far below, points lost."),
+    gettext_noop("Far below this time."),
+    gettext_noop("Low, points lost."),
+)
+
+BELOW = join(
+    gettext_noop("Below the goal."),
+    gettext_noop("Under the goal."),
+    gettext_noop("Just below the goal."),
+    gettext_noop("A little below."),
+    gettext_noop("Slightly below."),
+    gettext_noop("Short of the goal."),
+    gettext_noop("Not at the goal."),
+    gettext_noop("Just under the goal."),
+    gettext_noop("A bit below."),
+    gettext_noop("Below, points lost."),
+    gettext_noop("A little short."),
+    gettext_noop("Close, but below."),
+)
+
+NOTHING_LOST = join(
+    gettext_noop("No points lost."),
+    gettext_noop("Nothing lost."),
+    gettext_noop("Points kept."),
+    gettext_noop("All points kept."),
+    gettext_noop("Nothing taken."),
+    gettext_noop("No loss."),
+    gettext_noop("The points stay."),
+    gettext_noop("Points unchanged."),
+    gettext_noop("No change."),
+    gettext_noop("Score unchanged."),
+    gettext_noop("Your points stay."),
+    gettext_noop("As many points."),
+)
+
+MEASURED = join(
+    gettext_noop("Your push, this step."),
+    gettext_noop("This step."),
+    gettext_noop("Measured now."),
+    gettext_noop("Your value."),
+    gettext_noop("This push."),
+    gettext_noop("This step’s value."),
+    gettext_noop("Push of this step."),
+    gettext_noop("Now measured."),
+    gettext_noop("The last push."),
+    gettext_noop("The last step."),
+    gettext_noop("Your last step."),
+    gettext_noop("Your last push."),
+)

@@ -1,0 +1,152 @@
+// What a therapist has to look at: a table of causes, the one behind the others first. Each has the consequences that
+// it hides, a sentence with the cure, and what its button does.
+//
+//   describe(session, page)   the sentence; "" where it is not so
+//   action                    [label, what is done]; or a function of the session that returns it
+//   isRed                     somebody has to acknowledge it; everything else is amber
+//   isCalm                    no alarm: it is told, and makes no sound
+
+import { _, fill } from "garry/shared/language";
+import { clock } from "garry/shared/format";
+import { doubtCure } from "garry/shared/labels";
+import { SILENT_S, hasStarted } from "garry/monitor/state";
+import { describeReason } from "garry/monitor/robot_text";
+
+const FIRST_STRIDE_S = 10; // a walk needs longer to begin
+const RESTART_S = 15; // after which what has not come back is told
+const SEEN = _("I have seen it");
+const STORAGE = {
+  late: _("The database does not answer: strides wait, and the robot stands still."),
+  disk_full: _("The server’s disk is full: strides are not stored. Make room on it."),
+};
+const PAUSES = {
+  patient: _("Paused on the patient’s page."),
+  rest: _("The plan has a rest of %(time)s here."),
+  therapist: _("Paused by the therapist."),
+};
+
+const timeOf = (alarm) =>
+  new Date(alarm.at).toLocaleTimeString(document.documentElement.lang, { timeStyle: "short", hourCycle: "h23" });
+const alarmOf = ({ alarms }, kind) => alarms.find((one) => one.kind === kind);
+
+function describeServer({ number }, { socket }) {
+  const silent_s = socket.silentFor() / 1000;
+  if (!socket.isStale()) return "";
+  const text = number
+    ? _("The server has not answered for %(count)s s: this page is that old. Stored: all up to step %(number)s.")
+    : _("The server has not answered for %(count)s s: this page is that old.");
+  const values = { count: Math.floor(silent_s), number };
+  return `${fill(text, values)} ${_("To stop the robot, use its own switch.")}`;
+}
+
+function describeFall(session) {
+  const alarm = alarmOf(session, "fall");
+  return alarm ? fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) }) : "";
+}
+
+function describeOwnStop(session) {
+  const alarm = alarmOf(session, "robot_stop");
+  if (!alarm) return "";
+  const values = { why: describeReason(alarm.reason), time: timeOf(alarm) };
+  return fill(_("The robot stopped by itself, %(time)s: %(why)s."), values);
+}
+
+function describeRestart({ state, pause_reason: reason }) {
+  if (state !== "paused" || reason !== "restart") return "";
+  return _("The server was restarted; nothing was lost. Go on when ready.");
+}
+
+function describeSource({ presence, state: sessionState }, { state }) {
+  if (sessionState !== "running") return "";
+  if (!presence.source) {
+    return _("The sensor is not connected. Look at its switch and its cable, or pause.");
+  }
+  const running = state.sinceRunning_s;
+  const isFirst = presence.stride_ago_s == null;
+  const silent = isFirst ? running : Math.min(running, state.strideAgo_s);
+  if (silent < (isFirst ? FIRST_STRIDE_S : SILENT_S.stride)) return "";
+  const text = isFirst
+    ? _("No stride for %(count)s s. Does the patient walk? Look at the sensor, or pause.")
+    : _("The sensor is silent for %(count)s s. Does the patient walk? Look at the sensor, or pause.");
+  return fill(text, { count: Math.floor(silent) });
+}
+
+function describeDoubt(session, { state }) {
+  return hasStarted(session) ? doubtCure(state.lastStride?.reasons ?? []) : "";
+}
+
+function describeTablet(session, { state }) {
+  if (!hasStarted(session) || !state.hadTablet || state.isTabletHeard) return "";
+  return _("The tablet is lost: the patient sees no feedback. Look at its screen and its Wi-Fi, or pause.");
+}
+
+function describeRobot(session, { state, robot }) {
+  if (!hasStarted(session)) return "";
+  if (state.hadRobot && !session.presence.robot) {
+    return _("The robot is lost: it stands still. Look at its switch and its network.");
+  }
+  return robot.alarm;
+}
+
+function describePause({ state, pause_reason: reason, rest_s: rest }) {
+  if (state !== "paused") return "";
+  const why = fill(PAUSES[reason] ?? _("Paused."), { time: clock(rest ?? 0) });
+  return reason === "therapist" ? why : `${why} ${_("Go on when ready.")}`;
+}
+
+export const CAUSES = [
+  {
+    cause: "server",
+    hides: ["fall", "robot_stop", "storage", "restart", "source", "tablet", "robot", "why"],
+    describe: describeServer,
+  },
+  {
+    cause: "fall",
+    hides: ["robot_stop", "source", "robot", "why"],
+    isRed: true,
+    describe: describeFall,
+    isOwn: ({ state }) => state.fellHere,
+    action: () => [SEEN, ({ remark }) => remark("fall_acknowledged")],
+  },
+  {
+    cause: "robot_stop",
+    hides: ["robot"],
+    isRed: true,
+    describe: describeOwnStop,
+    action: () => [SEEN, ({ remark }) => remark("stop_acknowledged")],
+  },
+  {
+    cause: "storage",
+    hides: ["source", "robot", "why"],
+    describe: ({ presence }) => STORAGE[presence.storage] ?? "",
+  },
+  {
+    cause: "restart",
+    hides: ["why"],
+    // Devices come back within seconds; until then their absence follows from the restart.
+    hidesAtFirst: { within_s: RESTART_S, causes: ["source", "tablet", "robot"] },
+    describe: describeRestart,
+    isCalm: true,
+  },
+  { cause: "source", hides: [], describe: describeSource },
+  { cause: "signals", hides: [], describe: describeDoubt },
+  { cause: "tablet", hides: [], describe: describeTablet },
+  {
+    cause: "robot",
+    hides: [],
+    describe: describeRobot,
+    isOwn: ({ robot }) => robot.wasStoppedHere,
+    action: ({ presence }) => presence.robot && [_("Let it move"), ({ robot }) => robot.order("arm")],
+  },
+  { cause: "why", hides: [], describe: describePause, isCalm: true },
+];
+
+// Return the causes that are to be told now, as [row, sentence], the one behind the others first.
+export function findCauses(session, page) {
+  const found = CAUSES.map((row) => [row, row.describe(session, page)]).filter(([, sentence]) => sentence);
+  const hidden = new Set(found.flatMap(([row]) => row.hides));
+  for (const [{ hidesAtFirst: first }] of found) {
+    if (first && page.state.sinceSnapshot_s < first.within_s) for (const cause of first.causes) hidden.add(cause);
+  }
+  return found.filter(([{ cause }]) => !hidden.has(cause));
+}

@@ -1,0 +1,44 @@
+// The size of this screen: a drawing that is made as wide as a bank card, or the screen's diagonal; and which sizes of
+// words it can hold.
+
+import { pixelsOfDegree } from "garry/walk/fit_layout";
+
+const INCH_MM = 25.4;
+const USUAL = 4; // pixels a millimeter, to begin with
+// Of a page of words and a number: letters of the longest phrase and word (rehab/training/phrases.py), their width, a
+// line's height and the number's with its label.
+const LETTERS = { phrase: 30, word: 12 };
+const LETTER_WIDTH = 0.56;
+const LINE = 1.04;
+const NUMBER = 2.1;
+const USED = { width: 0.93, height: 0.85 }; // of the screen
+
+const form = document.querySelector("main form");
+const [width, diagonal] = ["[data-width]", "[data-diagonal]"].map((name) => form.querySelector(name));
+const { px_per_mm: field, distance_m: distance } = form.elements;
+
+function show(pxPerMm) {
+  width.value = pxPerMm;
+  form.querySelector(".bank-card").style.setProperty("--px-per-mm", pxPerMm);
+  const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
+  for (const row of form.querySelectorAll("[data-factor]")) {
+    const word = degree * Number(row.dataset.factor);
+    const inLine = Math.floor((USED.width * screen.width) / (word * LETTER_WIDTH));
+    const lines = Math.ceil(LETTERS.phrase / inLine);
+    const isHeld = inLine >= LETTERS.word && word * (lines * LINE + NUMBER) <= USED.height * screen.height;
+    row.firstElementChild.textContent = isHeld ? "✓" : "–";
+  }
+}
+
+function take(pxPerMm) {
+  field.value = pxPerMm.toFixed(3);
+  show(pxPerMm);
+}
+
+width.addEventListener("input", () => take(Number(width.value)));
+diagonal.addEventListener("input", () => {
+  const inches = Number(diagonal.value);
+  if (inches > 0) take(Math.hypot(screen.width, screen.height) / (inches * INCH_MM));
+});
+distance.addEventListener("change", () => show(Number(field.value || USUAL)));
+show(Number(field.value || USUAL));

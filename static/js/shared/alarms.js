@@ -1,0 +1,37 @@
+// Alarms of other sessions on every page of a therapist: asked for while the page is seen, and acknowledged there.
+
+const EVERY_MS = 2_500;
+const place = document.querySelector("[data-alarms]");
+let shown = "";
+
+async function look() {
+  if (!document.hidden) {
+    try {
+      // Watching is no activity: it does not keep anybody signed in.
+      const answer = await fetch(place.dataset.alarms, { headers: { "Garry-Watching": "yes" }, redirect: "error" });
+      const found = answer.ok ? (await answer.text()).trim() : "";
+      // The token in the forms is another each time.
+      const [now, before] = [found, shown].map((text) => text.replace(/<input[^>]*>/g, ""));
+      if (answer.ok && now !== before) place.innerHTML = shown = found;
+    } catch {
+      // asked again
+    }
+  }
+  setTimeout(look, EVERY_MS);
+}
+
+place.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const form = event.target;
+  const button = form.querySelector("button");
+  button.disabled = true;
+  try {
+    const answer = await fetch(form.action, { method: "POST", body: new FormData(form) });
+    if (answer.ok) form.remove();
+  } catch {
+    // it stays, and may be tapped again
+  }
+  button.disabled = false;
+});
+
+look();

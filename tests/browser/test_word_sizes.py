@@ -1,0 +1,169 @@
+"""The size of words is a promise in degrees: kept in each layout, size, language, type and on each
+screen that can hold it, and told where one cannot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.support.browsers import signed_in
+from tests.support.layout import DRAWN, SCREENS, set_screen
+from tests.support.servers import Server
+from tests.support.walk_seed import feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+FACTORS = {"normal": 1.0, "large": 1.4, "largest": 1.8}
+# Diagonal [inches] and distance [m] of the screens: where people would read them from.
+READ_FROM = {
+    "phone": (6.1, 0.5),
+    "tablet-portrait": (10.1, 0.7),
+    "old-laptop": (15.0, 1.5),
+    "tablet-landscape": (10.1, 0.7),
+    "low-laptop": (24.0, 1.5),
+    "laptop": (32.0, 2.0),
+    "wall": (65.0, 3.0),
+}
+SIDES = ("right", "left", "center", "in_right", "in_left")
+# Nobody walks on: the page must not say so.
+NEVER_STILL = """() => { const after = window.setTimeout;
+  window.setTimeout = (act, ms, ...rest) => ms === 4000 ? 0 : after(act, ms, ...rest); }"""
+MEASURE = """() => {
+  const size = (name) => parseFloat(getComputedStyle(document.querySelector(name)).fontSize);
+  const box = (name) => { const { left, top, right, bottom } =
+    document.querySelector(name).getBoundingClientRect(); return [left, top, right, bottom]; };
+  const shown = (name) => getComputedStyle(document.querySelector(name)).display !== "none";
+  const { drop, short } = document.body.dataset;
+  const probe = document.body.appendChild(document.createElement("i"));
+  probe.style.cssText = "position: absolute; width: var(--degree)";
+  const degree = probe.getBoundingClientRect().width;
+  probe.remove();
+  return { word: size(".words"), key: size(".key"), degree, drop: Number(drop),
+    short: Number(short ?? 1), words: box(".words"), number: box(".key"), head: box("header"),
+    buttons: [...document.querySelectorAll("header button")].filter((one) => one.checkVisibility())
+      .map((one) => { const { left, right } = one.getBoundingClientRect(); return [left, right]; }),
+    emblem: shown(".emblem"), scene: shown(".thermometer"), chart: shown(".strides") };
+}"""
+
+
+@pytest.fixture(scope="module")
+def walking(browser: Browser, server: Server) -> Iterator[Any]:
+    """Return a function that opens a page on which somebody walks, once for each set-up."""
+    pages: dict[tuple[str, str, str], Page] = {}
+    with ExitStack() as stack:
+
+        def open_page(side: str, language: str, valence: str) -> Page:
+            if (side, language, valence) not in pages:
+                screen = {"screen_side": side, "language": language}
+                (walk,) = make_walks(server, {"valence": valence, "screen": screen})
+                context = stack.enter_context(
+                    signed_in(browser, server, walk, reduced_motion="reduce")
+                )
+                page = context.new_page()
+                page.add_init_script(f"({NEVER_STILL})()")
+                page.goto(walk.path)
+                page.click("[data-change=start]")
+                page.wait_for_selector("body:not([data-look=ready])")
+                feet = stack.enter_context(feet_of(server, walk))
+                feet.walk(1.2, 0.8)
+                page.wait_for_function("() => document.body.dataset.step == 2")
+                pages[side, language, valence] = page
+            return pages[side, language, valence]
+
+        yield open_page
+
+
+def look(page: Page, screen: str, text: str, degree: float | None) -> dict[str, Any]:
+    """Return how large the page's words are on a screen of so many pixels a degree."""
+    set_screen(page, screen)
+    page.evaluate(
+        """([text, degree]) => {
+          document.body.dataset.text = text;
+          if (degree) document.body.style.setProperty("--degree", `${degree}px`);
+          else document.body.style.removeProperty("--degree");
+        }""",
+        [text, degree],
+    )
+    page.evaluate(DRAWN)
+    found: dict[str, Any] = page.evaluate(MEASURE)
+    return found
+
+
+def pixels_of_degree(screen: str) -> float:
+    diagonal_in, distance_m = READ_FROM[screen]
+    px_per_mm = math.hypot(*SCREENS[screen]) / (25.4 * diagonal_in)
+    return 2 * 1000 * distance_m * math.tan(math.pi / 360) * px_per_mm
+
+
+@pytest.mark.essential
+@pytest.mark.matrix
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("language", ["en", "de", "es", "fr"])
+@pytest.mark.parametrize("valence", ["positive", "negative", "binary", "explicit"])
+@pytest.mark.parametrize("screen", SCREENS)
+@pytest.mark.parametrize("measured", [False, True])
+def test_words_are_as_large_as_promised(
+    walking: Any, side: str, language: str, valence: str, screen: str, measured: bool
+) -> None:
+    page = walking(side, language, valence)
+    degree = pixels_of_degree(screen) if measured else None
+    sizes = []
+    for text, factor in FACTORS.items():
+        found = look(page, screen, text, degree)
+        promised = (degree or found["degree"]) * factor * found["short"]
+        assert found["word"] == pytest.approx(promised, rel=0.01), text
+        assert found["key"] == pytest.approx(2 * promised, rel=0.01), text
+        # What goes, goes in this order.
+        assert (found["chart"], found["emblem"], found["scene"]) == (
+            found["drop"] < 1,
+            found["drop"] < 2,
+            found["drop"] < 3,
+        )
+        if found["short"] < 1:  # only after all else has gone
+            assert found["drop"] == 3
+        width, height = SCREENS[screen]
+        for left, top, right, bottom in (found["words"], found["number"]):
+            assert left >= -1
+            assert top >= found["head"][3] - 0.35 * found["word"]
+            assert right <= width + 1
+            assert bottom <= height + 1
+        assert found["words"][3] <= found["number"][1] + 2 or (
+            found["words"][2] <= found["number"][0] + 2
+        )
+        if side.startswith("in_"):
+            low, high = (width / 2, width) if side == "in_right" else (0, width / 2)
+            spans = [*found["buttons"], *(box[::2] for box in (found["words"], found["number"]))]
+            assert all(low - 1 <= one for span in spans for one in span)
+            assert all(one <= high + 1 for span in spans for one in span)
+        if side == "center":
+            middle = (found["words"][0] + found["words"][2]) / 2
+            assert middle == pytest.approx(width / 2, abs=2)
+        sizes.append(found["word"])
+    # A larger setting never makes words smaller; what fits is searched for to half a percent.
+    assert sizes[0] <= 1.01 * sizes[1] <= 1.02 * sizes[2]
+
+
+@pytest.mark.parametrize(
+    ("side", "screen", "text"),
+    [
+        ("right", "tablet-landscape", "largest"),
+        ("right", "tablet-portrait", "largest"),
+        ("left", "wall", "largest"),
+        ("center", "tablet-landscape", "large"),
+        ("in_right", "tablet-landscape", "large"),
+    ],
+)
+def test_common_screens_hold_the_promise(walking: Any, side: str, screen: str, text: str) -> None:
+    assert look(walking(side, "en", "positive"), screen, text, None)["short"] == 1
+
+
+def test_what_no_screen_can_hold_is_told(walking: Any) -> None:
+    """The largest words at 3 m on a tablet of ten inches: two letters would fill it."""
+    found = look(walking("right", "en", "positive"), "tablet-landscape", "largest", 558)
+    assert (found["short"] < 0.5, found["drop"]) == (True, 3)

@@ -1,0 +1,115 @@
+"""Alarms on plain pages: what the clinic sees, what is told afterwards, and that watching is no
+activity.
+"""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.contrib.sessions.models import Session
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from rehab.people.roles import Role
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
+from tests.support.page_text import plain
+from tests.support.walks import HIT, make_patient, walk
+from tests.support.world import NOW, World, build_world, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def session(world: World) -> TrainingSession:
+    return walk(make_patient(world.clinic, "Iris"), "positive", [HIT, HIT])
+
+
+def note(session: TrainingSession, kind: str, **columns: Any) -> SessionEvent:
+    made: SessionEvent = SessionEvent.everywhere.create(
+        session=session, after_number=1, kind=kind, at=NOW, **columns
+    )
+    return made
+
+
+def seen(client: Client, name: str = "alarms", **query: Any) -> str:
+    return plain(client.get(reverse(name), query).content.decode())
+
+
+def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, world, session):
+    note(session, "fall")
+    pt = client_of(world)
+    assert "Iris fell." in seen(pt)
+    assert "Iris" not in seen(pt, but=session.pk)
+    assert "Iris" not in seen(pt, station=world.session.station_id or 0)  # it was at none
+    assert "Iris" not in seen(client_of(build_world("oak")))
+    answer = pt.post(reverse("acknowledge-alarms", args=[session.pk]))
+    assert (answer.status_code, answer.content) == (204, b"")
+    assert "Iris" not in seen(pt)
+    row = SessionEvent.everywhere.get(session=session, kind="fall_acknowledged")
+    assert row.by == world.people[Role.PT]
+
+
+def test_another_clinic_acknowledges_nothing(world, session):
+    note(session, "fall")
+    stranger = client_of(build_world("oak"))
+    answer = stranger.post(reverse("acknowledge-alarms", args=[session.pk]))
+    assert answer.status_code == 404
+    assert "Iris fell." in seen(client_of(world))
+
+
+def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
+    by = world.people[Role.PT]
+    note(session, "fall")
+    note(session, "fall_severity", value=1)
+    note(session, "robot_stop", data={"reason": "bump"})
+    note(session, "fall_acknowledged", by=by)
+    pt = client_of(world)
+    listed = seen(pt, "incidents")
+    assert "Iris fell." in listed
+    assert "slightly hurt" in listed
+    assert f"by {by}" in listed
+    assert "The robot of Iris stopped by itself." in listed
+    assert "not seen yet" in listed
+    assert "! incident" in plain(
+        pt.get(reverse("history", args=[session.patient_id])).content.decode()
+    )
+    for page in ("report", "session"):
+        text = plain(pt.get(reverse(page, args=[session.pk])).content.decode())
+        assert "! Falls" in text
+        assert "slightly hurt, seen" in text
+        assert "Robot stopped by itself" in text
+
+
+def test_a_withdrawn_fall_is_no_mark(world, session):
+    note(session, "fall")
+    note(session, "fall_withdrawn")
+    pt = client_of(world)
+    assert "Iris" not in seen(pt)
+    assert "! incident" not in plain(
+        pt.get(reverse("history", args=[session.patient_id])).content.decode()
+    )
+
+
+def test_watching_keeps_nobody_signed_in(world):
+    pt = client_of(world)
+    pt.get("/start/")
+    almost = timezone.now() + timedelta(minutes=1)
+    Session.objects.update(expire_date=almost)
+    stored = pt.session
+    stored["last_activity_at"] = 0
+    stored.save()
+    Session.objects.update(expire_date=almost)
+    pt.get(reverse("alarms"), headers={"Garry-Watching": "yes"})
+    assert Session.objects.get().expire_date == almost
+    pt.get(reverse("alarms"))
+    assert Session.objects.get().expire_date > almost
+
+
+def test_who_may_not_see_patients_sees_no_alarm(world, session):
+    note(session, "fall")
+    researcher = client_of(world, Role.RESEARCHER)
+    assert researcher.get(reverse("alarms")).status_code == 403
