@@ -85,7 +85,7 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
             "feedback_type": "binary", "measure": "knee", "unit": "deg", "wanted_hit_rate": 0.61,
             "planned": 602, "walked": 593.0, "protocol": "Long", "activation_threshold": 0.83,
             "robot_rule": "streaks", "robot_window": 6.4, "robot_count": 7, "robot_rest": 8.5,
-            "schedule": "faded", "schedule_steps": 9, "schedule_band": 0.11,
+            "schedule": "faded", "schedule_steps": 9, "schedule_band": 0.11, "words_vary": "<words_vary>",
             "goal_follows": "suggest", "close_part": 0.12, "imported": True, "source": "<source>",
             "age_band": "60-69", "months_since_stroke": 17, "severity": "mild",
             "paretic_side": "right", "device": "<device>", "belt_speed": 0.7,
