@@ -36,8 +36,8 @@ ALIKE_IN = {
     "de": "arm code codes design feedback hedges minus monitor name normal passkey patient pause "
     "person phase plan plus sensor start tablet tablets training",
     "fr": "cadence code correction corrections date description effort incident incidents "
-    "migrations minutes moment normal options pages participant participants patient patients pause "
-    "performance phase phases phrases plan plus point points position questionnaire "
+    "migrations minutes moment normal options pages participant participants patient patients "
+    "pause performance phase phases phrases plan plus point points position questionnaire "
     "questionnaires questions robot signature source type variation version",
 }
 

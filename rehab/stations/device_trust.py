@@ -59,7 +59,7 @@ def is_trusted() -> Q:
 def with_trust(devices: QuerySet[Device]) -> QuerySet[Device]:
     """Return devices that know whether they are trusted, so that a list of them asks once."""
     condition = ExpressionWrapper(is_trusted(), BooleanField())
-    return devices.annotate(is_trusted=Coalesce(condition, False))
+    return devices.annotate(is_trusted=Coalesce(condition, False))  # type: ignore[no-redef]
 
 
 def find_ended(devices: Iterable[Device], now: datetime) -> set[int]:

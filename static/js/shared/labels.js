@@ -79,10 +79,10 @@ const CURES = {
 // Why no stride counts until a person has looked: the cure (rehab/gait/selfcheck/checks.py).
 const DOUBTS = {
   doubt_weight: _(
-    "The plates do not carry the body mass that was given. Check it, and handrail and harness. If it is right, pause and go on: strides then count.",
+    "Plates and body mass disagree. Check mass, handrail and harness; if right, pause and go on: strides then count.",
   ),
   doubt_angle: _(
-    "The angle moves as a knee’s does. Check the columns at the source. If they are right, pause and go on: strides then count.",
+    "The angle moves as a knee’s does. Check the source’s columns; if right, pause and go on: strides then count.",
   ),
 };
 

@@ -14,7 +14,8 @@ import { createSounds } from "garry/walk/sounds";
 const WATCH_MS = 250; // silence sends no event
 const STILL_MS = 4_000; // after so long without a step the last one is no longer shown as current
 const LEAVE_MS = 1_500;
-const NOT_WALKING = new Set(["presence", "robot_stopped", "robot_unheard", "alarms"]); // events that are no sign of walking
+// Events that are no sign of walking.
+const NOT_WALKING = new Set(["presence", "robot_stopped", "robot_unheard", "alarms"]);
 
 const { body } = document;
 const isMirror = body.classList.contains("mirrored"); // in a frame on the therapist's page
