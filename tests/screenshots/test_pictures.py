@@ -193,27 +193,19 @@ for name, code, side, at in (
 def signed_in(tmp_path_factory):
     """A browser that is signed in at a server with a dozen sessions."""
     folder = tmp_path_factory.mktemp("data")
+    with serve(folder) as first:
+        password, environment = first.password, clean_environment(first.folder, first.port)
+    for seed, valence in enumerate(("positive", "negative", "binary"), start=1):
+        run = ["manage.py", "runsession", f"--synthetic={seed}", "--valence", valence]
+        subprocess.run(
+            [sys.executable, *run], cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL
+        )
     with serve(folder, "--robot", "kinematic") as server, chromium() as browser:
-        for seed, valence in enumerate(("positive", "negative", "binary"), start=1):
-            subprocess.run(
-                [
-                    sys.executable,
-                    "manage.py",
-                    "runsession",
-                    f"--synthetic={seed}",
-                    "--valence",
-                    valence,
-                ],
-                cwd=ROOT,
-                env=clean_environment(server.folder, server.port),
-                check=True,
-                stdout=subprocess.DEVNULL,
-            )
         server.run_shell(VISITS)
         context = browser.new_context(base_url=server.url, reduced_motion="reduce")
         page = context.new_page()
         page.goto("/admin/")
-        sign_in(page, server.password)
+        sign_in(page, password)
         page.goto("/start/")
         page.click("text=Try a demo")
         page.click(".huge")
