@@ -54,6 +54,18 @@ const REASONS = {
   worker_died: _("its program died"),
 };
 
+// What it does, by the pool that its gesture is from.
+const ANSWERS = {
+  joy: _("it celebrates"),
+  streak_3: _("it celebrates 3 in a row"),
+  streak_5: _("it celebrates 5 in a row"),
+  streak_10: _("it celebrates 10 in a row"),
+  comeback: _("it celebrates the comeback"),
+  near_miss: _("it shows that this was close"),
+  effort: _("it answers the effort"),
+  disappointment: _("it droops"),
+};
+
 // What has to be done before it may move again.
 const CURES = {
   away_from_home: _("Carry it back, turned as it stood."),
@@ -89,12 +101,12 @@ export const describeState = (state) => STATES[state] ?? state;
 // What a window came to and what followed; `breakReason`: why the gesture after it did not end as it should.
 export function describeDecision(decision, breakReason) {
   if (!decision) return _("It answers each five seconds of walking.");
-  const { mean, threshold, gesture, intensity, reason } = decision;
+  const { mean, threshold, gesture, intensity, pool, reason } = decision;
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
   return fill(_("The last five seconds: %(mean)s of the goal, it celebrates from %(threshold)s: %(what)s."), {
     mean: percent(mean),
     threshold: percent(threshold),
-    what: gesture ? gesture + size + end : describeReason(reason),
+    what: gesture ? (ANSWERS[pool] ?? gesture + size) + end : describeReason(reason),
   });
 }
