@@ -30,7 +30,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
 
         pt.click("text=Try a demo")
         pt.click("text=Change something")
-        pt.click("text=To the therapist")
+        pt.click("text=Therapist’s page")
         tablet.wait_for_selector("body[data-look=ready]")
         expect(tablet.locator("header b")).to_have_text("Demo")
         assert not tablet.is_visible("[data-change=start]")  # that is the therapist's
@@ -49,7 +49,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         pt.goto("/start/")  # somebody else is next, while these scores are still shown
         pt.click("text=Try a demo")
         pt.click("text=Change something")
-        pt.click("text=To the therapist")
+        pt.click("text=Therapist’s page")
         pt.wait_for_selector("[data-main]:not([disabled])")
         asked_at = time.monotonic()
         tablet.wait_for_selector("body[data-look=ready]")

@@ -29,11 +29,11 @@ def ankle(x_mm: float, height_mm: float = 80.0) -> np.ndarray:
 def test_each_plate_is_the_legs_that_stands_on_it_with_what_it_reads_in_swing() -> None:
     left_n, right_n = stand((50, 150), (250, 350), swing_n=4.0), stand((100, 200), swing_n=-3.0)
     forces, unknown = assign_plates(
-        np.array([left_n, right_n]), CORNERS_MM, {"left": ankle(200), "right": ankle(650)}
+        np.array([[left_n], [right_n]]), CORNERS_MM, {"left": ankle(200), "right": ankle(650)}
     )
     assert unknown == 0
-    assert forces["left"] == pytest.approx(left_n)
-    assert forces["right"] == pytest.approx(right_n)
+    assert forces["left"][0] == pytest.approx(left_n)
+    assert forces["right"][0] == pytest.approx(right_n)
 
 
 def test_legs_that_step_on_one_plate_in_turn_have_their_own_contacts_of_it() -> None:
@@ -43,11 +43,11 @@ def test_legs_that_step_on_one_plate_in_turn_have_their_own_contacts_of_it() -> 
     left = ankle(200, height_mm=80.0)
     left[2, 200:] = 180.0
     forces, unknown = assign_plates(
-        np.array([both_n]), CORNERS_MM[:1], {"left": left, "right": right}
+        np.array([[both_n]]), CORNERS_MM[:1], {"left": left, "right": right}
     )
     assert unknown == 0
-    assert forces["left"] == pytest.approx(stand((50, 150)))
-    assert forces["right"] == pytest.approx(stand((250, 350)))
+    assert forces["left"][0] == pytest.approx(stand((50, 150)))
+    assert forces["right"][0] == pytest.approx(stand((250, 350)))
 
 
 @pytest.mark.parametrize(
@@ -56,12 +56,12 @@ def test_legs_that_step_on_one_plate_in_turn_have_their_own_contacts_of_it() -> 
     ids=["both", "none"],
 )
 def test_a_contact_of_both_legs_or_of_neither_is_nobodys(ankles: dict[str, np.ndarray]) -> None:
-    forces, unknown = assign_plates(np.array([stand((50, 150))]), CORNERS_MM[:1], ankles)
+    forces, unknown = assign_plates(np.array([[stand((50, 150))]]), CORNERS_MM[:1], ankles)
     assert unknown == 1
     assert not any(force_n.any() for force_n in forces.values())
 
 
 def test_what_never_bears_a_step_is_no_contact() -> None:
     touched_n = np.where(stand((50, 150)) > 0, 140.0, 0.0)
-    forces, unknown = assign_plates(np.array([touched_n]), CORNERS_MM[:1], {"left": ankle(200)})
+    forces, unknown = assign_plates(np.array([[touched_n]]), CORNERS_MM[:1], {"left": ankle(200)})
     assert (unknown, forces["left"].max()) == (0, 0.0)

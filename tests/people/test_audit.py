@@ -54,6 +54,7 @@ def entries():
 SILENT = {
     *("account", "own-password", "set-up-second-factor", "add-app", "add-passkey"),
     *("remove-authenticator", "recovery-codes", "pair", "pair-phone", "consent-text", "export"),
+    "screen-size",
     *(
         "catalog",
         "home",

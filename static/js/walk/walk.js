@@ -32,10 +32,12 @@ let confetti = "none";
 const socket = connect(body.dataset.socket, {
   onSnapshot(snapshot) {
     session = fromSnapshot(snapshot);
+    watchServer();
     awaitStep();
   },
   onEvent(event) {
     applyEvent(session, event);
+    watchServer();
     if (event.kind === "step" && event.live && !document.hidden) {
       confetti = event.confetti;
       sound(event);
