@@ -17,6 +17,8 @@ from rehab.gait.stances import analysis, plausibility
 from rehab.gait.stances.analysis import StanceAnalyzer
 from tests.gait.corpus import READERS, find_clean, open_corpus
 
+pytest.importorskip("ezc3d")
+
 
 def describe(analyzer, contact, stance, push_off) -> dict[str, float]:
     """Return the figures of a stance that limits judge."""
