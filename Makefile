@@ -59,7 +59,7 @@ help: ## Say what can be made
 run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
 	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin}
 
-test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
+test: test-main test-postgres ## Run the tests of a change (ARGS='-k goal' picks some)
 
 test-fast: export GARRY_TEST_FAST = 1
 test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time, wide and long ones
@@ -88,7 +88,7 @@ test-clocks: setup ## Run the database tests by other clocks than today's
 
 # No Django there: what pytest cannot know of this project is no error. What takes real time is for
 # `make test-all`.
-test-pure: $(NEWER)/.test
+test-pure: $(NEWER)/.test ## Run the tests of the pure packages again, on a newer Python, as CI does
 	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
 	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
 	    $(call $(if $(GARRY_TEST_ALL),run_tests,shared),$(NEWER)/bin/python,-o strict_config=false \
