@@ -19,7 +19,7 @@ def page_files() -> list[str]:
 
 
 class BuildWithPageFiles(build_py):
-    """Copies them into the package, where garry_site.settings finds them; not for an editable one."""
+    """Copies them into the package, where garry_site.settings finds them; unless editable."""
 
     def run(self) -> None:
         """Build."""

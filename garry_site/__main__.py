@@ -11,7 +11,7 @@ def main() -> None:
         from django.core.management import execute_from_command_line
     except ModuleNotFoundError as error:
         raise SystemExit(
-            f"{error}. A server needs more than a source or a robot. Cure: pip install 'garry[server]'"
+            f"{error}: a server needs more than a source. Cure: pip install 'garry[server]'"
         ) from error
     execute_from_command_line(sys.argv)
 

@@ -8,9 +8,10 @@ import subprocess
 import sys
 import tarfile
 import time
-import urllib.request
 import venv
+from http.client import HTTPConnection
 from pathlib import Path
+from urllib.parse import urljoin, urlsplit
 
 import pytest
 
@@ -68,18 +69,21 @@ def garry(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(address: str, language: str = "en") -> str:
-    request = urllib.request.Request(address, headers={"Accept-Language": language})
-    with urllib.request.urlopen(request, timeout=20) as answer:
-        return str(answer.read().decode(errors="replace"))
+    place = urlsplit(address)
+    connection = HTTPConnection(place.netloc, timeout=20)
+    connection.request("GET", place.path, headers={"Accept-Language": language})
+    answer = connection.getresponse()
+    text = answer.read().decode(errors="replace")
+    connection.close()
+    if answer.status == 302:
+        return read(urljoin(address, answer.headers["Location"]), language)
+    assert answer.status == 200, address
+    return text
 
 
 def test_a_session_and_the_pages_without_the_repository(garry, tmp_path):
-    walked = run(
-        [str(garry), "runsession", "--synthetic", "7", "--valence", "positive"]
-        + ["--strides", "100", "--speed", "max", "--json"],
-        tmp_path,
-        tmp_path,
-    )
+    walk = f"{garry} runsession --synthetic 7 --valence positive --strides 100 --speed max --json"
+    walked = run(walk.split(), tmp_path, tmp_path)
     assert walked.returncode == 0, walked.stderr
     assert json.loads(walked.stdout)["strides"] == 100
     port = free_port()
