@@ -51,7 +51,10 @@ class SoftPasskey:
 
     def _data(self, more: FLAG = NONE, credential: bytes = b"") -> AuthenticatorData:
         hashed = sha256(self.rp_id.encode())
-        return AuthenticatorData.create(hashed, self.flags | more, self.counter, credential)
+        made: AuthenticatorData = AuthenticatorData.create(
+            hashed, self.flags | more, self.counter, credential
+        )
+        return made
 
     def _client_data(self, kind: str, options: dict[str, Any]) -> CollectedClientData:
         challenge = options["challenge"]
