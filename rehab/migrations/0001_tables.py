@@ -2975,6 +2975,7 @@ class Migration(migrations.Migration):
                             ("emergency", "Arm revealed in an emergency"),
                             ("refused", "Revealing the arm was refused"),
                             ("looked", "Looked at results before the end"),
+                            ("guessed", "Group guessed"),
                         ],
                         max_length=12,
                         verbose_name="what",
