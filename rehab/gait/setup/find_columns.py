@@ -107,6 +107,7 @@ def propose(
     time_name, time_factor = _find_time(table)
     time_s = table[time_name] * time_factor
     labels = {name: read_label(name) for name in table if name != time_name}
+    labels = {name: one for name, one in labels.items() if one or not name.startswith(OWN)}
     forces = find_forces(table, labels, time_s)
     if not forces:
         raise GaitInputError(_describe_no_force(labels))
