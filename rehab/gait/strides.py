@@ -110,7 +110,7 @@ class Stride(NamedTuple):
     walking_ratio_mm_min
         Step length by cadence, of the two last steps [mm per step a minute] (Sekiya 1996).
     margin_m
-        Forward margin of stability at initial contact (Hof 2005), if both hips are sent.
+        Backward margin of stability at initial contact (Hof 2005, Hak 2013), if both hips are sent.
     weight_ratio
         Mean force of both plates over the cycle that ended here, by body weight.
     """

@@ -27,7 +27,7 @@ BOUNCE_S = 0.15  # debounce: no foot swings faster; a sooner contact continues t
 # A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is
 # certain above that; its ends are timed at the release threshold where the force gets there and no
 # drag is found, else by slope and dip (`drag`).
-CERTAIN = 0.15  # of body weight
+CERTAIN = 0.2  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
 SHORTEST_S = 0.15  # no contact that ends sooner can be a valid stance, by any clock

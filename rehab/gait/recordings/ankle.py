@@ -23,8 +23,8 @@ JOINT_AHEAD_M = 0.012
 def add_computed(leg: dict[str, Floats]) -> None:
     """Add to a leg's channels what is not among them and follows from its markers.
 
-    Its ankle's moment and angle, where it has all of ``MARKED`` and not both; the foot's position;
-    and the knee's angle, where there is a hip.
+    Its ankle's moment and angle, where it has all of ``MARKED`` and not both; where its foot is, by
+    the ankle; and the knee's angle, where there is a hip.
 
     Parameters
     ----------
@@ -34,12 +34,14 @@ def add_computed(leg: dict[str, Floats]) -> None:
     """
     if leg.keys() >= set(MARKED) and not leg.keys() >= set(REQUIRED):
         leg["moment"], leg["angle"] = compute_ankle(leg)
-    if "toe_forward" in leg:
-        leg.setdefault("position", leg["toe_forward"])
-    thigh = ("hip_forward", "hip_up", "knee_forward", "knee_up", "ankle_forward", "ankle_up")
+    if not leg.keys() >= {"ankle_forward", "ankle_up"}:
+        return
+    ankle_x, ankle_z = _find_joint(leg)
+    if "position" not in leg:
+        leg["position"], leg["foot_up"] = ankle_x, ankle_z
+    thigh = ("hip_forward", "hip_up", "knee_forward", "knee_up")
     if "knee_angle" not in leg and leg.keys() >= set(thigh):
-        hip_x, hip_z, knee_x, knee_z, *_ = (leg[name] for name in thigh)
-        ankle_x, ankle_z = _find_joint(leg)
+        hip_x, hip_z, knee_x, knee_z = (leg[name] for name in thigh)
         upper, lower = (hip_x - knee_x, hip_z - knee_z), (knee_x - ankle_x, knee_z - ankle_z)
         leg["knee_angle"] = _find_turn(upper, lower)
 

@@ -11,7 +11,7 @@ from rehab.gait.strides import GaitInputError
 # A leg's channels as they are called on the command line, in the order of ``LegSamples``.
 CHANNELS = (
     *("force", "moment", "angle", "forward", "position"),
-    *("hip_forward", "hip_up", "knee_angle"),
+    *("foot_up", "hip_forward", "hip_up", "knee_angle"),
 )
 REQUIRED = CHANNELS[:3]
 # Instead of moment and angle: what they are computed from (``ankle``), in its order; and the other
@@ -121,6 +121,7 @@ def _moore_leg(side: str) -> dict[str, SignalColumn]:
         "angle": SignalColumn(f"{side}AnklePlantarFlexionAngle"),
         "forward": SignalColumn(f"{side}GRF_x"),
         "position": SignalColumn(f"{side}Foot_x"),
+        "foot_up": SignalColumn(f"{side}Foot_y"),
         "knee_angle": SignalColumn(f"{side}KneeFlexionAngle"),
     }
 

@@ -13,10 +13,10 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 # Rows of a leg's table of samples.
-TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION, HIP, HIP_UP, KNEE = range(9)
+TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION, FOOT_UP, HIP, HIP_UP, KNEE = range(10)
 CHANNEL_NAMES = (
     *("force_n", "moment_nm", "angle_rad", "forward_n", "position_m"),
-    *("hip_forward_m", "hip_up_m", "knee_angle_rad"),
+    *("foot_up_m", "hip_forward_m", "hip_up_m", "knee_angle_rad"),
 )
 
 
@@ -28,6 +28,7 @@ class LegSamples(NamedTuple):
     angle_rad: ArrayLike
     forward_n: ArrayLike | None = None
     position_m: ArrayLike | None = None
+    foot_up_m: ArrayLike | None = None
     hip_forward_m: ArrayLike | None = None
     hip_up_m: ArrayLike | None = None
     knee_angle_rad: ArrayLike | None = None

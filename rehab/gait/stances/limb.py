@@ -12,14 +12,11 @@ import numpy as np
 
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, average, find_maximum, is_finite
-from rehab.gait.signals.samples import HIP, HIP_UP, KNEE, POSITION, TIME
+from rehab.gait.signals.samples import FOOT_UP, HIP, HIP_UP, KNEE, POSITION, TIME
 
 GRAVITY_M_S2 = 9.81
-# A marker at the metatarsal heads is so high while the toes are on the floor (0.03-0.05 m, three
-# people: gaitalytics, BTK's two).
-TOE_UP_M = 0.04
 QUIET_S = 0.03  # peaks are of means over this time
-FLAT = (0.25, 0.6)  # of stance, while the foot rests on the floor or belt
+FLAT = (0.2, 0.45)  # of stance, while the whole foot rests on the floor or belt
 AROUND_S = 0.06  # of a contact, over which the hips' velocity is taken
 
 
@@ -30,10 +27,9 @@ def find_trailing_limb(leg: LegBuffer, begin: int, end: int, rate_hz: float) -> 
     stance, which is the samples ``begin:end``.
     """
     part = (begin + (end - begin) // 2, end)
-    hip, up, foot = (leg.channel(row, *part) for row in (HIP, HIP_UP, POSITION))
-    if end - begin < 4 or not (is_finite(hip) and is_finite(up) and is_finite(foot)):
-        return None
-    return _find_peak(np.arctan2(hip - foot, up - TOE_UP_M), rate_hz)
+    hip, up, foot, low = (leg.channel(row, *part) for row in (HIP, HIP_UP, POSITION, FOOT_UP))
+    angle = np.arctan2(hip - foot, up - low)
+    return _find_peak(angle, rate_hz) if end - begin >= 4 and is_finite(angle) else None
 
 
 def find_knee_flexion(leg: LegBuffer, begin: int, end: int, rate_hz: float) -> float | None:
@@ -53,11 +49,11 @@ def find_belt_speed(leg: LegBuffer, begin: int, end: int) -> float | None:
 def find_margin(
     legs: tuple[LegBuffer, LegBuffer], index: int, foot_m: float, belt_m_s: float, rate_hz: float
 ) -> float | None:
-    """Return the forward margin of stability at an initial contact [m], if both hips are known.
+    """Return the backward margin of stability at an initial contact [m], if both hips are known.
 
-    How far the foot that lands is ahead of the extrapolated center of mass, ``x + v / √(g / l)``
-    (Hof 2005). The middle between the hips stands for the center of mass, and their height for
-    the length of the pendulum.
+    How far the extrapolated center of mass, ``x + v / √(g / l)`` (Hof 2005), is ahead of the foot
+    that lands (Hak 2013). The middle between the hips stands for the center of mass, and their
+    height for the length of the pendulum.
 
     Parameters
     ----------
@@ -79,7 +75,7 @@ def find_margin(
     if velocity_m_s is None or not up_m > 0:
         return None
     center_m = float(middle_m[index - part[0]])
-    return foot_m - center_m - (velocity_m_s + belt_m_s) * math.sqrt(up_m / GRAVITY_M_S2)
+    return center_m + (velocity_m_s + belt_m_s) * math.sqrt(up_m / GRAVITY_M_S2) - foot_m
 
 
 def _find_peak(angle_rad: Floats, rate_hz: float) -> float:

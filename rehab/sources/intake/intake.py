@@ -166,7 +166,7 @@ class Intake:
         if excluded:
             self._warn(
                 f"left out {excluded}",
-                f"Left out of the strides: {', '.join(excluded)[:120]}. Up to 32 further values "
+                f"Left out of the strides: {', '.join(excluded)[:120]}. Up to 40 further values "
                 "can travel, numbers named with letters, digits or _ . : -",
             )
         self._put(stride, is_timed=any(name in row for name in TIMES))
@@ -284,7 +284,7 @@ class Intake:
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
         for side in SIDES:
             leg = {name: channel for (own, name), channel in values.items() if own == side}
-            if leg.keys() & {"cop", "toe_forward", "hip_forward"}:
+            if "ankle_forward" in leg:
                 add_computed(leg)
                 values |= {(side, name): channel for name, channel in leg.items()}
         if self._recorder is not None:
