@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
@@ -174,7 +174,7 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
 
 
 def _make_map(proposal: Proposal, columns: Collection[str]) -> ColumnMap:
-    """Return what is proposed as a map, with what plates and markers came to beside it."""
+    """Return what is proposed as a map, and what plates and markers came to beside it."""
     legs: dict[str, dict[str, SignalColumn]] = {}
     for (side, channel), guess in proposal.guesses.items():
         legs.setdefault(side, {})[channel] = SignalColumn(guess.column, guess.factor)
@@ -188,13 +188,26 @@ def _make_map(proposal: Proposal, columns: Collection[str]) -> ColumnMap:
             f"seen was {seen}.{lacking} Let the lab send what is missing, or give the file that "
             "has it in the same command."
         )
-    own = SIGNAL_LAYOUTS["garry"].legs
-    for side, leg in whole.items():
-        for channel in CHANNELS:
-            if channel not in leg and (name := OWN + own[side][channel].name) in columns:
-                leg[channel] = SignalColumn(name)
     frame = None if proposal.frame is None else SignalColumn(proposal.frame)
-    return ColumnMap(SignalColumn(proposal.time, proposal.time_factor), whole, frame)
+    time = SignalColumn(proposal.time, proposal.time_factor)
+    return add_own(ColumnMap(time, whole, frame), columns)
+
+
+def add_own(found: ColumnMap, columns: Collection[str]) -> ColumnMap:
+    """Return a map with what plates and markers came to beside its channels, where it has none."""
+    own = SIGNAL_LAYOUTS["garry"].legs
+    legs = {
+        side: {
+            **{
+                channel: SignalColumn(name)
+                for channel in CHANNELS
+                if (name := OWN + own[side][channel].name) in columns
+            },
+            **leg,
+        }
+        for side, leg in found.legs.items()
+    }
+    return replace(found, legs=legs)
 
 
 def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:
