@@ -124,8 +124,10 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
         )
     with open_text(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of rows that are too short, which are left out
+        # Between semicolons or tabs a comma is a decimal one, as in half of Europe.
+        lines = file if delimiter == "," else (line.replace(",", ".") for line in file)
         table = np.genfromtxt(
-            file,
+            lines,
             delimiter=delimiter,
             skip_header=1,
             usecols=[header.index(name) for name in wanted],

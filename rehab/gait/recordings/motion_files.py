@@ -201,6 +201,6 @@ def _read_rows(path: Path, names: list[str], rows: object) -> Table:
 
 def _read_number(cell: str) -> float:
     try:
-        return float(cell)
+        return float(cell.replace(",", "."))
     except ValueError:
         return float("nan")

@@ -208,8 +208,8 @@ def _find_time(columns: Mapping[str, Floats]) -> tuple[str, float]:
             if RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ and not is_frame:
                 return name, factor
     raise GaitInputError(
-        "No column is a time that goes on. Send the device's own times in seconds, or give the "
-        "rate of rows that are numbered: --rate 100."
+        "No column is a time that goes on. Export the samples with their times in seconds; one row "
+        "of names, then numbers."
     )
 
 
