@@ -271,7 +271,7 @@ _PLATES = (
      -60.0, 80.0, 60.0, 20.0, True, 0.2),
     ("knee_flexion", gettext_noop("knee flexion in swing"), "°", "knee_flexion_deg",
      -30.0, 160.0, 120.0, 60.0, True, 0.3),
-    ("walking_ratio", gettext_noop("walking ratio"), "mm/(steps/min)", "walking_ratio_mm_min",
+    ("walking_ratio", gettext_noop("walk ratio"), "mm/(steps/min)", "walking_ratio_mm_min",
      0.0, 40.0, 20.0, 6.0, True, 0.03),
     ("margin", gettext_noop("margin of stability (backward)"), "m", "margin_m",
      -1.0, 1.0, 0.8, 0.08, True, 0.004),

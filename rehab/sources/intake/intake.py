@@ -283,8 +283,8 @@ class Intake:
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
         for side in SIDES:
-            leg = {name: channel for (own, name), channel in values.items() if own == side}
-            if "ankle_forward" in leg:
+            if (side, "ankle_forward") in values:
+                leg = {name: channel for (own, name), channel in values.items() if own == side}
                 add_computed(leg)
                 values |= {(side, name): channel for name, channel in leg.items()}
         if self._recorder is not None:
