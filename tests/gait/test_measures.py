@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, measure_strides
+from rehab.gait import LegSamples, TwoLegDetector, measure_strides
 from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS
 from rehab.gait.recordings.readers import read_any_table
 from rehab.sources.intake.measurements import to_measurement
@@ -157,6 +157,18 @@ def test_against_numpy_alone(name, median, most):
     assert np.percentile(distances, 90) < most
 
 
+@pytest.mark.parametrize("size", [7, 100])
+def test_chunks_do_not_matter(size):
+    walk, strides = open_walk()
+    detector = TwoLegDetector(100, walk.mass_kg, look_ahead_s=0.05)
+    found = []
+    for first in range(0, len(walk.t_s), size):
+        part = slice(first, first + size)
+        legs = [LegSamples(*(row[part] for row in walk.legs[side])) for side in SIDES]
+        found += detector.feed(walk.t_s[part], *legs)
+    assert found + detector.finish() == strides
+
+
 PLUG_IN_GAIT = {
     "gaitalytics treadmill": "gaitalytics_treadmill_events.c3d",
     "BTK flatfoot": "btk_pig_flatfoot_full.c3d",
@@ -207,7 +219,8 @@ def test_posture_of_other_people_against_plug_in_gait(name):
         for side, leg in walk.legs.items()
     }  # fmt: skip
     strides = replace(walk, legs=legs).measure()
-    distances = {"trailing_limb_deg": [], "margin_m": [], "knee_flexion_deg": []}
+    fields = ("trailing_limb_deg", "margin_m", "knee_flexion_deg")
+    distances: dict[str, list[float]] = {field: [] for field in fields}
     for clean in find_clean(walk):
         expected = measure_posture(walk, table, clean.side, clean.begin_s, clean.end_s)
         (stride,) = [

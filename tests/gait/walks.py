@@ -40,7 +40,7 @@ class Walk:
     def check(self, strides=None):
         """Return the self-check of the whole walk."""
         given = {"rate_hz": self.rate_hz, "mass_kg": self.mass_kg, "strides": strides}
-        return check_signals(self.t_s, self.left, self.right, **given)
+        return check_signals(self.t_s, [*self.left], [*self.right], **given)
 
     def chunks(self, size):
         """Yield times and both legs in chunks, as ``TwoLegDetector.feed`` takes them."""
