@@ -108,9 +108,10 @@ class Stride(NamedTuple):
     knee_flexion_deg
         Largest knee flexion of the swing that ended at this initial contact, if it is sent.
     walking_ratio_mm_min
-        Step length by cadence, of the two last steps [mm per step a minute] (Sekiya 1996).
+        Step length by cadence, of the two last steps [mm per step a minute].
     margin_m
-        Backward margin of stability at initial contact (Hof 2005, Hak 2013), if both hips are sent.
+        Backward margin of stability at initial contact, if both hips are sent. Sources of all four:
+        docs/reference/gait.md#posture.
     weight_ratio
         Mean force of both plates over the cycle that ended here, by body weight.
     """

@@ -31,8 +31,8 @@ KNEES = ("KNE", "KNEE", "LEK", "LE", "LFE", "FLE", "LKNE", "LEPI", "_KNE", "_KNE
 FIFTHS = ("MT5", "FM5", "5MT", "_MT5", "_FM5")
 TOES = ("MT2", "FM2", "2MT", "MTP2", "TOE2", "_MT2", "_FM2", "TOE", "_TOE", *FIFTHS)
 MEDIALS = ("MM", "MMAL", "MED", "MMED", "_MM", "_MMAL", "_TAM", "TAM", "ANKM", "_ANKM")
-INNER_KNEES = ("MEK", "ME", "MFE", "_MEK", "_ME", "_FME", "FME", "KNEM", "_KNEM", "MEPI")
-TROCHANTERS = ("GTR", "GT", "TRO", "TROC", "GTRO", "_GTR", "_GT", "_FTC", "FTC", "HIP")
+INNER_KNEES = ("MEK", "ME", "MFE", "_MEK", "_ME", "_FME", "FME", "KNM", "KNEM", "_KNEM", "MEPI")
+TROCHANTERS = ("GTR", "GTRO", "TRO", "TROC", "FTC", "_GTR", "_FTC")
 # Centers of joints as the file's own program computed them: Plug-in Gait's bones, and by name.
 CENTERS = {
     "ankle": ("TIO", "AJC", "_AJC", "_ANKLE_JC"),

@@ -16,8 +16,8 @@ from rehab.gait.strides import Stride
 STRIDES_MIN = 5
 SWING = (0.25, 0.75)  # of swing
 ALONE = (0.4, 0.6)  # of stance: everybody's other foot swings then
-# Nm/kg. The foot's own weight, and what it takes to swing it: -0.024 to 0.015 (five people, five
-# systems; medians of their strides).
+# Nm/kg. The foot's own weight, and what it takes to swing it: -0.024 to 0.015 (five people, four
+# systems; most of their strides).
 FOOT_NM_KG = -0.01
 USUAL_NM_KG = (-0.045, 0.03)
 CERTAIN = 0.1  # of A2, by which it is off: then strides wait for a person

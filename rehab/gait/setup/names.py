@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 # Words of English, German, French and Spanish labels.
 SIDE = re.compile(
-    r"\b(?:(left|lt|l|linke?[rs]?|gauche|izq|izquierd[ao])|(right|rt|r|rechte?[rs]?|droite?|derech[ao]))"
+    r"\b(?:(left|lt|l|links|linke[rs]?|gauche|izq|izquierd[ao])"
+    r"|(right|rt|r|rechts|rechte[rs]?|droite?|derech[ao]))"
     r"(?=\d?\b| ?ank)"
 )
 ANKLE = re.compile(
