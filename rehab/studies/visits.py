@@ -15,6 +15,7 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.studies.registration.document import find_rule
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
@@ -116,6 +117,7 @@ def start_session(
                 phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,
+                rule=find_rule(study, arm),
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
                 seed=seed_of(study.pk, visit.number),
