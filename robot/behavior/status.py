@@ -71,7 +71,9 @@ class StatusReporter:
         self.reports.append(report)
         self.on_report(report)
 
-    def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
+    def report_gesture(
+        self, gesture: Gesture, phase: str, outcome: str, choice: Choice | None = None
+    ) -> None:
         """Report that a gesture has started or ended.
 
         Parameters
@@ -82,8 +84,13 @@ class StatusReporter:
             ``started`` or ``ended``.
         outcome
             How it ended, as a code; empty at its start.
+        choice
+            Which pool it is from, and by which seed, where no decision reports that.
         """
-        report = {"kind": "gesture", "name": gesture.name, "phase": phase, "outcome": outcome}
+        report: Report = {"kind": "gesture", "name": gesture.name}
+        report |= {"phase": phase, "outcome": outcome}
+        if choice is not None:
+            report |= {"pool": choice.pool, "seed": choice.seed}
         is_open = not self._base.abilities.closed_loop
         self.report(report | {"open_loop": True} if is_open else report)
 

@@ -161,7 +161,7 @@ ACT_OF = {
 _NUMBERED = re.compile(r"(.+?)(?:_(\d+))?")
 
 
-def find_act(gesture: str, *, is_glad: bool) -> tuple[str, Script]:
+def find_act(gesture: str, *, is_glad: bool | None) -> tuple[str, Script]:
     """Return the act of a gesture, and the script that this variant of it takes.
 
     Parameters
@@ -169,9 +169,9 @@ def find_act(gesture: str, *, is_glad: bool) -> tuple[str, Script]:
     gesture
         Its name; that of a clinic's own follows ``is_glad``.
     is_glad
-        Whether it answers a strong window; only then may it look glad.
+        Whether it answers a strong window; only then may it look glad. None for no answer.
     """
-    usual = "celebrating" if is_glad else "drooping"
+    usual = {True: "celebrating", False: "drooping", None: "idling"}[is_glad]
     numbered = _NUMBERED.fullmatch(gesture)
     name, number = (gesture, 1) if numbered is None else (numbered[1], int(numbered[2] or 1))
     act = ACT_OF.get(gesture) or ACT_OF.get(name, usual)

@@ -115,6 +115,8 @@ class _Gesture(Struct):
     phase: Literal["started", "ended"]
     outcome: Code
     open_loop: bool = False
+    pool: Name | None = None
+    seed: Whole | None = None
 
 
 class _Remark(Struct):
