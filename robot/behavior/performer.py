@@ -242,7 +242,7 @@ class Performer:
         if not runs:
             self.body.player.stop(state[:16])
             self.decider.drop_window()
-        # What starts may greet at once; what rests or ends does so with its last permission to move.
+        # What starts may greet at once; what rests or ends, with its last permission to move.
         self._is_running |= runs
         if pool in MOMENTS:
             self._perform_moment(pool, now_s)

@@ -1,4 +1,4 @@
-"""What a robot does beside answers: greeting, rest, farewell, idle life; and where it stands still."""
+"""What a robot does beside answers: greeting, rest, farewell, idle life; and where it is still."""
 
 import itertools
 import math
