@@ -47,6 +47,15 @@ class Look(NamedTuple):
     hand_deg: float | None = None
 
 
+# Ends and middle of each mouth's curve (x, y), in the avatar's drawing; a laugh is filled.
+MOUTHS = {
+    "calm": ((180, 164), (200, 164), (220, 164)),
+    "smile": ((172, 160), (200, 180), (228, 160)),
+    "laugh": ((166, 154), (200, 204), (234, 154)),
+    "sad": ((174, 174), (200, 148), (226, 174)),
+    "small": ((191, 166), (200, 170), (209, 166)),
+    "wry": ((178, 168), (204, 170), (222, 160)),
+}
 REST = Look()
 Script = tuple[Look, ...]
 
@@ -186,6 +195,13 @@ def look_at(script: Script, since_s: float) -> Look:
     return script[int(max(since_s, 0.0) / EACH_S) % len(script)]
 
 
+def look_of(gesture: str, mood: str, since_s: float) -> Look:
+    """Return the look of a gesture so long after it began [s], by its score's mood."""
+    is_glad = {"glad": True, "sad": False}.get(mood)
+    return look_at(find_act(gesture, is_glad=is_glad)[1], since_s)
+
+
 def to_message(look: Look) -> dict[str, Any]:
-    """Return a look as a page gets it."""
-    return look._asdict()
+    """Return a look as a page gets it: its fields, with the mouth's curve as a path of SVG."""
+    start, middle, end = (f"{x} {y}" for x, y in MOUTHS[look.mouth])
+    return look._asdict() | {"path": f"M{start}Q{middle} {end}"}

@@ -7,21 +7,12 @@ from collections.abc import Iterable
 
 from PIL import Image, ImageDraw
 
-from robot.motion.looks import HAPPY, Look
+from robot.motion.looks import HAPPY, MOUTHS, Look
 
 # The head of the avatar's drawing (robot/bases/avatar/page.html), with room to tilt [px].
 LEFT, TOP, WIDTH, HEIGHT = 94, 72, 212, 150
 SCALE = 3
 PAPER, HEAD, SKIN, INK, HAND = "#f4f1ea", "#5b95b8", "#f8fbfd", "#22313a", "#f2b84b"
-# Ends and middle of each mouth's curve (x, y); a laugh is filled.
-MOUTHS = {
-    "calm": ((180, 164), (200, 164), (220, 164)),
-    "smile": ((172, 160), (200, 180), (228, 160)),
-    "laugh": ((166, 154), (200, 204), (234, 154)),
-    "sad": ((174, 174), (200, 148), (226, 174)),
-    "small": ((191, 166), (200, 170), (209, 166)),
-    "wry": ((178, 168), (204, 170), (222, 160)),
-}
 EYES_X, EYES_Y, EYE_PX = (172, 228), 134, 11
 
 Point = tuple[float, float]

@@ -15,8 +15,14 @@ export function createReplayedRobot({ show }, pieces, player) {
     if (!recorded || !ordered) return recorded ?? ordered;
     // It went as recorded; what it showed meanwhile is what its gesture orders.
     const after_s = ordered.at_s - recorded.at_s;
-    const lights = ordered.lights.map(([from_s, ...colors]) => [from_s + after_s, ...colors]);
-    return { ...recorded, lights: recorded.lights.length ? recorded.lights : lights, mood: ordered.mood };
+    const later = (entries) => entries.map(([from_s, ...shown]) => [from_s + after_s, ...shown]);
+    const lights = later(ordered.lights);
+    return {
+      ...recorded,
+      lights: recorded.lights.length ? recorded.lights : lights,
+      mood: ordered.mood,
+      looks: later(ordered.looks),
+    };
   }
 
   return {

@@ -89,6 +89,7 @@ class _Status(Struct):
     bumpers: bool = False
     lights: tuple[_Light, _Light] = ("off", "off")
     mood: Literal["calm", "glad", "sad"] | None = None
+    look: tuple[Name, Number] | None = None
 
 
 class _Stop(Struct):
