@@ -12,12 +12,12 @@ from rehab.studies.allocation.crossover import VisitPlan
 from rehab.studies.allocation.groups import Allocated, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
 from rehab.studies.analysis.comparison import Difference, compare
+from rehab.studies.analysis.findings import observations
 from rehab.studies.analysis.participants import (
     AnalyzedSession,
     Participant,
     ParticipantVisit,
     make_participant,
-    observations,
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.simulation.walkers import ENDLESS, Person, Population, draw_person, walk_through
