@@ -2700,6 +2700,46 @@ class Migration(migrations.Migration):
                     models.JSONField(blank=True, default=list, verbose_name="secondary outcomes"),
                 ),
                 (
+                    "margin",
+                    models.FloatField(
+                        blank=True,
+                        help_text="By how much a later arm may be worse than an earlier one in the primary outcome, in its unit. Empty: the study asks which arm is better.",
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(0.001),
+                            django.core.validators.MaxValueValidator(1000),
+                        ],
+                        verbose_name="margin of non-inferiority",
+                    ),
+                ),
+                (
+                    "spending",
+                    models.CharField(
+                        blank=True,
+                        choices=[
+                            ("obrien_fleming", "Seldom early (O’Brien and Fleming)"),
+                            ("pocock", "Alike at each look (Pocock)"),
+                        ],
+                        help_text="How the 5 % of a false finding are spent. Without it no look may stop it.",
+                        max_length=16,
+                        verbose_name="looks before the end",
+                    ),
+                ),
+                (
+                    "planned_sd",
+                    models.FloatField(
+                        blank=True,
+                        help_text="Between people, of the primary outcome. A look then says how many participants the spread of all together needs.",
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(0.001),
+                            django.core.validators.MaxValueValidator(1000),
+                        ],
+                        verbose_name="SD that the size rests on",
+                    ),
+                ),
+                ("facts", models.JSONField(default=dict, editable=False)),
+                (
                     "created_at",
                     models.DateTimeField(default=django.utils.timezone.now, editable=False),
                 ),
@@ -2971,6 +3011,8 @@ class Migration(migrations.Migration):
                             ("withdrawn", "Withdrew"),
                             ("marked", "Mark given"),
                             ("unmarked", "Mark taken"),
+                            ("consented", "Agreed to a new version"),
+                            ("asked", "A second person is asked to reveal the arm"),
                             ("unblinded", "Arm revealed"),
                             ("emergency", "Arm revealed in an emergency"),
                             ("refused", "Revealing the arm was refused"),
@@ -3040,6 +3082,7 @@ class Migration(migrations.Migration):
                         choices=[
                             ("assessor", "Assesses, and must not know the arm"),
                             ("interim", "May look before the study is closed"),
+                            ("monitor", "Monitors harms by arm"),
                         ],
                         max_length=8,
                         verbose_name="task",
@@ -3099,6 +3142,12 @@ class Migration(migrations.Migration):
                 (
                     "reason",
                     models.TextField(blank=True, max_length=1000, verbose_name="why it is changed"),
+                ),
+                (
+                    "needs_consent",
+                    models.BooleanField(
+                        default=False, verbose_name="participants have to agree again"
+                    ),
                 ),
                 ("at", models.DateTimeField(default=django.utils.timezone.now)),
                 (

@@ -83,6 +83,9 @@ class StudyForm(ClinicForm):
     reason = forms.CharField(
         label=_("why it is changed"), max_length=1000, widget=forms.Textarea(attrs={"rows": 2})
     )
+    needs_consent = forms.BooleanField(
+        label=_("participants have to agree to it before their next visit"), required=False
+    )
 
     class Meta:
         model = Study
@@ -90,7 +93,8 @@ class StudyForm(ClinicForm):
             *("code", "title", "question", "participants", "months_since_stroke"),
             *("inclusion", "exclusion", "crossover"),
             *("visits", "days_between", "washout_days", "follow_up_days", "goal_percent"),
-            *("primary_outcome", "secondary_outcomes", "method"),
+            *("primary_outcome", "secondary_outcomes", "margin", "spending", "planned_sd"),
+            "method",
         )
         widgets = {
             "question": forms.Textarea(attrs={"rows": 4}),
@@ -102,7 +106,7 @@ class StudyForm(ClinicForm):
         super().__init__(*args, **options)
         study: Study = self.instance
         if study.is_draft:
-            del self.fields["reason"]
+            del self.fields["reason"], self.fields["needs_consent"]
             lines = (f"{name}: {', '.join(levels)}" for name, levels in study.factors)
             self.initial["factors_text"] = "\n".join(lines)
             if study.sealed:

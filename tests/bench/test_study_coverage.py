@@ -10,8 +10,8 @@ import numpy as np
 from scipy.stats import binomtest
 
 from rehab.studies.analysis import comparison, designs
-from rehab.studies.analysis.participants import by_arm
 from rehab.studies.analysis.mixed_model import Floats
+from rehab.studies.analysis.participants import by_arm
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.trial import differences, simulate
 

@@ -146,7 +146,9 @@ def of_looks(draw: Random) -> Iterator[Event]:
         p = [one([row for row in observed if int(row.participant) < look]).p for look in looks]
         for spending in ("obrien_fleming", "pocock"):
             limits = levels(spending, looks, 48, is_last=True)
-            hit = any(each is not None and each < limit for each, limit in zip(p, limits, strict=True))
+            hit = any(
+                each is not None and each < limit for each, limit in zip(p, limits, strict=True)
+            )
             expected = None if effect else (0.03, 0.07)
             yield Event(f"four looks, {spending}: found at {effect:g}", hit, expected)
         naive = any(each is not None and each < 0.05 for each in p)
@@ -193,7 +195,16 @@ def of_carry_over(draw: Random) -> Iterator[Event]:
 def studied(seed: int) -> list[Event]:
     """Return what happened in the studies of a seed."""
     draw = np.random.default_rng([38, seed])
-    parts = (of_design, of_clinics, of_margin, of_many, of_looks, of_size, of_missing, of_carry_over)
+    parts = (
+        of_design,
+        of_clinics,
+        of_margin,
+        of_many,
+        of_looks,
+        of_size,
+        of_missing,
+        of_carry_over,
+    )
     return [event for part in parts for event in part(draw)]
 
 

@@ -110,7 +110,7 @@ def parallel(observations: Sequence[Observation], arms: Sequence[str]) -> Design
     for arm, of_arm in weights.items():
         of_arm[[place[arm, visit] for visit in common]] = 1 / len(common)
     covariates = np.column_stack([table.baselines, table.strata])
-    x = np.concatenate([x, covariates[:, None, :] * x.any(axis=2)[..., None]], axis=2)
+    x = np.concatenate([x, covariates[:, None, :] * np.asarray(x.any(axis=2))[..., None]], axis=2)
     zeros = np.zeros(covariates.shape[1])
     weights = {arm: np.concatenate([of_arm, zeros]) for arm, of_arm in weights.items()}
     return table.to_design(x, parts, weights, in_arm)
@@ -182,7 +182,7 @@ class _Table:
                 self.y[row, column], self.seen[row, column] = one.value, True
             if one.baseline is not None:
                 baselines[row] = one.baseline
-        walked = self.seen.any(axis=1)
+        walked = np.asarray(self.seen.any(axis=1))
         self.baselines = _standardize(baselines, walked)
         self.strata = _strata([strata.get(row, ()) for row in range(shape[0])], walked)
 
@@ -190,7 +190,7 @@ class _Table:
         self, x: Floats, parts: Floats, weights: dict[str, Floats], groups: Flags
     ) -> Design:
         """Return the design. A visit at which nobody in the arm has a value was not due."""
-        due = x.any(axis=2)
+        due = np.asarray(x.any(axis=2))
         return Design(
             *(self.people, self.arms, x, parts, self.y, self.seen, due),
             *(np.where(due, self.arm, -1), groups, weights),

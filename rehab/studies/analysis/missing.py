@@ -78,7 +78,9 @@ def missing_of(design: Design, group: str, reference: str, estimate: Estimate) -
         The arms, and their difference.
     """
     missing = design.due & ~design.seen
-    in_group, in_reference = (missing & (design.arm == design.arms.index(one)) for one in (group, reference))
+    in_group, in_reference = (
+        missing & (design.arm == design.arms.index(one)) for one in (group, reference)
+    )
     if not (in_group | in_reference).any() or not design.fit.variances.any():
         return None
     weight = np.linalg.inv(_covariance(design))

@@ -109,10 +109,11 @@ def fit(x: Floats, y: Floats, seen: Flags, parts: Floats) -> Fit:
     """
     x, y = np.where(seen[..., None], x, 0.0), np.where(seen, y, 0.0)
     every, parts = parts, parts * (seen[:, :, None] & seen[:, None, :])
-    own = ~(parts * (1 - np.eye(seen.shape[1]))).any(axis=(1, 2, 3))
+    off_diagonal = 1 - np.eye(seen.shape[1])
+    own = ~np.asarray((parts * off_diagonal).any(axis=(1, 2, 3)))
     # A part that no two visits of anybody share could not be told from the visits' own.
-    of_visits = ~(every * (1 - np.eye(seen.shape[1]))).any(axis=(1, 2, 3))
-    used = parts.any(axis=(1, 2, 3)) & (~own | of_visits)
+    of_visits = ~np.asarray((every * off_diagonal).any(axis=(1, 2, 3)))
+    used = np.asarray(parts.any(axis=(1, 2, 3))) & (~own | of_visits)
     parts = parts[used]
     count, rank = int(seen.sum()), int(np.linalg.matrix_rank(x.reshape(-1, x.shape[2])))
     effects, span, residual = _least_squares(x, y)

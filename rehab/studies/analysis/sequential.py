@@ -80,17 +80,11 @@ def bounds(information: Sequence[float], spent: Sequence[float] | Floats) -> lis
     for amount, alpha in zip(information, spent, strict=True):
         step = math.sqrt(amount - before) if amount > before else 0.0
         root = math.sqrt(amount)
-
-        def crossed(bound: float, step: float = step, root: float = root) -> float:
-            edge = bound * root
-            if step == 0:
-                return float(density[np.abs(at) > edge].sum())
-            return float(density @ (ndtr((at - edge) / step) + ndtr((-at - edge) / step)))
-
         low, high = 0.0, BEYOND
         for _ in range(ROUNDS):
             middle = (low + high) / 2
-            low, high = (middle, high) if crossed(middle) > alpha else (low, middle)
+            is_low = _crossed(at, density, step, middle * root) > alpha
+            low, high = (middle, high) if is_low else (low, middle)
         found.append(high)
         if step > 0:
             grid = np.linspace(-high * root, high * root, GRID)
@@ -100,6 +94,13 @@ def bounds(information: Sequence[float], spent: Sequence[float] | Floats) -> lis
             at, density = grid, weight * (kernel @ density) / step
         before = max(before, amount)
     return found
+
+
+def _crossed(at: Floats, density: Floats, step: float, edge: float) -> float:
+    """Return the chance of being beyond an edge after a step from where a study can be."""
+    if step == 0:
+        return float(density[np.abs(at) > edge].sum())
+    return float(density @ (ndtr((at - edge) / step) + ndtr((-at - edge) / step)))
 
 
 def blinded_size(values: Sequence[float], planned_sd: float, planned: int) -> tuple[float, int]:

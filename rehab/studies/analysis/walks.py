@@ -15,7 +15,6 @@ from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import Phase
 
 
-
 @dataclass(frozen=True)
 class Walk:
     """One session: n strides of the trained leg, in their order.

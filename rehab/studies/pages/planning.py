@@ -84,7 +84,8 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
             else:
                 with transaction.atomic():
                     save_arms(arms, study)
-                    revise(study, form.cleaned_data["reason"], user, timezone.now())
+                    reason, again = (form.cleaned_data[n] for n in ("reason", "needs_consent"))
+                    revise(study, reason, user, timezone.now(), needs_consent=again)
         except InvalidSetting as problem:
             form.add_error(None, format_refusal(problem))
             if study_id is None:

@@ -23,6 +23,7 @@ from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Side
 from rehab.training.valences import find_valence
 
+ANALYSIS = ("margin", "spending", "planned_sd")
 USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
 
 
@@ -54,6 +55,9 @@ def describe(study: Study) -> dict[str, Any]:
         document["visits"]["days_to_follow_up"] = plan.follow_up_days
         for arm in study.arms.all():
             arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
+    document |= {"analysis": planned} if planned else {}
+    document |= {"facts": study.facts} if study.facts else {}
     criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}
     document |= {name: asked for name, asked in criteria.items() if asked}
     stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists

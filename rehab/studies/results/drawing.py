@@ -15,8 +15,9 @@ from rehab.studies.figures.flow import Box, draw_flow
 from rehab.studies.figures.forest import ForestRow, draw_forest
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
-from rehab.studies.results.results import (
-    Results,
+from rehab.studies.results.results import Results
+from rehab.studies.results.tables import (
+    carry_over_rows,
     change_rows,
     conduct_rows,
     curve_rows,
@@ -168,6 +169,7 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "outcomes": outcome_rows,
     "phases": phase_rows,
     "differences": difference_rows,
+    "carry_over": carry_over_rows,
     "curves": curve_rows,
     "flow": flow_rows,
     "screening": screening_rows,
