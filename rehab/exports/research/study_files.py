@@ -16,6 +16,7 @@ from typing import Any
 from rehab.exports.archive import write_csv
 from rehab.exports.research.dates import shift_of
 from rehab.people.models import User
+from rehab.studies import analysis
 from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment
@@ -27,7 +28,11 @@ PARTICIPANTS = (
     *("number", "participant", "pseudonym", "levels", "group", "version"),
     *("enrolled_at", "withdrawn_at", "data_kept"),
 )
-VERIFIER = Path(__file__).with_name("verify_allocation.py")
+HERE = Path(__file__).parent
+VERIFIER = HERE / "verify_allocation.py"
+# What `reanalyze.py` computes with: GARRY's own model, as it is.
+MODEL = ("comparison", "designs", "missing", "mixed_model", "sequential")
+PACKAGE = "garry_analysis"
 
 
 def studies_of(user: User, code: str) -> list[Study]:
@@ -56,12 +61,24 @@ def study_files(
     yield f"{folder}/definitions.csv", [write_table(definitions)]
     if study.state == StudyState.CLOSED:
         yield f"{folder}/verify_allocation.py", [VERIFIER.read_text("utf-8")]
+        for name, text in analysis_files():
+            yield f"{folder}/{name}", [text]
         results = read_results(study, now)
         for name, table in TABLES.items():
             cells = table(results)
             if shift_dates:
                 cells = ({key: row[key] for key in row if key != "at"} for row in cells)
             yield f"{folder}/{name}.csv", [write_table(cells)]
+
+
+def analysis_files() -> Iterator[tuple[str, str]]:
+    """Yield the scripts that compute a study's results again: name and text."""
+    yield "reanalyze.R", (HERE / "reanalyze.R").read_text("utf-8")
+    own = Path(analysis.__file__).parent
+    modules = [HERE / "reanalyze.py", *(own / f"{name}.py" for name in MODEL)]
+    for module in modules:
+        text = module.read_text("utf-8").replace(analysis.__name__, PACKAGE)
+        yield (module.name if module.parent == HERE else f"{PACKAGE}/{module.name}"), text
 
 
 def participant_rows(user: User, study: Study, *, shift_dates: bool) -> Iterator[tuple[Any, ...]]:

@@ -23,6 +23,7 @@ from rehab.studies.results.tables import (
     curve_rows,
     difference_rows,
     flow_rows,
+    look_rows,
     occurrence_rows,
     outcome_rows,
     phase_rows,
@@ -172,6 +173,7 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "carry_over": carry_over_rows,
     "curves": curve_rows,
     "flow": flow_rows,
+    "looks": look_rows,
     "screening": screening_rows,
     "changes": change_rows,
     "conduct": conduct_rows,
@@ -180,7 +182,9 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
 
 
 # What is shown before the end: the rest shows single people, or what tells an arm.
-INTERIM = frozenset({"registered", "differences", "flow", "screening", "changes", "conduct"})
+INTERIM = frozenset(
+    {"registered", "differences", "flow", "looks", "screening", "changes", "conduct"}
+)
 
 
 def is_shown(results: Results, name: str) -> bool:

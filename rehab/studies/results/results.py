@@ -154,17 +154,28 @@ class Results:
         return sum(any(self.primary in visit.outcomes for visit in one.visits) for one in people)
 
     @cached_property
-    def level(self) -> float | None:
-        """Below which p the primary outcome is found now; None at a look that was not planned."""
-        study = self.study
-        if not study.spending:
-            return None if self.is_interim else sequential.ALPHA
-        if not self.information:
-            return None
-        looks = [count for count in self.looks if count < self.information]
+    def levels(self) -> tuple[tuple[int, float | None], ...]:
+        """How many had the primary outcome at each look, now the last; below which p it is found.
+
+        None at looks that were not planned: they may find nothing.
+        """
+        study, count = self.study, self.information
+        if not count:
+            return ()
+        counts = [*(earlier for earlier in self.looks if earlier < count), count]
         is_last = not self.is_interim
-        all_looks = [*looks, self.information]
-        return sequential.levels(study.spending, all_looks, study.participants, is_last=is_last)[-1]
+        if not study.spending:
+            levels = [None] * (len(counts) - 1) + [sequential.ALPHA if is_last else None]
+        else:
+            levels = [
+                *sequential.levels(study.spending, counts, study.participants, is_last=is_last)
+            ]
+        return tuple(zip(counts, levels, strict=True))
+
+    @property
+    def level(self) -> float | None:
+        """Below which p the primary outcome is found now; None where it was not planned."""
+        return self.levels[-1][1] if self.levels else None
 
     @cached_property
     def blinded_size(self) -> tuple[float, int] | None:

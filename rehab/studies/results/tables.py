@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -40,7 +39,10 @@ def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
                     "arm": visit.arm,
                     "period": visit.period,
                     "baseline": one and one.baseline,
-                    "strata": json.dumps(one.strata if one else (), ensure_ascii=False),
+                    **{
+                        f"stratum_{n}": level
+                        for n, level in enumerate(one.strata if one else (), 1)
+                    },
                     "per_protocol": one is not None and not has_departed(one, results.departures),
                 }
             )
@@ -137,6 +139,17 @@ def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
     """Return one row for each group of the flow of participants."""
     rows = [asdict(one) | {"primary_outcome": results.primary} for one in results.flow]
     return [{"group": results.arms[row.pop("arm")]} | row for row in rows]
+
+
+def look_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each number of participants at which results were looked at."""
+    for participants, level in results.levels:
+        yield {
+            "participants": participants,
+            "planned": results.study.participants,
+            "spending": results.study.spending,
+            "level": level,
+        }
 
 
 def screening_rows(results: Results) -> Iterator[dict[str, Any]]:
