@@ -15,6 +15,7 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.studies.record.agreements import check_agreed
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
@@ -107,6 +108,7 @@ def start_session(
                 day=now.date(),
             )
         visit.version = current_version(study)
+        check_agreed(enrollment)
         arm = enrollment.allocation.arm_of_period(visit.period)
         visit.session = create_session(
             SessionRequest(

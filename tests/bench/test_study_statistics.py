@@ -117,6 +117,13 @@ def of_design(draw: Random) -> Iterator[Event]:
             yield Event(f"{lost}: power at {EFFECT:g}", is_found(true), None)
 
 
+def of_response(draw: Random) -> Iterator[Event]:
+    """Yield the coverage where half of one arm is missing by response, and people are many."""
+    found = one(people(draw, EFFECT, "by response", count=160))
+    name = "160 people, parallel; missing: by response: coverage"
+    yield Event(name, covers(found, EFFECT), (0.94, 0.96))
+
+
 def of_clinics(draw: Random) -> Iterator[Event]:
     """Yield the same where ten clinics differ much, and what leaving them out would cost."""
     for effect in (0.0, EFFECT):
@@ -203,6 +210,7 @@ def studied(seed: int) -> list[Event]:
     draw = np.random.default_rng([38, seed])
     parts = (
         of_design,
+        of_response,
         of_clinics,
         of_margin,
         of_many,
