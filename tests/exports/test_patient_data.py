@@ -111,7 +111,6 @@ TOLD_IN = {
     "SessionMetric": "sessions.csv",
     "SessionCorrection": "corrections.csv",
     "Enrollment": "studies.json",
-    "AdverseEvent": "studies.json",
     "Screening": "studies.json",
     "StudyVisit": "studies.json",
     "RobotIncident": "incidents.csv",

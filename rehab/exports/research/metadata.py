@@ -7,7 +7,6 @@ import json
 import mimetypes
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from datetime import datetime
 from typing import Any
 
 from rehab.exports.session_table import PARTICIPANT
@@ -19,15 +18,15 @@ CONTEXT = "https://w3id.org/ro/crate/1.1/context"
 QUASI = tuple(column.name for column in PARTICIPANT)
 
 
-def write_crate(names: Iterable[str], title: str, made_at: datetime, version: str) -> str:
+def write_crate(names: Iterable[str], title: str, published: str, version: str) -> str:
     """Return ro-crate-metadata.json (RO-Crate 1.1) of an archive.
 
     Parameters
     ----------
     names
         Of the archive's files.
-    title, made_at, version
-        Of the export; of GARRY.
+    title, published, version
+        Of the export: its name, its day or year (ISO 8601); of GARRY.
     """
     files = sorted(names)
     about = {
@@ -41,7 +40,7 @@ def write_crate(names: Iterable[str], title: str, made_at: datetime, version: st
         "@type": "Dataset",
         "name": title,
         "description": "Walking with feedback on each step, by pseudonyms, exported by GARRY.",
-        "datePublished": f"{made_at:%Y-%m-%d}",
+        "datePublished": published,
         "license": "To be set by who shares the data",
         "hasPart": [{"@id": name} for name in files],
     }

@@ -181,7 +181,8 @@ class Package:
             names.append(name)
             yield name, content
         what = f"Study {self.study}" if self.study else "All sessions"
-        crate = write_crate(names, what, self.made_at, garry_version())
+        published = f"{self.made_at:%Y}" if self.shift_dates else f"{self.made_at:%Y-%m-%d}"
+        crate = write_crate(names, what, published, garry_version())
         yield "ro-crate-metadata.json", [crate]
 
     def _all_files(

@@ -197,11 +197,7 @@ def main(folders: Sequence[Path]) -> int:
     """Print what was computed; of one folder, also where its tables differ. Return how many do."""
     trial = Trial(folders)
     tables = {"differences": list(trial.differences()), "carry_over": list(trial.carry_over())}
-    for rows in tables.values():
-        if rows:
-            writer = csv.DictWriter(sys.stdout, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+    sys.stdout.write(json.dumps(tables, indent=1) + "\n")
     if len(folders) > 1:
         return 0
     wrong = [
