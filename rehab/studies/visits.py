@@ -13,9 +13,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
+from rehab.studies.agreements import check_agreed
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
-from rehab.studies.record.agreements import check_agreed
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule

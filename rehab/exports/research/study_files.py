@@ -20,11 +20,11 @@ from rehab.exports.archive import write_csv
 from rehab.exports.research.dates import shift_of
 from rehab.people.models import User
 from rehab.studies import analysis
+from rehab.studies.agreements import agreement_rows
 from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment
 from rehab.studies.record.adverse_events import listing_rows
-from rehab.studies.record.agreements import agreement_rows
 from rehab.studies.record.checklists import checklist_rows
 from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.results.drawing import TABLES, write_table

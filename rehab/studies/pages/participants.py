@@ -16,12 +16,12 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
+from rehab.studies.agreements import agree, agreed_version, version_to_agree_to
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participant_forms import EnrollmentForm, PlaceForm
 from rehab.studies.participants import Enrollment
-from rehab.studies.record.agreements import agree, agreed_version, version_to_agree_to
 from rehab.studies.screening import find_unmet, turn_away
 from rehab.studies.unblinding import arms_of, find_request, may_read_arm, reveal_arms
 from rehab.studies.visits import next_visit, start_session

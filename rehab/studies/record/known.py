@@ -7,8 +7,8 @@ from typing import Any
 from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.models import Study, StudyMark
 from rehab.studies.participants import StudyEvent
-from rehab.studies.record.estimands import METHOD, SUMMARY, estimands
 from rehab.studies.registration.document import describe
+from rehab.studies.registration.estimands import METHOD, SUMMARY, estimands
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.results.results import Results
 

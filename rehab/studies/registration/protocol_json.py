@@ -9,7 +9,7 @@ from typing import Any
 
 from rehab.studies.allocation.draws import RULE
 from rehab.studies.models import Study, StudyState
-from rehab.studies.record.estimands import estimands
+from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.registration.sealing import unseal
 
