@@ -146,8 +146,8 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
             has_left = 0 < person.leaves_before <= visit.number
             walked = None
             if not has_left:
-                kept = trial.population.kept
-                walker = person.at_visit(visit.number, trial.effects[arm], kept)
+                retained = trial.population.retained
+                walker = person.at_visit(visit.number, trial.effects[arm], retained)
                 walked = walk_by_fold(trial.plans[arm], walker)
             planned.append((ParticipantVisit(visit.number, arm, period=visit.period), walked))
         participants.append(
