@@ -2900,7 +2900,7 @@ class Migration(migrations.Migration):
                             ("obrien_fleming", "Seldom early (O’Brien and Fleming)"),
                             ("pocock", "Alike at each look (Pocock)"),
                         ],
-                        help_text="How the 5 % of a false finding are spent. Without it no look may stop it.",
+                        help_text="How alpha, the chance of a false finding (0.05), is spent. Without it no look may stop the study.",
                         max_length=16,
                         verbose_name="looks before the end",
                     ),

@@ -57,6 +57,14 @@ def give_mark(study: Study, user: User, task: Task, by: User | None, now: dateti
             )
         if has_mark(study, user, task):
             return
+        other = {Task.INTERIM: Task.MONITOR, Task.MONITOR: Task.INTERIM}.get(task)
+        if other is not None and has_mark(study, user, other):
+            raise InvalidSetting(
+                gettext(
+                    "Harms by arm would tell which numbered group is which arm. Let one person "
+                    "monitor harms and another one look early."
+                )
+            )
         if task == Task.ASSESSOR:
             check_no_open_session(study)
             treated = study.enrollments.filter(visits__session__created_by=user)

@@ -199,6 +199,8 @@ def test_who_treats_judges_and_reports_and_only_a_monitor_sees_arms(world):
     monitor = User.everywhere.create_user("mo", role=Role.RESEARCHER, clinic=world.clinic)
     assert signed_in(monitor).get(url).status_code == 403
     give_mark(study, monitor, Task.MONITOR, None, NOW)
+    with pytest.raises(InvalidSetting, match="Let one person"):
+        give_mark(study, monitor, Task.INTERIM, None, NOW)
     seen = signed_in(monitor).get(url).content.decode()
     assert arm_column in seen
     assert f"<td>{enrollment.allocation.group}</td>" in seen

@@ -131,7 +131,10 @@ class Study(ClinicModel):
         max_length=16,
         blank=True,
         choices=list(SPENDINGS.items()),
-        help_text=_("How the 5 % of a false finding are spent. Without it no look may stop it."),
+        help_text=_(
+            "How alpha, the chance of a false finding (0.05), is spent. Without it no look may "
+            "stop the study."
+        ),
     )
     planned_sd = models.FloatField(
         _("SD that the size rests on"),
