@@ -200,6 +200,8 @@ class StudyEvent(SealableModel):
         WITHDRAWN = "withdrawn", _("Withdrew")
         MARKED = "marked", _("Mark given")
         UNMARKED = "unmarked", _("Mark taken")
+        CONSENTED = "consented", _("Agreed to a new version")
+        ASKED = "asked", _("A second person is asked to reveal the arm")
         UNBLINDED = "unblinded", _("Arm revealed")
         EMERGENCY = "emergency", _("Arm revealed in an emergency")
         REFUSED = "refused", _("Revealing the arm was refused")

@@ -38,7 +38,8 @@ def options_of(client: Client, url: str) -> dict[str, Any]:
     page = client.get(url).content.decode()
     found = re.search(r'data-passkey="([^"]*)"', page)
     assert found, page
-    return json.loads(html.unescape(found[1]))
+    asked: dict[str, Any] = json.loads(html.unescape(found[1]))
+    return asked
 
 
 def register(user: User, key: SoftPasskey, answer: Answer | None = None) -> Any:

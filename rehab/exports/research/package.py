@@ -21,6 +21,7 @@ from django.db.models import QuerySet
 from rehab.exports.archive import write_csv
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
+from rehab.exports.research.metadata import write_anonymity, write_crate
 from rehab.exports.research.session_files import ABOUT, KINDS, write_part
 from rehab.exports.research.sinks import has_parquet
 from rehab.exports.research.study_files import groups_of, studies_of, study_files
@@ -175,7 +176,21 @@ class Package:
                 if known["participant_id"]:
                     about_study = groups.get(known["pseudonym"], {})
                     people.setdefault(known["participant_id"], known | about_study)
+        names = []
+        for name, content in self._all_files(parts, studies, people):
+            names.append(name)
+            yield name, content
+        what = f"Study {self.study}" if self.study else "All sessions"
+        published = f"{self.made_at:%Y}" if self.shift_dates else f"{self.made_at:%Y-%m-%d}"
+        crate = write_crate(names, what, published, garry_version())
+        yield "ro-crate-metadata.json", [crate]
+
+    def _all_files(
+        self, parts: list[Path], studies: list[Study], people: dict[str, dict[str, Any]]
+    ) -> Iterator[tuple[str, Iterable[str | bytes]]]:
+        """Yield the files of the archive but for what describes them all."""
         yield "README.txt", [self._readme(len(parts))]
+        yield "k_anonymity.csv", [write_anonymity(list(people.values()))]
         yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
         for table in TABLES:
             yield table.file, _concatenate(table.header, [part / table.file for part in parts])
@@ -212,7 +227,9 @@ class Package:
             "study_visits.csv has the allocation of closed studies; of others it is sealed.\n"
             "studies/: a folder for each study: the protocol with all versions, everybody who was "
             "ever allocated, what each outcome means; of closed ones the results' tables, the "
-            "seed, and verify_allocation.py, which allocates again.\n"
+            "seed, verify_allocation.py, which allocates again, reanalyze.py and .R, which "
+            "redo the results. checklists.csv: SPIRIT, CONSORT, TIDieR, WHO.\n"
+            "k_anonymity.csv: how many people are alike. ro-crate-metadata.json: RO-Crate 1.1.\n"
             "Sessions of people who left a study and wanted their data removed are not here.\n\n"
             f"{README_TEXT % {'version': RULES_VERSION}}"
         )
