@@ -52,7 +52,8 @@ def hospital(tmp_path: Path) -> Iterator[Hospital]:
     with serve(tmp_path / "data", settings=settings) as server:
         made = Hospital(tmp_path, server, settings["GARRY_OIDC_ISSUER"])
         made.employ()
-        words = [node, PROVIDER, str(port), f"http://localhost:{server.port}", made.staff]
+        address = f"http://localhost:{server.port}"
+        words = [node, str(PROVIDER), str(port), address, str(made.staff)]
         with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             assert process.stdout.readline().strip() == "ready"
