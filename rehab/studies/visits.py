@@ -13,6 +13,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
+from rehab.studies.agreements import check_agreed
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
 from rehab.studies.registration.document import find_rule
@@ -108,6 +109,7 @@ def start_session(
                 day=now.date(),
             )
         visit.version = current_version(study)
+        check_agreed(enrollment)
         arm = enrollment.allocation.arm_of_period(visit.period)
         visit.session = create_session(
             SessionRequest(

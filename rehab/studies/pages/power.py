@@ -43,7 +43,7 @@ class PowerForm(forms.Form):
         self.initial = {
             "participants": study.participants,
             "sd_percent": USUAL.sd_percent,
-            "kept_percent": 100 * USUAL.kept,
+            "kept_percent": 100 * USUAL.retained,
             "dropout_percent": 100 * USUAL.dropout,
             "simulations": 200,
         }

@@ -35,6 +35,7 @@ FIRST_A2 = Measure(
     goal_max=15.0,
     first_goal=3.9,
 )
+ANALYSIS = ("margin", "spending", "planned_sd")
 USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
 
 
@@ -66,6 +67,9 @@ def describe(study: Study) -> dict[str, Any]:
         document["visits"]["days_to_follow_up"] = plan.follow_up_days
         for arm in study.arms.all():
             arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
+    document |= {"analysis": planned} if planned else {}
+    document |= {"facts": study.facts} if study.facts else {}
     criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}
     document |= {name: asked for name, asked in criteria.items() if asked}
     stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists

@@ -67,7 +67,7 @@ def test_every_measure_is_walked_and_answers_its_goal(measure):
 
 
 def test_signals_of_another_measure_say_that_they_do_not_answer_its_goal():
-    said = []
+    said: list[str] = []
     settings = {"mass": 75.0, "rate": 100.0, "look_ahead": 0.05, "keep": None}
     options = Namespace(seed=3, profile="good", side=None, signals=True, strides=None, **settings)
     live = SyntheticSource(options, said.append).open_walk(Side.LEFT)
