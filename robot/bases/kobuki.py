@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-from robot.bases.avatar.face_screen import FaceScreen, read_face
 from robot.bases.base import (
     Abilities,
     Answer,
@@ -20,6 +19,7 @@ from robot.bases.base import (
     MobileBase,
     SensorState,
 )
+from robot.bases.face import FaceScreen, read_face
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,

@@ -34,7 +34,7 @@ def needed_s(gesture: Gesture, pace: float) -> float:
 
 
 class IdleLife:
-    """Says which idle motion begins now, if any.
+    """Chooses which idle motion begins now, if any.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from robot.motion.looks import HAPPY, MOUTHS, Look
 
-# The head of the avatar's drawing (robot/bases/avatar/page.html), with room to tilt [px].
+# The head of the avatar's drawing (robot/bases/face/page.html), with room to tilt [px].
 LEFT, TOP, WIDTH, HEIGHT = 94, 72, 212, 150
 SCALE = 3
 PAPER, HEAD, SKIN, INK, HAND = "#f4f1ea", "#5b95b8", "#f8fbfd", "#22313a", "#f2b84b"

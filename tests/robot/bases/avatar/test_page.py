@@ -11,8 +11,8 @@ import pytest
 from websockets.sync.client import connect
 
 from robot.bases.avatar import AvatarBase
-from robot.bases.avatar.face_screen import FaceScreen
 from robot.bases.base import Answer, BaseLost, Indication
+from robot.bases.face import FaceScreen
 from robot.bases.kobuki import KobukiBase
 from robot.motion.gestures import GESTURES
 from robot.motion.looks import REST, to_message
@@ -265,6 +265,6 @@ def test_a_gesture_on_the_avatar(avatar):
 
 
 def test_its_page_names_no_other_host():
-    folder = Path(__file__).parents[4] / "robot" / "bases" / "avatar"
+    folder = Path(__file__).parents[4] / "robot" / "bases" / "face"
     for name in ("page.html", "avatar.js"):
         assert "://" not in (folder / name).read_text().replace("ws://${location.host}", "")

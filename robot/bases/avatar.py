@@ -6,8 +6,8 @@ from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable
 from typing import ClassVar
 
-from robot.bases.avatar.face_screen import FaceScreen, read_face
 from robot.bases.base import Abilities, Answer, Indication
+from robot.bases.face import FaceScreen, read_face
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.motion.twist import Twist
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable
 
-from robot.bases.avatar.page_server import PageServer
 from robot.bases.base import Answer, BadOption, BaseLost, Indication
+from robot.bases.face.page_server import PageServer
 from robot.motion.looks import REST, Script, find_act, look_at, to_message
 from robot.motion.pose import Pose
 
