@@ -7,6 +7,7 @@ and not by a check, which only Django's own commands run.
 
 import os
 from pathlib import Path
+from urllib.parse import urlsplit
 from zoneinfo import available_timezones
 
 from csp.constants import NONCE, NONE, SELF
@@ -158,6 +159,19 @@ AUTHENTICATION_BACKENDS = [
     "rehab.people.sign_in.backends.PasskeyBackend",
 ]
 LOGIN_URL = "sign-in"
+OIDC_ISSUER = text("GARRY_OIDC_ISSUER", "", "address of the hospital's sign-on (OpenID Connect)")
+OIDC_CLIENT_ID = text("GARRY_OIDC_CLIENT_ID", "garry", "GARRY's name at the sign-on")
+OIDC_CLIENT_SECRET = text("GARRY_OIDC_CLIENT_SECRET", "", "GARRY's secret at the sign-on")
+OIDC_NAME = text("GARRY_OIDC_NAME", "Hospital account", "what the button of the sign-on says")
+OIDC_SCOPE = text("GARRY_OIDC_SCOPE", "openid profile", "what the sign-on is asked to tell")
+OIDC_GROUPS_CLAIM = text("GARRY_OIDC_GROUPS_CLAIM", "groups", "claim that lists a person's groups")
+OIDC_CREATE = flag("GARRY_OIDC_CREATE", False, "make accounts for people whom a group lets in")
+OIDC_MFA_ACR = string_list(
+    "GARRY_OIDC_MFA_ACR", "", "values of acr by which the sign-on vouches for a second factor"
+)
+OIDC_ORIGIN = "{0.scheme}://{0.netloc}".format(urlsplit(OIDC_ISSUER))
+if OIDC_ISSUER and urlsplit(OIDC_ISSUER).scheme != "https" and HOSTED:
+    raise ImproperlyConfigured("GARRY_OIDC_ISSUER must begin with https:// on a hosted server.")
 SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
 SESSION_COOKIE_AGE = 12 * 3600  # one working day, whatever the activity
 SESSION_COOKIE_SAMESITE = "Lax"
@@ -237,7 +251,8 @@ CONTENT_SECURITY_POLICY = {
         "connect-src": [SELF],
         "object-src": [NONE],
         "base-uri": [NONE],
-        "form-action": [SELF],
+        # A sign-out goes on to the hospital's.
+        "form-action": [SELF, *([OIDC_ORIGIN] if OIDC_ISSUER else [])],
         "frame-ancestors": [NONE],
     }
 }

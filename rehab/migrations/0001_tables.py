@@ -252,6 +252,10 @@ class Migration(migrations.Migration):
                         verbose_name="language",
                     ),
                 ),
+                (
+                    "subject",
+                    models.CharField(editable=False, max_length=255, null=True, unique=True),
+                ),
                 ("sign_in_generation", models.PositiveIntegerField(default=0, editable=False)),
                 (
                     "groups",
@@ -1974,6 +1978,7 @@ class Migration(migrations.Migration):
                             ("factor_removed", "Removed a second factor"),
                             ("recovery_codes", "Made new recovery codes"),
                             ("password", "Changed a password"),
+                            ("sign_on", "Linked or unlinked a hospital account"),
                             ("token_use", "Used a token from a new network"),
                             ("refused", "Was refused"),
                             ("token", "Gave a new token"),
@@ -2615,6 +2620,56 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
+            name="SignOnGroup",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "name",
+                    models.CharField(
+                        help_text="As the hospital's sign-on names it.",
+                        max_length=200,
+                        verbose_name="group",
+                    ),
+                ),
+                (
+                    "role",
+                    models.CharField(
+                        choices=[
+                            ("lead", "Clinic lead"),
+                            ("pt", "Physical therapist"),
+                            ("researcher", "Researcher"),
+                        ],
+                        max_length=16,
+                        verbose_name="role",
+                    ),
+                ),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="sign_on_groups",
+                        to="rehab.clinic",
+                        verbose_name="clinic",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "sign-on group",
+                "verbose_name_plural": "sign-on groups",
+                "ordering": ["clinic", "name"],
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
             name="Station",
             fields=[
                 (
@@ -3197,6 +3252,7 @@ class Migration(migrations.Migration):
                             ("emergency", "Arm revealed in an emergency"),
                             ("refused", "Revealing the arm was refused"),
                             ("looked", "Looked at results before the end"),
+                            ("guessed", "Group guessed"),
                         ],
                         max_length=12,
                         verbose_name="what",
@@ -4203,6 +4259,14 @@ class Migration(migrations.Migration):
             model_name="resetrequest",
             constraint=models.UniqueConstraint(
                 fields=("account", "asked_by"), name="reset_request_once_per_host"
+            ),
+        ),
+        migrations.AddConstraint(
+            model_name="signongroup",
+            constraint=models.UniqueConstraint(
+                fields=("name", "clinic"),
+                name="sign_on_group_once_a_clinic",
+                violation_error_message="This clinic has this group already.",
             ),
         ),
         migrations.AddConstraint(

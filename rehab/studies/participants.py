@@ -206,6 +206,7 @@ class StudyEvent(SealableModel):
         EMERGENCY = "emergency", _("Arm revealed in an emergency")
         REFUSED = "refused", _("Revealing the arm was refused")
         LOOKED = "looked", _("Looked at results before the end")
+        GUESSED = "guessed", _("Group guessed")
 
     # Reasons may name the condition.
     scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")

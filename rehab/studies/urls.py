@@ -42,6 +42,7 @@ urlpatterns = [
     path("participants/<int:enrollment_id>/", participants.show_participant, name="participant"),
     path("participants/<int:enrollment_id>/start/", participants.start_visit, name="start-visit"),
     path("participants/<int:enrollment_id>/leave/", participants.leave_study, name="leave-study"),
+    path("participants/<int:enrollment_id>/guess/", participants.note_guess, name="note-guess"),
     path("participants/<int:enrollment_id>/agree/", participants.agree_again, name="agree-again"),
     path("participants/<int:enrollment_id>/reveal/", participants.reveal, name="reveal"),
 ]

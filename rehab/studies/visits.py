@@ -16,6 +16,7 @@ from rehab.stations.models import Station
 from rehab.studies.agreements import check_agreed
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.studies.registration.document import find_rule
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
@@ -118,6 +119,7 @@ def start_session(
                 phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,
+                rule=find_rule(study, arm),
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
                 seed=seed_of(study.pk, visit.number),

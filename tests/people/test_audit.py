@@ -53,6 +53,7 @@ def entries():
 # Pages and calls that show nothing of patients. Whatever is not here must leave an entry.
 SILENT = {
     *("account", "own-password", "set-up-second-factor", "add-app", "add-passkey"),
+    *("sign-on", "sign-on-complete", "sign-on-ended", "sign-on-confirm", "sign-on-link"),
     *("remove-authenticator", "recovery-codes", "pair", "pair-phone", "consent-text", "export"),
     "screen-size",
     *(
@@ -87,6 +88,7 @@ def is_silent(name: str) -> bool:
             "clinic",
             "user",
             "apitoken",
+            "signongroup",
             "station",
             "device",
             "measuredefinition",

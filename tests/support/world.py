@@ -24,7 +24,7 @@ from rehab.people.audit.seals import LogSeal
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.consent.tombstones import ImportTombstone
-from rehab.people.models import BoardsConsent, Clinic, Patient, User
+from rehab.people.models import BoardsConsent, Clinic, Patient, SignOnGroup, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
@@ -343,6 +343,7 @@ def build_world(name: str) -> World:
         AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
         HistoryEntry.everywhere.get(model_name="Patient", object_id=patient.pk),
         seal_nothing(clinic),
+        SignOnGroup.everywhere.create(clinic=clinic, name=mark(name, SignOnGroup), role=Role.PT),
         ApiToken.everywhere.create(
             clinic=clinic,
             user=people[Role.PT],

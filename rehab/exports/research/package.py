@@ -22,7 +22,7 @@ from rehab.exports.archive import write_csv
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.research.metadata import write_anonymity, write_crate
-from rehab.exports.research.session_files import ABOUT, write_part
+from rehab.exports.research.session_files import ABOUT, KINDS, write_part
 from rehab.exports.research.sinks import has_parquet
 from rehab.exports.research.study_files import groups_of, studies_of, study_files
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
@@ -199,7 +199,7 @@ class Package:
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
             yield f"bids/{name}", [text]
         for part in parts:
-            for kind in ("parquet", "bids", "recordings", "fhir"):
+            for kind in KINDS:
                 for file in sorted((part / kind).rglob("*.*")):
                     if file.is_file():
                         yield file.relative_to(part).as_posix(), _read(file)
@@ -222,7 +222,8 @@ class Package:
             f"Made from {self.made_at:%Y-%m-%d %H:%M} UTC; {given} of {len(self.keys)} sessions. "
             "Missing ones may not be seen any more.\n\n"
             f"{dates}\n{parquet}\n"
-            "recordings/: sessions to play again in GARRY. bids/: BIDS motion. fhir/: FHIR R4B.\n"
+            "recordings/: sessions to play again in GARRY. bids/: BIDS motion, of strides "
+            "and of the robot. robot/: how it moved, as MCAP. fhir/: FHIR R4B.\n"
             "study_visits.csv has the allocation of closed studies; of others it is sealed.\n"
             "studies/: a folder for each study: the protocol with all versions, everybody who was "
             "ever allocated, what each outcome means; of closed ones the results' tables, the "

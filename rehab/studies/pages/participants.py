@@ -18,6 +18,7 @@ from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
 from rehab.studies.agreements import agree, agreed_version, version_to_agree_to
 from rehab.studies.enrolling import enroll, withdraw
+from rehab.studies.guesses import GUESSERS, UNKNOWN, group_labels, may_guess, record_guess
 from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participant_forms import EnrollmentForm, PlaceForm
@@ -91,12 +92,16 @@ def render_participant(
     if not blind and "revealed" not in more and may_read_arm(enrollment, user, now):
         more["revealed"] = arms_of(enrollment)
     is_walking = any(visit.session and visit.session.state in OPEN_STATES for visit in visits)
+    guesser = may_guess(enrollment, user)
     context = {
         "enrollment": enrollment,
         "study": enrollment.study,
         "visits": visits,
         "next": None if is_walking else next_visit(enrollment),
         "blind": blind,
+        "guesser": GUESSERS[guesser] if guesser else "",
+        "groups": group_labels(enrollment.study) if guesser else {},
+        "unknown": UNKNOWN,
         "asked": find_request(enrollment, now),
         "agreed": agreed_version(enrollment),
         "to_agree_to": version_to_agree_to(enrollment),
@@ -134,6 +139,20 @@ def leave_study(request: HttpRequest, enrollment_id: int) -> HttpResponse:
     user = user_of(request)
     enrollment = get_enrollment(user, enrollment_id)
     withdraw(enrollment, user, timezone.now(), request.POST.get("reason", "")[:1000])
+    return redirect("participant", enrollment_id=enrollment.pk)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def note_guess(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Note what the participant, or the assessor who asks, guesses about the group."""
+    user = user_of(request)
+    enrollment = get_enrollment(user, enrollment_id)
+    try:
+        record_guess(enrollment, request.POST.get("group", ""), user, timezone.now())
+    except InvalidSetting as problem:
+        return render_participant(request, enrollment, 403, refused=refuse(request, problem))
+    messages.success(request, _("The guess is noted."))
     return redirect("participant", enrollment_id=enrollment.pk)
 
 

@@ -19,6 +19,7 @@ from rehab.people.roles import Role
 from rehab.sessions.formatting import format_number
 from rehab.studies.analysis.comparison import CONFIDENCE, Difference, Interval
 from rehab.studies.analysis.findings import OutcomeResult
+from rehab.studies.guesses import GUESSERS, Guesser, group_labels, guess_rows
 from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
 from rehab.studies.results.drawing import (
@@ -76,6 +77,10 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
         },
         "registered": [_describe(results, slug) for slug in results.registered],
         "exploratory": [_describe(results, slug) for slug in results.exploratory],
+        "groups": group_labels(study),
+        "guesses": []
+        if results.is_interim
+        else [_describe_guess(study, row) for row in guess_rows(study)],
         "tables": [name for name in TABLES if is_shown(results, name)],
     }
     return render(request, "studies/results.html", context)
@@ -117,6 +122,20 @@ def _describe(results: Results, slug: str) -> dict[str, Any]:
             }
             for one in found.differences
         ],
+    }
+
+
+def _describe_guess(study: Study, row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row of guesses as the page's table has it."""
+    estimate = row["estimate"]
+    interval = None if estimate is None else Interval(estimate, row["low_95"], row["high_95"])
+    return {
+        "guesser": GUESSERS[Guesser(row["guesser"])],
+        "group": group_labels(study).get(row["group"], ""),
+        "counts": [row[name] for name in row if name.startswith("guessed_")],
+        "do_not_know": row["do_not_know"],
+        "index": row["index"],
+        "found": _format_interval(interval, ""),
     }
 
 

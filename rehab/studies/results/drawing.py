@@ -15,6 +15,7 @@ from rehab.studies.figures.flow import Box, draw_flow
 from rehab.studies.figures.forest import ForestRow, draw_forest
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
+from rehab.studies.guesses import guess_rows
 from rehab.studies.results.results import Results
 from rehab.studies.results.tables import (
     carry_over_rows,
@@ -178,6 +179,7 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "changes": change_rows,
     "conduct": conduct_rows,
     "occurrences": occurrence_rows,
+    "guesses": lambda results: guess_rows(results.study),
 }
 
 
