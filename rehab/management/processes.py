@@ -49,7 +49,7 @@ class Server:
         self._socket.bind(str(address))
         self._socket.setblocking(False)
         self.process: subprocess.Popen[bytes]
-        self.is_ready = False
+        self._was_ready = False
         self.due_s = 0.0  # when it has to have been heard, by the monotonic clock
         self.ended_s: float | None = None
 
@@ -60,20 +60,28 @@ class Server:
         self.process = subprocess.Popen(
             self._command, stdin=subprocess.DEVNULL, start_new_session=True, env=environment
         )
-        self.is_ready, self.ended_s = False, None
+        self._was_ready, self.ended_s = False, None
         self.due_s = now_s + READY_S
+
+    def is_ready(self) -> bool:
+        """Return whether it has reported that it is ready."""
+        return self._was_ready
+
+    def has_ended(self) -> bool:
+        """Return whether its process has ended."""
+        return self.process.poll() is not None
 
     def listen(self, now_s: float) -> None:
         """Read what it has reported."""
         with suppress(BlockingIOError):
             while state := self._socket.recv(256):
-                self.is_ready = self.is_ready or b"READY=1" in state
+                self._was_ready = self._was_ready or b"READY=1" in state
                 self.due_s = now_s + SILENT_S
 
     def look(self, now_s: float) -> None:
         """End it where it hangs, start it again where it has ended."""
         self.listen(now_s)
-        if self.process.poll() is None:
+        if not self.has_ended():
             if now_s > self.due_s:
                 log.critical("Server %s hangs, and is ended.", self.name)
                 self.end()
@@ -105,8 +113,7 @@ class Processes:
 
     def __init__(self, commands: Sequence[Sequence[str]], folder: Path) -> None:
         self._servers = [
-            Server(command, folder / str(place))
-            for place, command in enumerate(commands, start=1)
+            Server(command, folder / str(place)) for place, command in enumerate(commands, start=1)
         ]
         self._signals: list[int] = []
         self._wake = threading.Event()
@@ -124,7 +131,7 @@ class Processes:
                 self._signals.remove(signal.SIGHUP)
                 self._restart_each()
             self._look(self._servers)
-            if not is_announced and any(server.is_ready for server in self._servers):
+            if not is_announced and any(server.is_ready() for server in self._servers):
                 notify("READY=1")
                 is_announced = True
             self._wake.wait(LOOK_S)
@@ -161,12 +168,12 @@ class Processes:
         for server in self._servers:
             others = [one for one in self._servers if one is not server]
             self._stop(server)
-            self._wait_until(lambda: server.process.poll() is not None, STOP_S, others)
+            self._wait_until(server.has_ended, STOP_S, others)
             if self._is_ending:
                 return
             server.end()
             server.start(time.monotonic())
-            if not self._wait_until(lambda: server.is_ready, READY_S, self._servers):
+            if not self._wait_until(server.is_ready, READY_S, self._servers):
                 log.error("Server %s is not ready; the others go on as they are.", server.name)
                 return
 

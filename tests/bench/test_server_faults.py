@@ -1,4 +1,4 @@
-"""Two servers behind nginx under load, and each part of the set fails in turn.
+"""Two servers behind HAProxy under load, and each part of the set fails in turn.
 
 GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED (GARRY_TEST_FAULT: only those so named): no
 acknowledged step lost or doubled, no gap at a viewer, orderly restarts pause nobody, and
@@ -25,7 +25,7 @@ import psycopg
 import pytest
 
 from tests.support.faulty_set import FAKE_TIME, FaultySet, run_faulty_set
-from tests.support.hosted import REVIVE_POSTGRES, find_missing, run_nginx
+from tests.support.hosted import REVIVE_POSTGRES, find_missing, run_haproxy
 from tests.support.pair import Message, of_type
 from tests.support.torture import GONE, Entrance, Walk
 
@@ -66,7 +66,7 @@ class Faults:
             "kill -9 of a server": self.kill_server,
             "its database connections": self.cut_connections,
             "PostgreSQL": lambda: asyncio.to_thread(self.restarts["postgres"]),
-            "nginx": lambda: asyncio.to_thread(self.restarts["nginx"]),
+            "haproxy": lambda: asyncio.to_thread(self.restarts["haproxy"]),
             "rolling restart": self.restart_each,
             "a server's network": self.cut_network,
             "clock of a server": lambda: self.set_clock(self.random.randrange(2)),
@@ -78,18 +78,9 @@ class Faults:
         return faults
 
     async def kill_server(self) -> None:
-        place = await asyncio.to_thread(self.find_owner)
+        place = await asyncio.to_thread(self.pair.find_busiest)
         await self.pair.end(place)
         self.pair.begin(place)
-
-    def find_owner(self) -> int:
-        """Return the server that has most clinics."""
-        with psycopg.connect(self.pair.environment["GARRY_DATABASE_URL"]) as connection:
-            found = connection.execute(
-                "SELECT address FROM rehab_server JOIN rehab_clinicowner "
-                "ON owner = rehab_server.id GROUP BY address ORDER BY count(*) DESC"
-            )
-            return self.pair.ports.index(int(found.fetchone()[0].rpartition(":")[2]))
 
     async def cut_connections(self) -> None:
         def cut() -> None:
@@ -110,7 +101,7 @@ class Faults:
 
     async def cut_network(self) -> Heal:
         """Cut a server off the database; clients still reach it."""
-        place = await asyncio.to_thread(self.find_owner)
+        place = await asyncio.to_thread(self.pair.find_busiest)
         for cable in self.set.cables[place]:
             cable.cut()
         until_s = time.monotonic() + CUT_S
@@ -263,8 +254,8 @@ def test_each_part_fails_under_load_and_nothing_is_lost(tmp_path: Path) -> None:
     (tmp_path / "garry").mkdir()
     with run_faulty_set(tmp_path / "garry") as broken:
         pair = broken.pair
-        nginx = run_nginx(tmp_path / "nginx", *pair.ports, restarts=broken.restarts)
-        with nginx as (_, secure, tls):
+        proxy = run_haproxy(tmp_path / "haproxy", *pair.ports, restarts=broken.restarts)
+        with proxy as (_, secure, tls):
             print(f"\nlog: {pair.log}")
             print(f"seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s")
             faults = Faults(broken, Entrance(secure, tls), seed)

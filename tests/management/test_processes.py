@@ -47,7 +47,7 @@ def start(tmp_path: Path) -> Iterator[Callable[[str], Server]]:
 
 def hear(server: Server, now_s: float) -> None:
     until_s = time.monotonic() + 20
-    while not server.is_ready:
+    while not server.is_ready():
         assert time.monotonic() < until_s
         server.look(now_s)
         time.sleep(0.01)
@@ -96,7 +96,7 @@ def test_what_an_earlier_server_reported_is_not_the_next_ones(start, monkeypatch
     server.end()
     server.start(now_s=0.0)
     server.look(READY_S)
-    assert not server.is_ready
+    assert not server.is_ready()
     assert server.process.poll() is None
 
 
