@@ -224,12 +224,14 @@ class Pair:
         assert place is not None
         return servers.index(place)
 
-    def find_busiest(self) -> int:
-        """Return the server that has most clinics."""
+    def find_busiest(self, clinic_id: int | None = None) -> int:
+        """Return the server that has most clinics, or one of them."""
         with psycopg.connect(self.environment["GARRY_DATABASE_URL"]) as connection:
             found = connection.execute(
                 "SELECT address FROM rehab_server JOIN rehab_clinicowner "
-                "ON owner = rehab_server.id GROUP BY address ORDER BY count(*) DESC"
+                "ON owner = rehab_server.id WHERE %(one)s::int IS NULL OR clinic_id = %(one)s "
+                "GROUP BY address ORDER BY count(*) DESC",
+                {"one": clinic_id},
             ).fetchone()
         assert found is not None
         return self.ports.index(int(found[0].rpartition(":")[2]))
