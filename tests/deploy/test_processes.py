@@ -111,7 +111,7 @@ def test_a_walk_goes_on_while_one_server_after_the_other_restarts(tmp_path: Path
 
 
 async def hang(served: Served, entrance: Entrance) -> tuple[list[Walk], list[Message], list[float]]:
-    """Freeze twice the server that has most; return the walks, their logs, and how long until all went on."""
+    """Freeze twice the server that has most; return walks, logs, and how long until all went on."""
     took_s: list[float] = []
     try:
         async with served:
