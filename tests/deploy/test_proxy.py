@@ -155,7 +155,7 @@ def test_each_device_is_limited_by_itself_behind_one_address(tmp_path: Path, sho
         request = urllib.request.Request(f"{secure}/x", headers=headers.get(shown, {}))  # noqa: S310
         try:
             with opener.open(request, timeout=20) as answer:
-                return answer.status
+                return int(answer.status)
         except urllib.error.HTTPError as answer:
             return answer.code
 

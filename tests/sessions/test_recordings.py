@@ -244,7 +244,7 @@ def test_the_parser_of_an_upload_has_no_key_and_may_use_little(tmp_path, monkeyp
         assert "--bounded" in arguments  # with which it limits itself
         return run([sys.executable, "-c", asked], **options)
 
-    monkeypatch.setattr(recordings.subprocess, "run", ask)
+    monkeypatch.setattr(subprocess, "run", ask)
     told = recordings.check_upload([tmp_path / "walk.csv"], None, None).found
     assert not {name for name in told["names"] if name.startswith(("GARRY_", "PG", "NOTIFY"))}
     assert "PATH" in told["names"]
