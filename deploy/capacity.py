@@ -108,8 +108,8 @@ class Assumed:
     restore_mb_s: float = 100  # at which a database is copied back
     restore_h: float = 4  # that a clinic may be without its database at worst
     sockets_a_session: float = 4  # source, tablet, monitor, robot
-    sockets_a_host: float = 28_000  # to one address of a server, by nginx's local ports
-    proxy_connections: float = 2 * 4096  # of an nginx with two workers; each socket takes two
+    sockets_a_host: float = 28_000  # to one address of a server, by the proxy's local ports
+    proxy_connections: float = 20_000  # of clients: maxconn of haproxy.cfg
     core_month: float = 15.0  # euros: a core with 4 GB
     disk_gb_month: float = 0.12
     copies: float = 3  # of the database: primary, replica, backups
@@ -157,7 +157,7 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     archive_gb = 12 * rows_month * measured.parquet_bytes / GB
     sent = sum(size for whom, size in measured.frame_bytes.items() if whom != "source")
     egress_gb = rows_month * sent / GB
-    cores = processes + (a.copies - 1) * database_cores + 2  # nginx
+    cores = processes + (a.copies - 1) * database_cores + 2  # HAProxy
     cost = (
         cores * a.core_month
         + online_gb * a.copies * a.disk_gb_month
@@ -214,12 +214,12 @@ LIMITS: tuple[Limit, ...] = (
         lambda n, m, a: n.online_gb / a.one_disk_gb,
     ),
     (
-        "connections of one nginx (two workers, 4,096 each)",
-        "raise worker_connections and the files that it may open",
-        lambda n, m, a: 2 * n.sessions * a.sockets_a_session / a.proxy_connections,
+        "connections of one HAProxy (maxconn 20,000)",
+        "raise maxconn and the files that it may open",
+        lambda n, m, a: n.sessions * a.sockets_a_session / a.proxy_connections,
     ),
     (
-        "sockets from one nginx to one address of a server",
+        "sockets from one HAProxy to one address of a server",
         "more addresses or hosts",
         lambda n, m, a: n.sessions * a.sockets_a_session / n.processes / a.sockets_a_host,
     ),

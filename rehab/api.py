@@ -26,8 +26,8 @@ from rehab.people.models import User
 from rehab.people.web.api_base import PerUserThrottle, Rejected, SessionAuth, TokenAuth, check_roles
 from rehab.sessions import api as sessions
 from rehab.sessions.live.database.owners import OwnedElsewhere
-from rehab.sessions.pages.server.whereabouts import at_clinics_server
-from robot.wire.limits import SERVER_HEADER
+from rehab.sessions.pages.server.whereabouts import at_clinics_server, is_named
+from robot.wire.limits import SERVER_COOKIE
 
 
 class Api(NinjaAPI):
@@ -109,8 +109,12 @@ def on_owned_elsewhere(request: HttpRequest, problem: OwnedElsewhere) -> HttpRes
     """Send a call to the server that has the clinic."""
     if not problem.server:  # a command
         return problem_response(request, 409, str(problem))
-    response = problem_response(request, 421, str(problem))
-    response[SERVER_HEADER] = problem.server
+    if is_named(request, problem.server):
+        return problem_response(request, 503, str(problem))
+    query = request.GET.copy()
+    query[SERVER_COOKIE] = problem.server
+    response = problem_response(request, 307, str(problem))
+    response["Location"] = f"{request.path}?{query.urlencode()}"
     return response
 
 

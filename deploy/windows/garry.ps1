@@ -1,6 +1,6 @@
 # Keeps a source or robot of the clinic running on Windows: a scheduled task that starts with the
 # computer, as an account without rights, and again within a minute of its end. It was written from
-# the manuals and has never been run on Windows (docs/hosting.md). As an administrator:
+# the manuals and has never been run on Windows (docs/services.md). As an administrator:
 #
 #   .\garry.ps1 -Kind source -Name rows -Server https://garry.example.org -Options '--listen tcp://127.0.0.1:9101 --mass 75'
 #   .\garry.ps1 -Kind robot -Name avatar -Server https://garry.example.org

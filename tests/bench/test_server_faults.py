@@ -1,4 +1,4 @@
-"""Two servers behind nginx under load, and each part of the set fails in turn.
+"""Two servers behind HAProxy under load, and each part of the set fails in turn.
 
 GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED (GARRY_TEST_FAULT: only those so named): no
 acknowledged step lost or doubled, no gap at a viewer, orderly restarts pause nobody, and
@@ -25,15 +25,19 @@ import psycopg
 import pytest
 
 from tests.support.faulty_set import FAKE_TIME, FaultySet, run_faulty_set
-from tests.support.hosted import REVIVE_POSTGRES, find_missing, run_nginx
+from tests.support.hosted import REVIVE_POSTGRES, find_missing, run_haproxy
 from tests.support.pair import Message, of_type
+from tests.support.real_clinic import RealClinic
 from tests.support.torture import GONE, Entrance, Walk
 
 pytestmark = pytest.mark.skipif(bool(find_missing()), reason=f"faults: {find_missing()}")
 SESSIONS, RATE = 6, 4.0
 RECOVERED_S = 90.0
 CUT_S = 60.0  # a network without a word
+HUNG_S = 30.0  # a server that hangs, and then goes on as if nothing were
+GRAY_S = 3.5  # into that, when pages have to know nothing any more
 FULL_S = 10.0
+UNHEARD_S = 1.0  # 0.5 s, on a machine that does nothing else
 JUMPS = ("+3600", "-3600")  # seconds
 
 Heal = Callable[[], Awaitable[None]]
@@ -47,7 +51,8 @@ def has_more(walk: Walk, mark: int) -> bool:
 class Faults:
     """The set, its load, and what each fault did."""
 
-    def __init__(self, broken: FaultySet, entrance: Entrance, seed: int) -> None:
+    def __init__(self, broken: FaultySet, entrance: Entrance, certificate: Path, seed: int) -> None:
+        self.certificate = certificate
         self.set, self.pair, self.restarts = broken, broken.pair, broken.restarts
         self.entrance = entrance
         self.began_s = 0.0
@@ -58,6 +63,10 @@ class Faults:
         self.paused_by_order = 0
         self.went_on_without = 0  # sessions, at the other server while one was cut off
         self.kept_back = 0  # acknowledgements, while the disk was full
+        self.clinic: RealClinic | None = None
+        self.false_claims: list[str] = []  # of pages whose server hung
+        self.unheard_s: list[float] = []  # after a stop there, until the page said so
+        self.pages_s: list[float] = []  # until both pages were fresh, everybody connected
 
     @property
     def kinds(self) -> dict[str, Callable[[], Awaitable[Heal | None]]]:
@@ -66,9 +75,10 @@ class Faults:
             "kill -9 of a server": self.kill_server,
             "its database connections": self.cut_connections,
             "PostgreSQL": lambda: asyncio.to_thread(self.restarts["postgres"]),
-            "nginx": lambda: asyncio.to_thread(self.restarts["nginx"]),
+            "haproxy": lambda: asyncio.to_thread(self.restarts["haproxy"]),
             "rolling restart": self.restart_each,
             "a server's network": self.cut_network,
+            "a server hangs": self.hang_server,
             "clock of a server": lambda: self.set_clock(self.random.randrange(2)),
         }
         if self.set.disk is not None:
@@ -78,18 +88,9 @@ class Faults:
         return faults
 
     async def kill_server(self) -> None:
-        place = await asyncio.to_thread(self.find_owner)
+        place = await asyncio.to_thread(self.pair.find_busiest)
         await self.pair.end(place)
         self.pair.begin(place)
-
-    def find_owner(self) -> int:
-        """Return the server that has most clinics."""
-        with psycopg.connect(self.pair.environment["GARRY_DATABASE_URL"]) as connection:
-            found = connection.execute(
-                "SELECT address FROM rehab_server JOIN rehab_clinicowner "
-                "ON owner = rehab_server.id GROUP BY address ORDER BY count(*) DESC"
-            )
-            return self.pair.ports.index(int(found.fetchone()[0].rpartition(":")[2]))
 
     async def cut_connections(self) -> None:
         def cut() -> None:
@@ -110,7 +111,7 @@ class Faults:
 
     async def cut_network(self) -> Heal:
         """Cut a server off the database; clients still reach it."""
-        place = await asyncio.to_thread(self.find_owner)
+        place = await asyncio.to_thread(self.pair.find_busiest)
         for cable in self.set.cables[place]:
             cable.cut()
         until_s = time.monotonic() + CUT_S
@@ -122,6 +123,44 @@ class Faults:
                 cable.mend()
 
         return mend
+
+    async def hang_server(self) -> Heal:
+        """Freeze the server of the real pages, which nobody supervises; it wakes up again."""
+        assert self.clinic is not None
+        await self.clinic.come_back(RECOVERED_S)
+        await self.clinic.resume()  # another fault may have paused it
+        await self.clinic.go_on(RECOVERED_S)
+        place = await asyncio.to_thread(self.pair.find_busiest, self.clinic.row["clinic"])
+        process = self.pair.processes[place]
+        assert process is not None
+        began_s = self.began_s = time.monotonic()
+        hung_at = time.time()
+        process.send_signal(signal.SIGSTOP)
+        turn = len(self.pages_s) + 1
+        await asyncio.sleep(GRAY_S)
+        self.false_claims += await self.clinic.find_false_claims()
+        self.unheard_s.append(await self.clinic.stop())
+        await self.clinic.picture(f"hang-{turn}-silent")
+        await self.clinic.come_back(RECOVERED_S)
+        self.pages_s.append(time.monotonic() - began_s)
+        await self.clinic.picture(f"hang-{turn}-back")
+        self.false_claims += await self.clinic.find_celebrated(hung_at + 2.5, time.time())
+        print(
+            f"pages: back after {self.pages_s[-1]:.1f} s, a stop unheard after "
+            f"{self.unheard_s[-1]:.2f} s, {self.false_claims}"
+        )
+        await self.clinic.resume()
+        await self.clinic.go_on(RECOVERED_S)
+        await self.clinic.picture(f"hang-{turn}-resumed")
+
+        async def wake_up() -> None:
+            assert self.clinic is not None
+            await asyncio.sleep(max(0.0, began_s + HUNG_S - time.monotonic()))
+            process.send_signal(signal.SIGCONT)
+            await self.clinic.go_on(RECOVERED_S)
+            await self.clinic.picture(f"hang-{turn}-awake")
+
+        return wake_up
 
     async def fill_disk(self) -> None:
         """Fill the database's disk; nothing is acknowledged until there is room again."""
@@ -232,16 +271,24 @@ class Faults:
 
     async def run(self, times: int) -> None:
         """Let everything fail so many times, in a random order."""
-        rows = self.pair.seed(SESSIONS)
+        only = os.environ.get("GARRY_TEST_FAULT", "")
+        wanted = [name for name in self.kinds if only in name] * times
+        self.random.shuffle(wanted)
+        *rows, real = self.pair.seed(SESSIONS + 1)
+        if "a server hangs" in wanted:
+            async with RealClinic(real, self.entrance.url, self.certificate) as self.clinic:
+                await self.run_each(rows, wanted)
+        else:
+            await self.run_each(rows, wanted)
+
+    async def run_each(self, rows: list[Message], wanted: list[str]) -> None:
+        """Let these fail while sessions walk."""
         self.walks = [Walk(row, self.entrance, RATE) for row in rows]
         senders = [asyncio.create_task(walk.send()) for walk in self.walks]
         watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
         async with asyncio.timeout(RECOVERED_S):
             while not all(walk.acknowledged for walk in self.walks):  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
-        only = os.environ.get("GARRY_TEST_FAULT", "")
-        wanted = [name for name in self.kinds if only in name] * times
-        self.random.shuffle(wanted)
         for name in wanted:
             await self.run_one(name)
         for walk in self.walks:
@@ -263,17 +310,20 @@ def test_each_part_fails_under_load_and_nothing_is_lost(tmp_path: Path) -> None:
     (tmp_path / "garry").mkdir()
     with run_faulty_set(tmp_path / "garry") as broken:
         pair = broken.pair
-        nginx = run_nginx(tmp_path / "nginx", *pair.ports, restarts=broken.restarts)
-        with nginx as (_, secure, tls):
+        proxy = run_haproxy(tmp_path / "haproxy", *pair.ports, restarts=broken.restarts)
+        with proxy as (_, secure, tls):
             print(f"\nlog: {pair.log}")
             print(f"seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s")
-            faults = Faults(broken, Entrance(secure, tls), seed)
+            certificate = tmp_path / "haproxy" / "garry.pem"
+            faults = Faults(broken, Entrance(secure, tls), certificate, seed)
             asyncio.run(run_all(faults, times))
             problems = find_problems(faults)
     report(faults, problems)
     assert problems == []
     assert faults.paused_by_order == 0
     assert faults.went_on_without == len(faults.recovered_s.get("a server's network", ()))
+    assert faults.false_claims == []
+    assert max(faults.unheard_s, default=0) <= UNHEARD_S
     assert faults.kept_back == len(faults.recovered_s.get("disk full", ()))
 
 
@@ -311,6 +361,9 @@ def report(faults: Faults, problems: list[str]) -> None:
         print("disk full: left out, mounting needs root")
     if FAKE_TIME is None:
         print("clock of the database: left out, apt-get install faketime")
+    if faults.pages_s:
+        print(f"real pages after a hang: {sorted(round(one, 1) for one in faults.pages_s)} s")
+        print(f"a stop there unheard: {sorted(round(one, 2) for one in faults.unheard_s)} s")
     stops = sorted(faults.stops_s)
     print(
         f"stop: n {len(stops)}, median "

@@ -7,7 +7,6 @@ import re
 import sqlite3
 import time
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
 
 import pytest
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
@@ -188,43 +187,6 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
         expect(monitor.locator("[data-alarm=tablet]")).to_contain_text("The tablet is lost")
         expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no tablet")
     expect(monitor.locator("[data-alarm=robot]")).to_contain_text("The robot is lost")
-
-
-def unheard_page(visit: Visit, walk: Walk) -> Page:
-    """Return a page whose stop is answered as where the session's own server is silent."""
-    page = visit("about:blank", walk, reduced_motion="reduce")
-
-    def pass_on(socket: WebSocketRoute) -> None:
-        server_side = socket.connect_to_server()
-
-        def answer(text: str | bytes) -> None:
-            message = json.loads(text)
-            if message.get("order") == "stop":
-                error = {"type": "error", "code": "robot_unheard", "order": "stop"}
-                socket.send(json.dumps(error | {"message": "The robot's server is silent."}))
-            else:
-                server_side.send(text)
-
-        socket.on_message(answer)
-
-    page.clock.install()
-    page.route_web_socket(re.compile("/ws/session/"), pass_on)
-    page.goto(walk.monitor_path)
-    return page
-
-
-def test_a_stop_that_the_sessions_server_does_not_hear_is_told_at_once(
-    server: Server, visit: Visit, walk: Walk
-) -> None:
-    """On a page at another server; it says what to do, and no time has to pass for that."""
-    with robot_of(server, walk):
-        page = unheard_page(visit, walk)
-        expect(page.locator("[data-presence=robot]")).to_contain_text("✓")  # it is connected
-        page.clock.pause_at(datetime.now(UTC) + timedelta(seconds=5))
-        page.locator("[data-robot=stop]:visible").first.click()
-        told = page.get_by_text("Stop not heard. Use the robot’s own switch.").first
-        expect(told).to_be_visible()
-        expect(page.locator("[data-robot=stop].asked")).to_have_count(0)
 
 
 @pytest.mark.essential

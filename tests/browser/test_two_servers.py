@@ -1,4 +1,4 @@
-"""A clinic lives in one of two servers behind nginx: its pages and forms find it."""
+"""A clinic lives in one of two servers behind HAProxy: its pages and forms find it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, WebSocket
 
-from tests.support.hosted import find_missing, run_nginx, run_postgres
+from tests.support.hosted import find_missing, run_haproxy, run_postgres
 from tests.support.pair import Pair
 
 pytestmark = [
@@ -44,7 +44,7 @@ def test_a_page_and_its_forms_at_the_wrong_server_find_the_right_one(
     def hear(socket: WebSocket) -> None:
         socket.on("framereceived", lambda text: heard.append((time.monotonic(), str(text))))
 
-    with run_nginx(tmp_path / "nginx", *pair.ports) as (_, secure, _tls):
+    with run_haproxy(tmp_path / "haproxy", *pair.ports) as (_, secure, _tls):
         context = browser.new_context(ignore_https_errors=True)
         cookies = {"sessionid": row["cookie"], "garry_server": wrong}
         context.add_cookies([{"name": n, "value": v, "url": secure} for n, v in cookies.items()])
@@ -58,7 +58,7 @@ def test_a_page_and_its_forms_at_the_wrong_server_find_the_right_one(
         back_s = next(at for at, text in heard if '"snapshot"' in text) - sent_away_s
         print(f"back after {back_s:.2f} s")
         assert back_s < BACK_S
-        # A program without the cookie, or with the wrong one, is sent there by nginx itself.
+        # A program without the cookie, or with the wrong one, is sent there by HAProxy itself.
         for named in (wrong, right, ""):
             context.add_cookies([{"name": "garry_server", "value": named, "url": secure}])
             kind = "pause" if named == wrong else "resume" if named == right else "pause"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
+import subprocess
 from configparser import RawConfigParser
 from importlib import import_module
 from pathlib import Path
@@ -18,6 +20,7 @@ from prometheus_client import generate_latest
 from rehab.sessions.live import runtime
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
+from rehab.sessions.live.pulse import SILENT_S
 from rehab.sessions.live.session import instruments
 from rehab.sources import load_source
 from rehab.sources.arguments import make_parser as make_source_parser
@@ -81,6 +84,30 @@ def test_the_server_has_longer_to_stop_than_it_takes() -> None:
     assert float(read["Service"]["TimeoutStopSec"]) > STOP_S
     grace = re.search(r"stop_grace_period: (\d+)s", (DEPLOY / "compose.yaml").read_text())
     assert float(grace[1]) > STOP_S
+
+
+def test_systemd_ends_a_server_that_is_silent_as_long_as_a_supervisor_waits() -> None:
+    read = Unit(strict=False)
+    read.read(DEPLOY / "systemd" / "garry-server.service")
+    service = read["Service"]
+    assert (service["Type"], float(service["WatchdogSec"])) == ("notify", SILENT_S)
+    check = (DEPLOY / "haproxy" / "haproxy.cfg").read_text()
+    assert "option httpchk GET /livez" in check
+    assert "on-marked-down shutdown-sessions" in check
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="apt-get install systemd")
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.stem)
+def test_a_unit_may_do_little_beside_its_work(unit: Path) -> None:
+    judged = subprocess.run(
+        ["systemd-analyze", "security", "--offline=yes", str(unit)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    exposure = re.search(r"exposure level for .*: ([\d.]+)", judged.stdout)
+    assert exposure is not None, judged.stderr
+    assert float(exposure[1]) <= 3
 
 
 def test_a_robots_port_may_owe_its_base_a_stop_after_the_service_has_ended() -> None:

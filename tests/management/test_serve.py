@@ -74,3 +74,12 @@ def test_several_servers_begin_only_where_all_their_ports_are_free(monkeypatch):
         port = taken.getsockname()[1]
         with pytest.raises(CommandError, match=rf"Cannot serve at 127\.0\.0\.1:{port} "):
             call_command("serve", host="127.0.0.1", port=port - 1, processes=2)
+
+
+def test_a_server_reports_to_systemd_that_it_is_ready_and_that_its_loop_turns(tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        systemd.settimeout(10)
+        with serve(tmp_path / "garry", settings={"NOTIFY_SOCKET": str(tmp_path / "notify")}):
+            states = [systemd.recv(100) for _ in range(8)]
+        assert set(states) == {b"READY=1", b"WATCHDOG=1"}

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from datetime import UTC, datetime, timedelta
+from typing import Any
 from urllib.parse import urlencode
 
 import pytest
@@ -226,3 +228,26 @@ def test_who_waits_for_a_check_holds_no_connection(monkeypatch):
     monkeypatch.setattr(subprocess, "run", run)
     check_upload([uploaded_file(7, ".csv")], None)
     assert held == [None]
+
+
+def test_the_parser_of_an_upload_has_no_key_and_may_use_little(tmp_path, monkeypatch):
+    """Whatever a file makes of it: it is asked for its own variables and limits here."""
+    monkeypatch.setenv("GARRY_SECRET_KEY", "a secret")
+    monkeypatch.setenv("PGPASSWORD", "another")
+    run = subprocess.run
+    asked = (
+        "import json, os, resource; from rehab.gait.recordings.limits import limit_resources; "
+        "limit_resources(); kinds = ('CPU', 'AS', 'FSIZE', 'NOFILE'); print(json.dumps({'names': "
+        "sorted(os.environ), 'most': [resource.getrlimit(getattr(resource, f'RLIMIT_{kind}'))[0] "
+        "for kind in kinds]}))"
+    )
+
+    def ask(arguments: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
+        assert "--bounded" in arguments  # with which it limits itself
+        return run([sys.executable, "-c", asked], **options)
+
+    monkeypatch.setattr(subprocess, "run", ask)
+    told = recordings.check_upload([tmp_path / "walk.csv"], None, None).found
+    assert not {name for name in told["names"] if name.startswith(("GARRY_", "PG", "NOTIFY"))}
+    assert "PATH" in told["names"]
+    assert told["most"] == [60, 4 * 1024**3, 512 * 1024**2, 128]

@@ -1,4 +1,4 @@
-"""A hosted set of its own on loopback, in a folder: PostgreSQL, and nginx with TLS before GARRY.
+"""A hosted set of its own on loopback, in a folder: PostgreSQL, and HAProxy with TLS before GARRY.
 
 Services that run on the machine already are not touched.
 """
@@ -21,7 +21,6 @@ from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
-import psutil
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
@@ -37,16 +36,16 @@ PASSWORD = "only on loopback, for a minute"
 def find_missing() -> str:
     """Return what the set needs and this machine lacks, with the cure; empty where it is there."""
     programs = {
-        "nginx-light": find_nginx(),
+        "haproxy": find_haproxy(),
         "postgresql": find_initdb(),
     }
     lacking = [package for package, program in programs.items() if program is None]
     return f"apt-get install {' '.join(lacking)}" if lacking else ""
 
 
-def find_nginx() -> str | None:
-    """Return nginx, which Debian keeps where only root looks."""
-    return shutil.which("nginx", path=f"{os.environ['PATH']}:/usr/sbin")
+def find_haproxy() -> str | None:
+    """Return HAProxy, which Debian keeps where only root looks."""
+    return shutil.which("haproxy", path=f"{os.environ['PATH']}:/usr/sbin")
 
 
 def find_initdb() -> Path | None:
@@ -192,7 +191,7 @@ def _address(port: int, database: str) -> str:
 
 
 def make_certificate(folder: Path) -> ssl.SSLContext:
-    """Write a certificate for this machine and its key; return a context that trusts it."""
+    """Write a certificate for this machine with its key; return a context that trusts it."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, NAME)])
     now = datetime.now(UTC)
@@ -213,14 +212,12 @@ def make_certificate(folder: Path) -> ssl.SSLContext:
         .sign(key, hashes.SHA256())
     )
     pem = certificate.public_bytes(serialization.Encoding.PEM)
-    (folder / "fullchain.pem").write_bytes(pem)
-    (folder / "privkey.pem").write_bytes(
-        key.private_bytes(
-            serialization.Encoding.PEM,
-            serialization.PrivateFormat.PKCS8,
-            serialization.NoEncryption(),
-        )
+    private = key.private_bytes(
+        serialization.Encoding.PEM,
+        serialization.PrivateFormat.PKCS8,
+        serialization.NoEncryption(),
     )
+    (folder / "garry.pem").write_bytes(pem + private)
     return ssl.create_default_context(cadata=pem.decode())
 
 
@@ -233,59 +230,55 @@ def adapt(text: str, changes: dict[str, str]) -> str:
 
 
 @contextmanager
-def run_nginx(
+def run_haproxy(
     folder: Path, *server_ports: int, restarts: Restarts | None = None
 ) -> Iterator[tuple[str, str, ssl.SSLContext]]:
-    """Run nginx before one or two servers until the block ends, by the configuration we ship.
+    """Run HAProxy before one or two servers until the block ends, by the configuration we ship.
 
-    Yields its addresses with and without TLS, and a context that trusts it.
+    Yields its addresses with and without TLS, and a context that trusts it. ``folder``/log has
+    what it logs.
     """
     folder.mkdir()
     plain, secure = free_port(), free_port()
     tls = make_certificate(folder)
-    site = adapt(
-        (DEPLOY / "nginx" / "garry.conf").read_text(),
+    second = server_ports[-1] if server_ports[1:] else free_port()
+    text = adapt(
+        (DEPLOY / "haproxy" / "haproxy.cfg").read_text(),
         {
-            "garry.example.org": NAME,
-            "/etc/ssl/garry": str(folder),
+            "log /dev/log local0": "log stdout format raw local0",
+            "    chroot /var/lib/haproxy\n    user haproxy\n    group haproxy\n": "",
+            "/etc/haproxy/garry.pem": str(folder / "garry.pem"),
             "127.0.0.1:8000": f"127.0.0.1:{server_ports[0]}",
-            "127.0.0.1:8001": f"127.0.0.1:{server_ports[-1] if server_ports[1:] else free_port()}",
-            "listen 80;": f"listen 127.0.0.1:{plain};",
-            "listen 443 ssl http2;": f"listen 127.0.0.1:{secure} ssl http2;",
-            "    listen [::]:80;\n": "",
-            "    listen [::]:443 ssl http2;\n": "",
+            "127.0.0.1:8001": f"127.0.0.1:{second}",
+            "maxconn 20000": "maxconn 2000",  # as many files as a test may open
+            "bind :80": f"bind 127.0.0.1:{plain}",
+            "bind :443": f"bind 127.0.0.1:{secure}",
         },
     )
-    (folder / "garry.conf").write_text(site)
-    temporary = "".join(
-        f"{kind}_temp_path {folder}/{kind};\n"
-        for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
-    )
-    main = folder / "nginx.conf"
-    main.write_text(
-        f"daemon off;\n{'user root;' if os.geteuid() == 0 else ''}\npid {folder}/pid;\n"
-        f"error_log {folder}/error.log;\nevents {{ worker_connections 1024; }}\n"
-        f"http {{ access_log {folder}/access.log;\n{temporary}include {folder}/garry.conf; }}\n"
-    )
-    command = [find_nginx(), "-p", str(folder), "-c", str(main)]
-    tried = subprocess.run([*command, "-t"], capture_output=True, text=True)
+    (folder / "haproxy.cfg").write_text(text)
+    command = [find_haproxy(), "-f", str(folder / "haproxy.cfg")]
+    tried = subprocess.run([*command, "-c"], capture_output=True, text=True)
     assert tried.returncode == 0, tried.stderr
-    server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    assert "WARNING" not in tried.stderr, tried.stderr
+
+    def start() -> subprocess.Popen[bytes]:
+        with (folder / "log").open("a") as log:
+            return subprocess.Popen(command, stdout=log, stderr=log)
+
+    server = start()
 
     def restart() -> None:
         nonlocal server
-        for worker in psutil.Process(server.pid).children():
-            worker.kill()
         server.kill()
         server.wait(10)
-        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        server = start()
         wait_for_port(secure)
 
     if restarts is not None:
-        restarts["nginx"] = restart
+        restarts["haproxy"] = restart
     try:
         wait_for_port(secure)
         yield f"http://{NAME}:{plain}", f"https://{NAME}:{secure}", tls
     finally:
-        server.terminate()
+        server.kill()
         server.wait(10)

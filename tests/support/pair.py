@@ -15,6 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
+import psycopg
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
@@ -122,7 +123,7 @@ class Pair:
         self.programs: list[tuple[str, ...]] = [("manage.py",)] * count
         self.processes: list[subprocess.Popen[bytes] | None] = [None] * count
         self._open: list[Dialed] = []
-        self.named = ""  # the server that the last answer sent us to
+        self.redirected = ""  # where the last answer sent us
 
     async def __aenter__(self) -> Self:
         """Make the tables and start both servers."""
@@ -205,7 +206,7 @@ class Pair:
             with urllib.request.urlopen(request, timeout=20) as answer:  # noqa: S310 (our own)
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as answer:
-            self.named = answer.headers.get("GARRY-Server", "")
+            self.redirected = answer.headers.get("Location", "")
             return answer.code, answer.read().decode()
         except OSError:
             return 0, ""
@@ -222,6 +223,18 @@ class Pair:
         place = find_place(row["clinic"], servers)
         assert place is not None
         return servers.index(place)
+
+    def find_busiest(self, clinic_id: int | None = None) -> int:
+        """Return the server that has most clinics, or one of them."""
+        with psycopg.connect(self.environment["GARRY_DATABASE_URL"]) as connection:
+            found = connection.execute(
+                "SELECT address FROM rehab_server JOIN rehab_clinicowner "
+                "ON owner = rehab_server.id WHERE %(one)s::int IS NULL OR clinic_id = %(one)s "
+                "GROUP BY address ORDER BY count(*) DESC",
+                {"one": clinic_id},
+            ).fetchone()
+        assert found is not None
+        return self.ports.index(int(found[0].rpartition(":")[2]))
 
     async def dial(self, place: int, path: str, **headers: str) -> Dialed:
         """Dial in to a server."""

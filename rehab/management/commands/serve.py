@@ -7,6 +7,8 @@ import socket
 import sys
 from argparse import ArgumentParser
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from channels.routing import get_default_application
@@ -22,6 +24,7 @@ from rehab.people.sign_in.first_start import (
     prepare_database,
 )
 from rehab.sessions.live.database.lease import Lease
+from rehab.sessions.live.pulse import notify
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.supervisor import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token
@@ -41,10 +44,9 @@ class Command(BaseCommand):
         parser.add_argument(
             "--processes",
             type=int,
-            default=1,
             metavar="N",
-            help="so many servers, at this port and those after it; hosted, on "
-            "PostgreSQL. SIGHUP restarts them one after the other.",
+            help="so many servers, at this port and those after it, each ended and started again "
+            "where it hangs; hosted, on PostgreSQL. SIGHUP restarts them one after the other.",
         )
         parser.add_argument(
             "--child",
@@ -66,13 +68,13 @@ class Command(BaseCommand):
         *args: Any,
         host: str,
         port: int,
-        processes: int,
+        processes: int | None,
         child: list[str],
         robot: str,
         **options: Any,
     ) -> None:
         """Serve. Raises CommandError, with the cure, where the port is taken."""
-        if processes != 1:
+        if processes is not None:
             check_sharing(processes)
             if child or robot != "none":
                 raise CommandError("Several servers run no other programs. Run them beside.")
@@ -80,7 +82,9 @@ class Command(BaseCommand):
             for one in ports:
                 check_port(host, one)
             prepare_database()
-            Processes([serve_command(host, one) for one in ports]).run()
+            commands = [serve_command(host, one) for one in ports]
+            with TemporaryDirectory(prefix="garry-serve-") as folder:
+                Processes(commands, Path(folder)).run()
             return
         if robot != "none" and settings.HOSTED:
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
@@ -107,6 +111,7 @@ class Command(BaseCommand):
             current().supervisor.start(f"child {number}", shlex.split(command))
         self.stdout.write("Ready. Ctrl-C stops the server.")
         self.stdout.flush()
+        notify("READY=1")
 
     def _print_address(self, address: str) -> None:
         self.stdout.write(f"GARRY serves at {address}/")
@@ -145,7 +150,7 @@ def check_sharing(processes: int) -> None:
             "Several servers share a PostgreSQL database. Set GARRY_HOSTED=1 and "
             "GARRY_DATABASE_URL=postgres://…, or serve by one process."
         )
-    if settings.ADDRESS:
+    if settings.ADDRESS and processes > 1:
         raise CommandError(
             "GARRY_ADDRESS is the address of one server. Unset it: several have the host's and "
             "their ports'. Or start each by a `serve` of its own."

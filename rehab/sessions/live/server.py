@@ -6,6 +6,7 @@ Importing this module installs Twisted's asyncio reactor, so only the commands t
 from __future__ import annotations
 
 import asyncio
+import faulthandler
 import logging
 from collections.abc import Callable
 from typing import Any
@@ -17,8 +18,10 @@ from twisted.internet import defer, reactor
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.database import lease
 from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
+from rehab.sessions.live.pulse import keep_pulse
 from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
 from robot.wire.limits import MAX_FRAME_BYTES
 
@@ -97,10 +100,14 @@ class LiveServer(Server):  # type: ignore[misc]
     def _begin(self) -> None:
         # The reactor runs before its event loop does.
         loop = asyncio.get_event_loop()
-        loop.call_soon(lambda: self._hold(loop.create_task(self._start())))
+        loop.call_soon(lambda: self._run_tasks(loop))
 
-    def _hold(self, task: asyncio.Task[None]) -> None:
-        self._starting = task  # tasks without a reference may be collected
+    def _run_tasks(self, loop: asyncio.AbstractEventLoop) -> None:
+        faulthandler.enable()  # a supervisor ends a server that hangs by SIGABRT
+        own = lease.held()
+        pulse = loop.create_task(keep_pulse(None if own is None else own.show_pulse))
+        # Tasks without a reference may be collected. The pulse goes on while the server drains.
+        self._tasks = [pulse, loop.create_task(self._start())]
 
     async def _start(self) -> None:
         process.tune_interpreter()

@@ -32,6 +32,8 @@ STABLE_S = 60.0  # after so long without a failure the backoff starts again
 STOP_S = 5.0
 CHUNK = 64 * 1024
 MAX_LINE_BYTES = 1200  # stored of a line
+# What a source is not given: it may read a recording from a stranger.
+SECRETS = ("GARRY_SECRET_KEY", "GARRY_DATABASE_URL", "GARRY_METRICS_TOKEN", "NOTIFY_SOCKET")
 MAX_LINE_CHARS = 300  # of a line in the report
 
 
@@ -234,4 +236,5 @@ async def run_source(supervisor: Supervisor, session: TrainingSession, server: s
     token = await sync_to_async(issue_builtin_token)(session.station, Device.Kind.SOURCE)
     command = [sys.executable, "-m", "rehab.sources", *session.source_args, "--child", "--resume"]
     place = ["--server", server, "--session", str(session.pk)]
-    supervisor.start(name, [*command, *place], {"GARRY_TOKEN": token}, once=True)
+    variables = dict.fromkeys(SECRETS, "") | {"GARRY_TOKEN": token}
+    supervisor.start(name, [*command, *place], variables, once=True)

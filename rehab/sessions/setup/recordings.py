@@ -27,6 +27,17 @@ from robot.wire.limits import TIME_MAX_S
 BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
 PART_BYTES = 1024 * 1024
 WAIT_S = 90.0
+# Variables of the server that a file's parser gets: no key, no database.
+PASSED_ON = {
+    "HOME",
+    "LANG",
+    "LC_ALL",
+    "LD_LIBRARY_PATH",
+    "PATH",
+    "PYTHONPATH",
+    "SYSTEMROOT",
+    "TMPDIR",
+}
 RETAINED_S = 86_400.0  # an upload that was not stored as a recording
 _one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
 # What `rehab.gait.recordings.readers` reads; it is not imported, as servers do without numpy.
@@ -151,7 +162,8 @@ def _check(
         done = subprocess.run(
             arguments,
             cwd=settings.BASE_DIR,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            env={name: os.environ[name] for name in PASSED_ON & os.environ.keys()}
+            | {"OPENBLAS_NUM_THREADS": "1"},
             capture_output=True,
             text=True,
             timeout=WAIT_S,

@@ -76,7 +76,6 @@ export class RobotPanel {
       this.#orderFailure = "";
       this.#settleOrder();
     }
-    if (event.kind === "robot_unheard") this.#reportUnanswered(event.order);
     if (event.kind === "presence") this.#isConnected = event.presence.robot;
     if (event.kind === "robot") this.#handleReport(event.report);
   }

@@ -58,7 +58,8 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
   }
 
   function receive(message) {
-    receivedAt = heardAt = performance.now();
+    receivedAt = performance.now();
+    if (message.type !== "error") heardAt = receivedAt; // a server that sends us away knows nothing of the session
     switch (message.type) {
       case "snapshot":
         measureAge(message.now);
@@ -97,7 +98,6 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         break;
       case "error":
         if (message.server) goTo(message.server);
-        if (message.code === "robot_unheard") onEvent?.({ kind: message.code, order: message.order });
         closeReason = refusal(message);
         if (message.id) settle(message.id, new Error(closeReason));
     }

@@ -56,7 +56,6 @@ export function createControls(body, socket, showQuestion) {
     orderTimer = setTimeout(sent ? reportUnanswered : () => showOrder(""), sent ? ANSWER_MS : NOTE_MS);
   }
 
-  // Called by the page, too, where another server should have stopped it and did not say so.
   function reportUnanswered() {
     clearTimeout(orderTimer);
     if (!isStopped) notify(UNHEARD);
@@ -100,5 +99,5 @@ export function createControls(body, socket, showQuestion) {
     drawRobot();
   }
 
-  return { showRobot, keepFocus, tellTherapist, reportUnanswered };
+  return { showRobot, keepFocus, tellTherapist };
 }

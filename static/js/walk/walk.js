@@ -15,7 +15,7 @@ const WATCH_MS = 250; // silence sends no event
 const STILL_MS = 4_000; // after so long without a step the last one is no longer shown as current
 const LEAVE_MS = 1_500;
 // Events that are no sign of walking.
-const NOT_WALKING = new Set(["presence", "robot_stopped", "robot_unheard", "alarms"]);
+const NOT_WALKING = new Set(["presence", "robot_stopped", "alarms"]);
 
 const { body } = document;
 const isMirror = body.classList.contains("mirrored"); // in a frame on the therapist's page
@@ -42,7 +42,6 @@ const socket = connect(body.dataset.socket, {
       confetti = event.confetti;
       sound(event);
     }
-    if (event.kind === "robot_unheard") reportUnanswered();
     if (NOT_WALKING.has(event.kind)) redraw();
     else awaitStep();
   },
@@ -53,7 +52,7 @@ const socket = connect(body.dataset.socket, {
     redraw();
   },
 });
-const { showRobot, keepFocus, tellTherapist, reportUnanswered } = createControls(body, socket, (asking) => {
+const { showRobot, keepFocus, tellTherapist } = createControls(body, socket, (asking) => {
   page.asking = asking;
   redraw();
 });

@@ -145,18 +145,28 @@ async def ask(scope: dict[str, Any]) -> list[dict[str, Any]]:
     [
         ({"type": "http", "path": "/"}, {"type": "http.response.start", "status": 504}),
         ({"type": "http", "path": "/readyz"}, {"type": "inner"}),
-        ({"type": "websocket", "path": "/ws/source/"}, {"type": "websocket.close"}),
+        ({"type": "http", "path": "/livez"}, {"type": "http.response.start", "status": 503}),
+        ({"type": "websocket", "path": "/ws/source/"}, {"type": "websocket.accept"}),
     ],
 )
 async def test_nobody_but_a_watchdog_gets_in(monkeypatch, scope, first):
     servers = SimpleNamespace(is_isolated=True)
-    monkeypatch.setattr(runtimes, "peek", lambda: SimpleNamespace(servers=servers))
+    live = SimpleNamespace(servers=servers, is_ready=True)
+    monkeypatch.setattr(runtimes, "peek", lambda: live)
     sent = await ask(scope)
     assert first.items() <= sent[0].items()
+    if scope["type"] == "websocket":  # so it connects again, and the proxy asks another server
+        assert sent[1] == {"type": "websocket.close", "code": 4012}
     servers.is_isolated = False
-    assert await ask(scope) == [{"type": "inner"}]
-    monkeypatch.setattr(runtimes, "peek", lambda: SimpleNamespace(servers=None))
-    assert await ask(scope) == [{"type": "inner"}]
+    live.servers = servers if scope["path"] == "/" else None
+    if scope["path"] != "/livez":
+        assert await ask(scope) == [{"type": "inner"}]
+        return
+    assert (await ask(scope))[0]["status"] == 200
+    live.is_ready = False
+    assert (await ask(scope))[0]["status"] == 503
+    monkeypatch.setattr(runtimes, "peek", lambda: None)  # it is starting, or stopping
+    assert (await ask(scope))[0]["status"] == 503
 
 
 async def test_no_robot_hears_a_server_whose_clinics_another_may_have(place, begun, monkeypatch):

@@ -194,3 +194,16 @@ def test_a_dead_server_does_not_live_on_when_the_databases_clock_is_set_back(two
     own._unbroken_since_s -= 1
     assert not owners.is_alive(other.id)
     assert valid_ids() == {own.id}
+
+
+def test_the_lease_of_a_server_whose_event_loop_hangs_expires(monkeypatch):
+    """Though its thread goes on: others take the clinics over."""
+    monkeypatch.setattr(lease, "PULSE_MAX_S", 0.2)
+    one = enter()
+    one.show_pulse()
+    time.sleep(1.0)
+    assert (valid_ids(), one.is_current) == (set(), False)
+    one.show_pulse()
+    time.sleep(0.2)
+    assert (valid_ids(), one.is_current, one.entered) == ({one.id}, True, 2)
+    one.release()

@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 
 LEASE_S = 5.0  # after so long without a renewal a server's clinics are taken over
 RENEW_S = 1.0
+PULSE_MAX_S = 1.0  # the age of the event loop's last pulse, beyond which a lease is not renewed
 TIMEOUT_MS = 2_000  # a database that is stuck
 
 # A lease that ends later than any server asks for is from before the database's clock was set back.
@@ -106,6 +107,7 @@ class Lease:
         self._connection: BaseDatabaseWrapper | None = None
         self._renewed_s = 0.0  # by the monotonic clock
         self._unbroken_since_s = 0.0
+        self._pulse_s: float | None = None  # of the event loop, once there is one
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._renew, name="garry-lease", daemon=True)
 
@@ -131,6 +133,10 @@ class Lease:
         """
         return self.may_judge and self.id in valid_ids
 
+    def show_pulse(self) -> None:
+        """Note that the event loop turns: without it this server does nothing for its clinics."""
+        self._pulse_s = time.monotonic()
+
     def acquire(self) -> None:
         """Enter, then stay. Raises DatabaseError where nothing answers."""
         global _held  # noqa: PLW0603 (one lease a process)
@@ -155,6 +161,9 @@ class Lease:
     def _renew(self) -> None:
         while not self._closing.wait(RENEW_S):
             began_s = time.monotonic()
+            if self._pulse_s is not None and began_s - self._pulse_s > PULSE_MAX_S:
+                log.warning("The event loop is silent: the server's lease is not renewed.")
+                continue
             try:
                 if self._execute(RENEW):
                     self._renewed_s = began_s

@@ -1,7 +1,8 @@
 """Requests that change something of a clinic: answered where the clinic lives.
 
-Another server says 421 (RFC 9110, 15.5.20) and names that one, for the proxy to ask it. Pages that
-only show something read the database, at any server.
+Another server redirects the request, unchanged (307), to the same address: a cookie names the
+clinic's server to the proxy, or the query where a program calls the API. Pages that only show
+something read the database, at any server.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from rehab.people.web.api_base import caller
 from rehab.sessions.live import runtime
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.database.owners import OwnedElsewhere
-from robot.wire.limits import SERVER_HEADER
+from robot.wire.limits import SERVER_COOKIE, SERVER_HEADER
 
 SAFE = ("GET", "HEAD", "OPTIONS")
 
@@ -29,6 +30,12 @@ def find_elsewhere(request: HttpRequest, user: Any) -> OwnedElsewhere | None:
     if clinic_id is None or request.method in SAFE or live is None or live.servers is None:
         return None
     return None if clinic_id in live.clinics else owners.find_elsewhere(clinic_id)
+
+
+def is_named(request: HttpRequest, server: str) -> bool:
+    """Return whether a request names this server to the proxy, which then does not reach it."""
+    named = request.GET.get(SERVER_COOKIE) or request.headers.get(SERVER_HEADER)
+    return server in ("", named or request.COOKIES.get(SERVER_COOKIE))
 
 
 class ClinicServerMiddleware:
@@ -45,8 +52,16 @@ class ClinicServerMiddleware:
         """Let the view run, or send the request away."""
         if (problem := find_elsewhere(request, request.user)) is None:
             return None
-        headers = {SERVER_HEADER: problem.server, "Cache-Control": "no-store"}
-        return HttpResponse(f"{problem}\n", "text/plain", 421, headers=headers)
+        headers = {"Cache-Control": "no-store"}
+        if is_named(request, problem.server):
+            headers["Retry-After"] = "1"
+            return HttpResponse(f"{problem}\n", "text/plain", 503, headers=headers)
+        headers["Location"] = request.get_full_path()
+        response = HttpResponse(f"{problem}\n", "text/plain", 307, headers=headers)
+        response.set_cookie(
+            SERVER_COOKIE, problem.server, secure=request.is_secure(), samesite="Strict"
+        )
+        return response
 
 
 def at_clinics_server(call: Callable[..., Any]) -> Callable[..., Any]:
