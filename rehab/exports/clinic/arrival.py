@@ -14,6 +14,7 @@ from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from itertools import groupby
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from django.db import connection, transaction
@@ -97,9 +98,7 @@ class Arrival:
         """Return new values for those that are taken here, by column. Raises CannotMove."""
         header, names = self._content.header, self._content.names
         if Clinic.everywhere.filter(name=name).exists():
-            raise CannotMove(
-                f"There is a clinic {name} here. Give this one another name by --name."
-            )
+            raise CannotMove(f"A clinic {name} is here already. Give another name by --name.")
         here = Patient.everywhere.filter(pseudonym__in=names[PSEUDONYMS]).select_related("clinic")
         if (patient := here.first()) is not None:
             raise CannotMove(
@@ -217,9 +216,7 @@ def import_clinic(
             )
         owner = ClinicOwner.everywhere.filter(pk=move.clinic_id).values_list("owner", flat=True)
         if (other := owner.first()) and owners.is_alive(other):
-            raise CannotMove(
-                "This file is being taken in at this moment. Wait until that has ended."
-            )
+            raise CannotMove("This file is being taken in just now. Wait until that has ended.")
         delete_rows(move.clinic_id)  # of an import that was interrupted
     clinic = Arrival(content, now, log).load(file, identities, name)
     for lost in _store_recordings(file, identities):
@@ -292,7 +289,7 @@ def _store_recordings(file: BinaryIO, identities: Sequence[Identity]) -> Iterato
         read_parts(file, identities), lambda part: part[0].get("recording", "")
     ):
         content = (decode_part(row) for _, row in parts if row is not None)
-        if not name or os.path.basename(name) != name:
+        if not name or Path(name).name != name:
             for _ in parts:
                 pass
             continue

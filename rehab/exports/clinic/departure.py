@@ -109,14 +109,16 @@ def compare_with_file(clinic: Clinic, content: Content, found: dict[str, str]) -
     ]
     if differing:
         raise CannotMove(
-            f"{clinic} is not as the file has it ({', '.join(differing)}): it was changed since, or "
-            "the file is of another one. Export it again."
+            f"{clinic} is not as the file has it ({', '.join(differing)}): it was changed since, "
+            "or the file is of another one. Export it again."
         )
 
 
 def last_seals(clinic_id: int) -> dict[str, str]:
     """Return the digest at the end of each chain of a clinic."""
-    found = {log: seals.seals_of(log, clinic_id).last() for log in seals.sealed_models()}
+    found: dict[str, Any] = {
+        log: seals.seals_of(log, clinic_id).last() for log in seals.sealed_models()
+    }
     found["steps and events"] = session_seals.last_seal(clinic_id)
     return {log: seal.digest for log, seal in found.items() if seal is not None}
 
@@ -143,7 +145,7 @@ def delete_rows(clinic_id: int) -> dict[str, int]:
         while keys := list(mine.order_by("pk").values_list("pk", flat=True)[:BATCH_ROWS]):
             some = model._base_manager.filter(pk__in=keys)
             with transaction.atomic():
-                count += some._raw_delete(some.db)
+                count += some._raw_delete(some.db)  # noqa: SLF001
         deleted[model._meta.label_lower] = count
     return deleted
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import msgspec
+from cryptography.fernet import InvalidToken
 from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
 from django.db.models import Model, Q, QuerySet
 
@@ -20,6 +21,7 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.factors.factors import Authenticator, close_secret, open_secret
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.registration.sealing import seal, unseal
+from rehab.training.measures import InvalidSetting
 
 READ_ROWS = 2000
 TOKENS = ("token_hash", "successor_hash", "retired_hash")
@@ -27,18 +29,36 @@ to_json = msgspec.json.Encoder(order="sorted").encode
 Rewrite = Callable[[str], str]
 
 
+class CannotMove(ValueError):
+    """A clinic that cannot be taken out, in or away; the message says why, and what to do."""
+
+
 def _open_study(sealed: str) -> str:
-    return unseal(sealed).to_text() if sealed else ""
+    try:
+        return unseal(sealed).to_text() if sealed else ""
+    except InvalidSetting as problem:
+        raise CannotMove(str(problem)) from problem
 
 
 def _close_study(text: str) -> str:
     return seal(Secret.from_text(text)) if text else ""
 
 
+def _open_app(credential: str) -> str:
+    try:
+        return open_secret(credential)
+    except InvalidToken:  # of an earlier key of the server: its codes are refused here, too
+        return ""
+
+
+def _close_app(secret: str) -> str:
+    return close_secret(secret) if secret else ""
+
+
 # Columns that are encrypted with a server's own key: how they are opened and closed.
 ENCRYPTED: dict[str, tuple[str, Rewrite, Rewrite]] = {
     "rehab.study": ("sealed", _open_study, _close_study),
-    "rehab.authenticator": ("credential", open_secret, close_secret),
+    "rehab.authenticator": ("credential", _open_app, _close_app),
 }
 
 
@@ -127,7 +147,7 @@ class ClinicRows:
             label, _, column = where.rpartition(".")
             if label == table.label:
                 before = {new: old for old, new in names.items()}
-                changes.append((table.index(column), lambda now, b=before: b.get(now, now)))
+                changes.append((table.index(column), partial(_renamed, before)))
         return changes
 
     def _empty_account(self, table: Table, row: list[Any]) -> None:
@@ -164,6 +184,10 @@ class ClinicRows:
                     digest.add(row, to_json(row))
                 found[table.label] = digest.text
         return found
+
+
+def _renamed(names: dict[str, str], now: str | None) -> str | None:
+    return None if now is None else names.get(now, now)
 
 
 class Digest:

@@ -23,7 +23,7 @@ from pyrage.x25519 import Identity, Recipient
 
 from rehab.exports.backup import GZIP_WBITS, consistent_read, tables_version
 from rehab.exports.clinic.keys import last_keys
-from rehab.exports.clinic.rows import ClinicRows, Digest, to_json
+from rehab.exports.clinic.rows import CannotMove, ClinicRows, Digest, to_json
 from rehab.exports.clinic.shared_rows import describe_shared
 from rehab.exports.clinic.tables import moving_tables
 from rehab.exports.encryption import CannotDecrypt, decrypt, encrypt
@@ -40,10 +40,6 @@ TRIES = 5
 COMPRESS_BYTES = 256_000
 Names = dict[str, list[str]]
 from_json = msgspec.json.Decoder().decode
-
-
-class CannotMove(ValueError):
-    """A clinic that cannot be taken out, in or away; the message says why, and what to do."""
 
 
 @dataclass(frozen=True)

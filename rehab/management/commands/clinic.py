@@ -118,8 +118,8 @@ class Command(BaseCommand):
             self.stderr.write(problem)
         if broken:
             raise CommandError(
-                f"{len(broken)} are not as they were sealed. Compare with a backup from before, and "
-                "find out who was there."
+                f"{len(broken)} are not as they were sealed. Compare with a backup from before, "
+                "and find out who was there."
             )
         if file is not None:
             with _opened(file) as opened:

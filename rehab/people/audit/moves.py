@@ -63,7 +63,7 @@ class ClinicMove(AppendOnlyModel):
         """Return the key that a row has since this move."""
         label = model._meta.label_lower
         shared: dict[str, int] = self.shared.get(label, {})
-        return shared.get(str(key), key + self.shifts.get(label, 0))
+        return shared.get(str(key), key + int(self.shifts.get(label, 0)))
 
     def old_key(self, model: type[Model], key: int) -> int:
         """Return the key that a row had before this move."""

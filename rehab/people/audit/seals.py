@@ -132,7 +132,8 @@ def seal_at_once(clinic_id: int, now: datetime) -> None:
     """Seal all rows of a clinic's logs, also the newest; who adds one meanwhile waits."""
     with transaction.atomic(), connection.cursor() as cursor:
         if connection.vendor == "postgresql":
-            tables = [model._meta.db_table for model in (*sealed_models().values(), LogSeal)]
+            logs: list[type[Any]] = [*sealed_models().values(), LogSeal]
+            tables = [model._meta.db_table for model in logs]
             cursor.execute(f"LOCK TABLE {', '.join(tables)} IN SHARE ROW EXCLUSIVE MODE")
         for log in sealed_models():
             while _seal_batch(log, clinic_id, datetime.max.replace(tzinfo=UTC), now):
