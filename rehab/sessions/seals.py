@@ -110,8 +110,16 @@ def digest_steps(session: TrainingSession, first: int, last: int) -> str:
     rows = Step.everywhere.filter(session=session.pk, number__range=(first, last))
     if first <= last:
         for row in rows.order_by("number").values_list(*STEP_FIELDS):
-            digest.update(_to_json(with_floats(row)))
+            digest.update(_to_json([_plain(value) for value in row]))
     return digest.hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a step as every database gives it back."""
+    kind = type(value)
+    if kind is float:
+        return value + 0.0  # no negative zero
+    return with_floats(value) if kind in (dict, list) else value
 
 
 def digest_events(session_id: int, first: int, last: int, original: Translate = same_key) -> str:

@@ -35,6 +35,7 @@ from rehab.sessions.replay import check_log
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Device
 from rehab.studies.participants import Enrollment
+from tests.support.archives import body_of, open_archive, rows_of
 from tests.support.walks import HIT, MISS, walk
 from tests.support.world import NOW, World, build_world, scoped_models, set_owner, signed_in
 
@@ -173,9 +174,8 @@ def test_a_persons_requests_after_a_move(world, file, key):
     lead = signed_in(User.everywhere.get(username=world.people[Role.LEAD].username))
     answer = lead.get(reverse("patient-data", kwargs={"patient_id": patient.pk}))
     files = open_archive(body_of(answer))
-    assert (
-        len(rows_of(files["steps.csv"])) == Step.everywhere.filter(session__patient=patient).count()
-    )
+    walked = Step.everywhere.filter(session__patient=patient)
+    assert len(rows_of(files["steps.csv"])) == walked.count()
     erase(patient, ErasureReason.ASKED, None, timezone.now())
     assert Patient.everywhere.get(pk=patient.pk).nickname != world.patient.nickname
     assert find_broken(clinic) == []
