@@ -2023,6 +2023,8 @@ class Migration(migrations.Migration):
                             ("family_end", "Ended a family's link"),
                             ("family_view", "Looked at, by a family's link"),
                             ("unblind", "Revealed a study's arm"),
+                            ("clinic_in", "Took the clinic in"),
+                            ("clinic_out", "Removed a clinic"),
                             ("robot_stop", "Stopped the robot"),
                             ("robot_arm", "Armed the robot"),
                             ("robot_trial", "Tried a gesture on the robot"),

@@ -11,7 +11,7 @@ import hashlib
 import time
 from collections.abc import Iterator
 from datetime import datetime
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 from django.db import IntegrityError, models, transaction
