@@ -252,6 +252,37 @@ def test_a_spoiled_file_is_refused_before_anything_is_stored(
     assert Clinic.everywhere.count() == 1
 
 
+@pytest.mark.parametrize(
+    ("label", "column", "value", "said"),
+    [
+        ("rehab.user", "clinic_id", None, "not of its clinic"),  # it would be a host's
+        ("rehab.user", "is_superuser", True, "not of its clinic"),
+        ("rehab.patient", "clinic_id", 7, "not of its clinic"),
+        ("rehab.trainingsession", "patient_id", -3, "a key beyond its own"),
+        ("rehab.step", "session_id", 10**12, "a key beyond its own"),
+    ],
+)
+def test_a_forged_row_reaches_no_other_clinic(
+    world, file, key, monkeypatch, label, column, value, said
+):
+    read = ClinicRows.read
+
+    def forge(rows: ClinicRows, table: Any) -> Any:
+        for row in read(rows, table):
+            if table.label == label:
+                row[table.index(column)] = value
+            yield row
+
+    with monkeypatch.context() as patched:
+        patched.setattr(ClinicRows, "read", forge)
+        run("export", world.clinic.name, file)
+    run("remove", world.clinic.name, file.with_suffix(".json"), "--destroy")
+    before = {model: model._base_manager.count() for model in moving_models()}
+    with pytest.raises(CommandError, match=said):
+        run("import", file, "--key", key)
+    assert {model: model._base_manager.count() for model in moving_models()} == before
+
+
 def test_another_key(world, file, tmp_path):
     run("export", world.clinic.name, file)
     wrong = tmp_path / "wrong.txt"
@@ -297,16 +328,16 @@ def test_a_failed_import_leaves_nothing_and_can_be_repeated(world, file, key, mo
     run("export", world.clinic.name, file)
     run("remove", world.clinic.name, file.with_suffix(".json"), "--file", file, "--key", key)
     empty = {model: model._base_manager.count() for model in moving_models()}
-    monkeypatch.setattr(arrival.Arrival, "_open", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        run("import", file, "--key", key)
-    assert {model: model._base_manager.count() for model in moving_models()} == empty
-    # Killed on the way: what it left is removed by the next try.
-    monkeypatch.setattr(arrival, "delete_rows", lambda _key: None)
-    with pytest.raises(ZeroDivisionError):
-        run("import", file, "--key", key)
+    with monkeypatch.context() as patched:
+        patched.setattr(arrival.Arrival, "_open", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            run("import", file, "--key", key)
+        assert {model: model._base_manager.count() for model in moving_models()} == empty
+        # Killed on the way: what it left is removed by the next try.
+        patched.setattr(arrival, "delete_rows", lambda _key: None)
+        with pytest.raises(ZeroDivisionError):
+            run("import", file, "--key", key)
     assert not User.everywhere.filter(clinic__isnull=False, is_active=True).exists()
-    monkeypatch.undo()
     set_owner(Clinic.everywhere.get().pk, "gone|1|1")
     run("import", file, "--key", key)
     assert Clinic.everywhere.count() == 1
@@ -345,6 +376,7 @@ def test_what_was_added_since_the_file_is_not_lost(world, file, key):
     with pytest.raises(CommandError, match=r"not as the file has it \(.*patient.*Export it again"):
         run("remove", world.clinic.name, paper, "--file", file, "--key", key)
     assert Patient.everywhere.filter(nickname="Later").exists()
+    assert User.everywhere.get(pk=world.people[Role.LEAD].pk).is_active  # and nobody is shut out
     with pytest.raises(CommandError, match="Name the file that it leaves with"):
         run("remove", world.clinic.name, paper)
     run("remove", world.clinic.name, paper, "--destroy")
@@ -356,6 +388,7 @@ def test_a_server_that_has_the_clinic_is_waited_for(world, file, key):
     with pytest.raises(CommandError, match="A server still has"):
         run("remove", world.clinic.name, file.with_suffix(".json"), "--destroy")
     assert Clinic.everywhere.filter(pk=world.clinic.pk).exists()
+    assert find_by_token(Device, world.token, NOW) is not None
 
 
 def _started(pid: int) -> str:

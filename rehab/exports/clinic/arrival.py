@@ -154,7 +154,12 @@ class Arrival:
             ClinicOwner.everywhere.create(pk=key, owner=owners.own_name())
 
     def _local(self, table: Table, row: list[Any], column: str, names: dict[str, str]) -> list[Any]:
-        """Return a row of the file as it is stored here."""
+        """Return a row of the file as it is stored here. Raises CannotMove for another's row."""
+        key = self._content.header["key"]
+        if clinic_paths()[table.model] in ("pk", "clinic"):
+            own = row[table.index("id" if table.label == CLINIC else "clinic_id")]
+            if own != key or (table.label == USER and row[table.index("is_superuser")]):
+                raise CannotMove("Rows of the file are not of its clinic. Export it again.")
         if is_encrypted(table, row):
             name, _, close = ENCRYPTED[table.label]
             row[table.index(name)] = close(row[table.index(name)])
@@ -162,7 +167,7 @@ class Arrival:
             row[table.index(column)] = names.get(row[table.index(column)], row[table.index(column)])
         if "token_hash" in table.names and not row[table.index("token_hash")]:
             row[table.index("token_hash")] = hash_token(draw_token())  # nobody has it
-        table.translate(row, self.move.new_key)
+        table.translate(row, self._new_key)
         if table.label == USER and row[table.index("is_active")]:
             self._active.append(row[table.index("id")])
             row[table.index("is_active")] = False
@@ -170,6 +175,15 @@ class Arrival:
             self._boards_across = row[table.index("boards_across")]
             row[table.index("boards_across")] = False
         return row
+
+    def _new_key(self, model: type[Any], key: int) -> int:
+        """Return a row's key here: one of those that are reserved. Raises CannotMove for others."""
+        label = model._meta.label_lower
+        if not 0 <= key <= self._content.header["last_keys"].get(label, 0):
+            raise CannotMove(
+                f"The file has a key beyond its own ({label} {key}). Export the clinic again."
+            )
+        return self.move.new_key(model, key)
 
     def _compare(self, labels: Sequence[str]) -> None:
         """Raise CannotMove where the stored rows are not those of the file."""
@@ -289,7 +303,7 @@ def _store_recordings(file: BinaryIO, identities: Sequence[Identity]) -> Iterato
         read_parts(file, identities), lambda part: part[0].get("recording", "")
     ):
         content = (decode_part(row) for _, row in parts if row is not None)
-        if not name or Path(name).name != name:
+        if not name or Path(name).name != name or name.startswith("."):
             for _ in parts:
                 pass
             continue

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from typing import Any
 
@@ -46,15 +48,11 @@ def remove_clinic(
     do not let it go.
     """
     check_no_session_runs(clinic)
-    _shut(clinic, now)
-    _wait_for_servers(clinic, wait_s)
-    check_no_session_runs(clinic)
-    seal_everything(clinic, now)
-    rows = ClinicRows(clinic.pk, with_tokens=content is not None and content.header["tokens"])
-    for _ in rows.lines():
-        pass
-    if content is not None:
-        compare_with_file(clinic, content, rows.digests)
+    _read_all(clinic, content, now)  # first, so that nobody is shut out in vain
+    with _shut(clinic, now):
+        _wait_for_servers(clinic, wait_s)
+        check_no_session_runs(clinic)
+        rows = _read_all(clinic, content, now)
     certificate = {
         "certificate": "This clinic was removed from this installation of GARRY.",
         "clinic": clinic.name,
@@ -77,11 +75,34 @@ def remove_clinic(
     return {"text": f"{text}\n", "digest": digest}
 
 
-def _shut(clinic: Clinic, now: datetime) -> None:
-    """End all sign-ins and tokens of a clinic's people and devices."""
+def _read_all(clinic: Clinic, content: Content | None, now: datetime) -> ClinicRows:
+    """Return all rows with counts and digests. Raises CannotMove where the file has others."""
+    seal_everything(clinic, now)
+    rows = ClinicRows(clinic.pk, with_tokens=content is not None and content.header["tokens"])
+    for _ in rows.lines():
+        pass
+    if content is not None:
+        compare_with_file(clinic, content, rows.digests)
+    return rows
+
+
+@contextmanager
+def _shut(clinic: Clinic, now: datetime) -> Iterator[None]:
+    """End all sign-ins and tokens of a clinic's people and devices, for good unless this fails."""
+    people = User.everywhere.filter(clinic=clinic, is_active=True)
+    devices = Device.everywhere.filter(clinic=clinic, revoked_at=None)
+    keys = [list(rows.values_list("pk", flat=True)) for rows in (people, devices)]
     with transaction.atomic():
-        User.everywhere.filter(clinic=clinic, is_active=True).update(is_active=False)
-        Device.everywhere.filter(clinic=clinic, revoked_at=None).update(revoked_at=now)
+        people.update(is_active=False)
+        devices.update(revoked_at=now)
+    try:
+        yield
+    except BaseException:
+        with transaction.atomic():
+            User.everywhere.filter(pk__in=keys[0]).update(is_active=True)
+            Device.everywhere.filter(pk__in=keys[1]).update(revoked_at=None)
+        owners.release([clinic.pk])
+        raise
 
 
 def _wait_for_servers(clinic: Clinic, wait_s: float) -> None:
@@ -94,8 +115,8 @@ def _wait_for_servers(clinic: Clinic, wait_s: float) -> None:
         except owners.OwnedElsewhere as problem:
             if time.monotonic() > until_s:
                 raise CannotMove(
-                    f"A server still has {clinic}. Its people and devices are signed out; wait a "
-                    "minute until it has closed their pages, then run this again."
+                    f"A server still has {clinic}, though nobody could sign in meanwhile. Restart "
+                    "the server, then run this again."
                 ) from problem
             time.sleep(0.5)
 

@@ -213,6 +213,8 @@ def inspect(file: BinaryIO, identities: Sequence[Identity]) -> Content:
             end = part
         elif "model" in part:
             label = part["model"]
+            if part["columns"] != tables[label].names:
+                raise _not_a_clinic()
             counts[label] += 1
             sums[label].add(row, to_json(row))
             _note_names(tables[label].names, label, row, names)
