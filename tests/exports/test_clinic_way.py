@@ -35,7 +35,7 @@ class Place:
 
     def walk(self, seed: int) -> None:
         """Let a simulated patient walk."""
-        how = ("--strides", 80, "--valence", "positive", "--goal", 1.2, "--clinic", NAME)
+        how = ("--strides", 120, "--valence", "positive", "--goal", 1.2, "--clinic", NAME)
         self.manage("runsession", "--synthetic", seed, *how)
 
 
