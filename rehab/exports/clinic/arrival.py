@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from datetime import datetime
 from functools import partial
-from itertools import groupby
+from itertools import count, groupby
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -106,12 +106,13 @@ class Arrival:
                 "in from another file, or never left. Remove that one first, or leave it as it is."
             )
         renamed: dict[str, dict[str, str]] = {f"{CLINIC}.name": {header["clinic"]: name}}
-        accounts = {}
+        accounts, coming = {}, {one.lower() for one in names.get(f"{USER}.username", [])}
         for taken in names.get(f"{USER}.username", []):
             if User.is_taken(taken):
-                accounts[taken] = _free_name(taken)
+                accounts[taken] = _free_name(taken, coming)
+                coming.add(accounts[taken].lower())
                 self._log(f"The account {taken} is {accounts[taken]} here: the name is taken.")
-        aliases, drawn = {}, set[str]()
+        aliases, drawn = {}, set(names.get("rehab.patient.alias", []))
         for alias in names.get("rehab.patient.alias", []):
             if Patient.everywhere.filter(alias=alias).exists():
                 aliases[alias] = draw_alias(
@@ -238,11 +239,12 @@ def import_clinic(
     return clinic
 
 
-def _free_name(username: str) -> str:
-    """Return a name for an account that nobody has here."""
-    numbers = iter(range(2, 10_000))
-    while User.is_taken(name := f"{username[:140]}.{next(numbers)}"):
-        pass
+def _free_name(username: str, coming: Collection[str]) -> str:
+    """Return a name for an account that nobody has here, and none that comes in."""
+    for number in count(2):
+        name = f"{username[:140]}.{number}"
+        if name.lower() not in coming and not User.is_taken(name):
+            break
     return name
 
 
