@@ -5,13 +5,13 @@ from rehab.boards.models import Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients import family, visits  # noqa: F401
-from rehab.people.audit import seals  # noqa: F401
+from rehab.people.audit import moves  # noqa: F401
 from rehab.people.consent import tombstones  # noqa: F401
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.sign_in import attempts, resets  # noqa: F401
 from rehab.people.sign_in.factors import factors  # noqa: F401
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions import corrections, incidents, log, models, ownership  # noqa: F401
+from rehab.sessions import corrections, incidents, log, models, ownership, seals  # noqa: F401
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase

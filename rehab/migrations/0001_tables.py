@@ -149,6 +149,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 ("created_at", models.DateTimeField(auto_now_add=True, verbose_name="created at")),
+                ("removing_at", models.DateTimeField(editable=False, null=True)),
             ],
             options={
                 "verbose_name": "clinic",
@@ -435,6 +436,44 @@ class Migration(migrations.Migration):
                 "verbose_name": "API token",
                 "verbose_name_plural": "API tokens",
                 "ordering": ["name"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="ClinicMove",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("number", models.PositiveIntegerField()),
+                ("file", models.CharField(max_length=64)),
+                ("exported_at", models.DateTimeField()),
+                ("at", models.DateTimeField()),
+                ("finished_at", models.DateTimeField(null=True)),
+                ("shifts", models.JSONField()),
+                ("shared", models.JSONField(default=dict)),
+                ("renamed", models.JSONField(default=dict)),
+                ("digests", models.JSONField()),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="moves",
+                        to="rehab.clinic",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "move of a clinic",
+                "ordering": ["clinic", "number"],
                 "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
@@ -1381,6 +1420,7 @@ class Migration(migrations.Migration):
                 ),
                 ("log", models.CharField(max_length=16)),
                 ("number", models.PositiveIntegerField()),
+                ("moves", models.PositiveIntegerField(default=0)),
                 ("first_id", models.BigIntegerField()),
                 ("last_id", models.BigIntegerField()),
                 ("last_at", models.DateTimeField()),
@@ -1988,6 +2028,8 @@ class Migration(migrations.Migration):
                             ("family_end", "Ended a family's link"),
                             ("family_view", "Looked at, by a family's link"),
                             ("unblind", "Revealed a study's arm"),
+                            ("clinic_in", "Took the clinic in"),
+                            ("clinic_out", "Removed a clinic"),
                             ("robot_stop", "Stopped the robot"),
                             ("robot_arm", "Armed the robot"),
                             ("robot_trial", "Tried a gesture on the robot"),
@@ -2473,7 +2515,7 @@ class Migration(migrations.Migration):
                     "by",
                     models.ForeignKey(
                         null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
+                        on_delete=django.db.models.deletion.PROTECT,
                         related_name="+",
                         to=settings.AUTH_USER_MODEL,
                         verbose_name="by",
@@ -3547,6 +3589,7 @@ class Migration(migrations.Migration):
                 ),
                 ("legacy_row", models.JSONField(editable=False, null=True)),
                 ("last_number", models.PositiveIntegerField(default=0, editable=False)),
+                ("unsealed", models.BooleanField(default=True, editable=False)),
                 ("checkpoint", models.JSONField(editable=False, null=True)),
                 (
                     "clinic",
@@ -3750,6 +3793,55 @@ class Migration(migrations.Migration):
                 "verbose_name": "step",
                 "verbose_name_plural": "steps",
                 "ordering": ["session", "number"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="SessionSeal",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("number", models.PositiveIntegerField()),
+                ("moves", models.PositiveIntegerField(default=0)),
+                ("first_step", models.PositiveIntegerField()),
+                ("last_step", models.PositiveIntegerField()),
+                ("first_event", models.PositiveIntegerField()),
+                ("last_event", models.PositiveIntegerField()),
+                ("steps", models.CharField(max_length=64)),
+                ("events", models.CharField(max_length=64)),
+                ("previous", models.CharField(blank=True, max_length=64)),
+                ("digest", models.CharField(max_length=64)),
+                ("sealed_at", models.DateTimeField(default=django.utils.timezone.now)),
+                ("replaced_at", models.DateTimeField(null=True)),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="+",
+                        to="rehab.clinic",
+                    ),
+                ),
+                (
+                    "session",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="seals",
+                        to="rehab.trainingsession",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "seal of a session",
+                "ordering": ["clinic", "number"],
                 "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
@@ -4068,6 +4160,12 @@ class Migration(migrations.Migration):
             ),
         ),
         migrations.AddConstraint(
+            model_name="clinicmove",
+            constraint=models.UniqueConstraint(
+                fields=("clinic", "number"), name="clinic_moved_in_order"
+            ),
+        ),
+        migrations.AddConstraint(
             model_name="composedgesture",
             constraint=models.UniqueConstraint(
                 fields=("clinic", "name"), name="gesture_name_once_per_clinic"
@@ -4341,6 +4439,14 @@ class Migration(migrations.Migration):
                 name="running_session_by_clinic",
             ),
         ),
+        migrations.AddIndex(
+            model_name="trainingsession",
+            index=models.Index(
+                condition=models.Q(("unsealed", True)),
+                fields=["clinic"],
+                name="unsealed_session_by_clinic",
+            ),
+        ),
         migrations.AddConstraint(
             model_name="trainingsession",
             constraint=models.UniqueConstraint(
@@ -4357,6 +4463,12 @@ class Migration(migrations.Migration):
             model_name="step",
             constraint=models.UniqueConstraint(
                 fields=("session", "number"), name="step_number_once"
+            ),
+        ),
+        migrations.AddConstraint(
+            model_name="sessionseal",
+            constraint=models.UniqueConstraint(
+                fields=("clinic", "number"), name="sessions_sealed_in_order"
             ),
         ),
         migrations.AddIndex(

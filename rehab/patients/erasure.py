@@ -29,6 +29,7 @@ from rehab.people.field_policy import (
 )
 from rehab.people.models import Clinic, ErasureReason, Patient, User
 from rehab.sessions.formatting import clinic_time
+from rehab.sessions.seals import replace_seals
 
 
 def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetime) -> None:
@@ -55,6 +56,7 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
         for model, path in paths_to_patient().items():
             if model is not Patient:
                 _erase_rows(model, path, patient, pseudonym)
+        replace_seals(patient, now)
         erase_values("Patient", patient.pk)
         LogEntry.objects.filter(
             content_type=ContentType.objects.get_for_model(Patient), object_id=str(patient.pk)

@@ -12,6 +12,7 @@ from django.dispatch import Signal
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.append_only import Allowed, AppendOnlyModel
 from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.scope import ScopedModel
@@ -20,10 +21,14 @@ from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS
 from rehab.training.summary.metrics import METRICS
 
+PATIENT_IS_ERASED = (
+    "EXISTS (SELECT 1 FROM rehab_trainingsession s JOIN rehab_patient p ON p.id = s.patient_id "
+    "WHERE s.id = OLD.session_id AND p.erased_at IS NOT NULL)"
+)
 MEASURED = retained("a measurement under a pseudonym", shown=True, research=True)
 
 
-class Step(ScopedModel):
+class Step(AppendOnlyModel):
     """A scored stride. Rows are only ever added."""
 
     scope = SessionScope(
@@ -71,7 +76,7 @@ class Step(ScopedModel):
         }
     )
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         verbose_name = _("step")
         verbose_name_plural = _("steps")
         ordering: ClassVar = ["session", "number"]
@@ -232,7 +237,7 @@ def erase_typed_words(patient: Patient, _pseudonym: str) -> None:
     events.bulk_update(edits, ["data"])
 
 
-class SessionEvent(ScopedModel):
+class SessionEvent(AppendOnlyModel):
     """A change of a session, a remark, or an act of its robot, ordered against its steps.
     Rows are only added.
 
@@ -243,6 +248,9 @@ class SessionEvent(ScopedModel):
     scope = SessionScope(
         clinic="session__clinic", station="session__station", patient="session__patient"
     )
+
+    # An erasure empties typed words.
+    allowed_changes = (Allowed(("data",), PATIENT_IS_ERASED),)
 
     session = models.ForeignKey(
         TrainingSession, on_delete=models.PROTECT, related_name="events", verbose_name=_("session")
@@ -256,7 +264,7 @@ class SessionEvent(ScopedModel):
     old = models.FloatField(_("old"), null=True)
     value = models.FloatField(_("value"), null=True)
     by = models.ForeignKey(
-        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+        User, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("by")
     )
     at = models.DateTimeField(_("at"))
     data = models.JSONField(_("data"), default=dict)
@@ -269,7 +277,7 @@ class SessionEvent(ScopedModel):
         }
     )
 
-    class Meta(ScopedModel.Meta):
+    class Meta(AppendOnlyModel.Meta):
         verbose_name = _("session event")
         verbose_name_plural = _("session events")
         ordering: ClassVar = ["session", "pk"]

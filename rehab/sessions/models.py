@@ -172,6 +172,8 @@ class TrainingSession(ClinicModel):
     legacy_row = models.JSONField(null=True, editable=False)
     # The log's end as it was last noted: with changes and checkpoints, and when it is unloaded.
     last_number = models.PositiveIntegerField(default=0, editable=False)
+    # Whether steps or events may lack a seal (``seals``).
+    unsealed = models.BooleanField(default=True, editable=False)
     # Of an open session: the fold of its first steps, so that the rest is quickly folded.
     checkpoint = models.JSONField(null=True, editable=False)
 
@@ -192,7 +194,7 @@ class TrainingSession(ClinicModel):
             "active_s excluded": WALKED,
             "clinic station created_by": retained("places and staff", shown=False, research=False),
             "checkpoint": retained("None once it has ended", shown=False, research=False),
-            "last_number": retained("the server's own", shown=False, research=False),
+            "last_number unsealed": retained("the server's own", shown=False, research=False),
         }
     )
 
@@ -208,6 +210,9 @@ class TrainingSession(ClinicModel):
                 fields=["clinic"],
                 condition=Q(state=State.RUNNING.value),
                 name="running_session_by_clinic",
+            ),
+            models.Index(
+                fields=["clinic"], condition=Q(unsealed=True), name="unsealed_session_by_clinic"
             ),
         ]
         constraints: ClassVar = [

@@ -41,7 +41,7 @@ def run_alone(module: str, *arguments: object, folder: Path, database: str = "")
 
 
 @contextmanager
-def make_postgresql() -> Iterator[str]:
+def make_postgresql(of: str = "bench") -> Iterator[str]:
     """Make a database on the server at DATABASE_URL; give its address. Skips without a server."""
     import psycopg
     from psycopg import sql
@@ -50,7 +50,7 @@ def make_postgresql() -> Iterator[str]:
         server = psycopg.connect(POSTGRES, autocommit=True, connect_timeout=3)
     except psycopg.OperationalError:
         pytest.skip("no PostgreSQL answers at DATABASE_URL")
-    name = f"garry_bench_{os.getpid()}"
+    name = f"garry_{of}_{os.getpid()}"
     server.execute(sql.SQL("CREATE DATABASE {}").format(sql.Identifier(name)))
     try:
         yield f"{POSTGRES.rpartition('/')[0]}/{name}"

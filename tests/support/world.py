@@ -8,7 +8,7 @@ from typing import Any
 
 from django.apps import apps
 from django.contrib.auth.models import AnonymousUser
-from django.db.models import Model
+from django.db.models import Model, Q
 from django.test import Client
 
 from rehab.boards.changes import BoardChange
@@ -20,6 +20,7 @@ from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
+from rehab.people.audit.moves import ClinicMove
 from rehab.people.audit.seals import LogSeal
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.consent.services import record_consent
@@ -39,6 +40,7 @@ from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
+from rehab.sessions.seals import SessionSeal, seal_sessions
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
@@ -71,6 +73,15 @@ RECORDED = [
     {"at_s": 10.5, "retained": "bump", "is_first": True},
     {"at_s": 10.7, "tick": [0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.0]},
 ]
+
+
+MOVED: dict[str, Any] = {
+    "exported_at": NOW,
+    "at": NOW,
+    "finished_at": NOW,
+    "shifts": {},
+    "digests": {},
+}
 
 
 @dataclass
@@ -173,6 +184,12 @@ def seal_nothing(clinic: Clinic) -> LogSeal:
     seal.digest = seal.compute_digest([])
     seal.save()
     return seal
+
+
+def seal_steps(session: TrainingSession) -> SessionSeal:
+    """Seal a session's steps and events; return the seal."""
+    seal_sessions(NOW, Q(pk=session.pk))
+    return SessionSeal.everywhere.get(session=session)
 
 
 def build_world(name: str) -> World:
@@ -296,6 +313,8 @@ def build_world(name: str) -> World:
             at=NOW,
         ),
         ClinicOwner.everywhere.get_or_create(pk=clinic.pk)[0],
+        seal_steps(session),
+        ClinicMove.everywhere.create(clinic=clinic, number=1, file=mark(name, ClinicMove), **MOVED),
         RobotIncident.everywhere.create(
             session=session, at=NOW, reason=mark(name, RobotIncident), recording=pack(RECORDED)
         ),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from django.utils import timezone
 
 from rehab.exports.backup import write_backup
 from rehab.exports.encryption import InvalidKey, read_recipients
+from rehab.management.new_file import new_file
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
@@ -37,20 +37,8 @@ class Command(BaseCommand):
                 "A backup holds everything about patients, and is encrypted to a public key in "
                 f"GARRY_BACKUP_KEYS. {problem}"
             ) from problem
-        new = file.with_name(f".{file.name}.new")
-        flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW  # never through a link
-        try:
-            with os.fdopen(os.open(new, flags, 0o600), "wb") as out:
-                counts = write_backup(out, recipients, now)
-                out.flush()
-                os.fsync(out.fileno())
-            new.replace(file)
-        except OSError as problem:
-            raise CommandError(
-                f"{file} cannot be written ({problem.strerror}). Choose another place."
-            ) from problem
-        finally:
-            new.unlink(missing_ok=True)
+        with new_file(file) as out:
+            counts = write_backup(out, recipients, now)
         for clinic in Clinic.everywhere.all():
             audit_log.record(
                 Act.BACKUP, None, clinic_id=clinic.pk, about="manage.py backup", now=now

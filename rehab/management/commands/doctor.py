@@ -8,7 +8,7 @@ import tempfile
 import time
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
-from datetime import timedelta
+from datetime import datetime, timedelta
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -22,6 +22,7 @@ from django.utils import timezone
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
 from rehab.people.sign_in.first_start import count_pending_migrations
+from rehab.sessions import seals as session_seals
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
@@ -30,6 +31,7 @@ from rehab.stations.models import Device
 from rehab.training.changes import OPEN_STATES, State
 
 SLOW_DISK_S = 0.05
+SEALED_SINCE = timedelta(days=30)  # whose rows are read again without --deep
 
 
 class Diagnosis(NamedTuple):
@@ -49,12 +51,15 @@ class Command(BaseCommand):
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the options."""
         parser.add_argument(
-            "--deep", action="store_true", help="also fold the logs of all open sessions again"
+            "--deep",
+            action="store_true",
+            help="also fold the logs of all open sessions again, and compare all steps with seals",
         )
 
     def handle(self, *args: Any, deep: bool = False, **options: Any) -> None:
         """Print the diagnoses. Exits with status 1 where something needs a cure."""
-        examinations = (*EXAMINATIONS, examine_session_logs) if deep else EXAMINATIONS
+        last = (examine_session_logs, examine_all_steps) if deep else (examine_new_steps,)
+        examinations = (*EXAMINATIONS, *last)
         diagnoses = [diagnosis for run in examinations for diagnosis in examine(run)]
         for diagnosis in diagnoses:
             mark = "needs care" if diagnosis.cure else "well"
@@ -213,6 +218,28 @@ def examine_seals() -> Iterator[Diagnosis]:
         late = seals.count_unsealed(timezone.now() - timedelta(days=1))
         state = f"{LogSeal.everywhere.count()} seals hold, {late} rows older than a day lack one"
         yield Diagnosis("logs", state, "Start the server: it seals them." if late else "")
+
+
+def examine_new_steps() -> Iterator[Diagnosis]:
+    """Diagnose the seals of all sessions, and the steps and events that were sealed lately."""
+    return _examine_steps(timezone.now() - SEALED_SINCE)
+
+
+def examine_all_steps() -> Iterator[Diagnosis]:
+    """Diagnose the seals of all sessions, and all their steps and events."""
+    return _examine_steps(None)
+
+
+def _examine_steps(since: datetime | None) -> Iterator[Diagnosis]:
+    broken = list(session_seals.find_broken(since))
+    for problem in broken[:10]:
+        cure = "Compare with a backup from before, and find out who was there."
+        yield Diagnosis("steps", problem, cure)
+    if not broken:
+        late = session_seals.count_late(timezone.now() - timedelta(days=1))
+        state = "as they were sealed" + ("" if since is None else " in the last 30 days")
+        cure = "Start the server: it seals them." if late else ""
+        yield Diagnosis("steps", f"{state}; {late} sessions ended a day ago lack a seal", cure)
 
 
 EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (

@@ -66,6 +66,8 @@ class Act(models.TextChoices):
     FAMILY_END = "family_end", _("Ended a family's link")
     FAMILY_VIEW = "family_view", _("Looked at, by a family's link")
     UNBLIND = "unblind", _("Revealed a study's arm")
+    CLINIC_IN = "clinic_in", _("Took the clinic in")
+    CLINIC_OUT = "clinic_out", _("Removed a clinic")
     ROBOT_STOP = "robot_stop", _("Stopped the robot")
     ROBOT_ARM = "robot_arm", _("Armed the robot")
     ROBOT_TRIAL = "robot_trial", _("Tried a gesture on the robot")

@@ -15,6 +15,7 @@ from django.apps import apps
 from django.db import connections
 
 from rehab.people.append_only import AppendOnlyModel
+from rehab.people.models import Clinic
 
 VENDORS = ("sqlite", "postgresql")
 WORDS = (
@@ -83,9 +84,25 @@ def _rules(vendor: str) -> Iterator[tuple[str, str, str, str]]:
             for fields, sql in model.allowed_changes
         ]
         yield f"garry_{table}_update", "UPDATE", table, " OR ".join(changes) or "1 = 0"
-        yield f"garry_{table}_delete", "DELETE", table, model.allowed_deletion
+        allowed = f"{model.allowed_deletion} OR {_is_removed(model)}"
+        yield f"garry_{table}_delete", "DELETE", table, allowed
         if vendor == "postgresql":
             yield f"garry_{table}_truncate", "TRUNCATE", table, ""
+
+
+def _is_removed(model: type[AppendOnlyModel]) -> str:
+    """Return the condition that the row OLD is of a clinic that is being removed."""
+    of_model, key = model, ""
+    for name in model.scope.clinic.split("__"):
+        field: Any = of_model._meta.get_field(name)
+        table = of_model._meta.db_table
+        above = f"(SELECT {field.column} FROM {table} WHERE id = {key})"  # noqa: S608
+        key = above if key else f"OLD.{field.column}"
+        of_model = field.related_model
+    return (
+        f"EXISTS (SELECT 1 FROM {Clinic._meta.db_table} c "  # noqa: S608  # no stranger's text
+        f"WHERE c.id = {key} AND c.removing_at IS NOT NULL)"
+    )
 
 
 def _same(model: type[AppendOnlyModel], but: tuple[str, ...]) -> str:

@@ -23,7 +23,8 @@ from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed
-from rehab.people.audit.sealing import ERASED, SealableModel, is_cut
+from rehab.people.audit.moves import Translate, translate_json
+from rehab.people.audit.sealing import ERASED, SealableModel, is_cut, plain
 from rehab.people.field_policy import policies_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
@@ -128,6 +129,33 @@ class HistoryEntry(SealableModel):
     def is_emptied(self) -> bool:
         """Whether it has no values."""
         return not any(self.changes.values())
+
+    def sealed_values(self, original: Translate) -> dict[str, Any]:
+        """Return the sealed values by name, also those within the changes by their first keys."""
+        number, changes = translate_entry(self.model_name, self.object_id, self.changes, original)
+        values = super().sealed_values(original)
+        return values | {"object_id": number, "changes": plain(changes)}
+
+
+def translate_entry(
+    model_name: str, number: int, changes: dict[str, Any], translate: Translate
+) -> tuple[int, dict[str, Any]]:
+    """Return an entry's row and changes with the keys in them translated."""
+    model = next((one for one in _tracked if one.__name__ == model_name), None)
+    if model is None:
+        return number, changes
+    relations = {
+        field.name: field.related_model
+        for field in (*model._meta.concrete_fields, *model._meta.many_to_many)
+        if field.is_relation
+    }
+    translated = {
+        name: translate_json(pair, partial(translate, relations[name]))
+        if name in relations
+        else pair
+        for name, pair in changes.items()
+    }
+    return translate(model, number), translated
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.db import models
 
 from rehab.people.append_only import AppendOnlyModel
+from rehab.people.audit.moves import Translate, same_key
 
 ERASED = "NEW.erased AND NEW.salt = ''"
 
@@ -57,26 +58,51 @@ class SealableModel(AppendOnlyModel):
         self.salt = secrets.token_hex(16)
         self.digest = self.compute_digest()
 
-    def compute_digest(self) -> str:
-        """Return the digest of the salt and the sealed values as they are."""
-        fields: list[Any] = [self._meta.get_field(name) for name in self.sealed_fields]
-        values = {field.name: _plain(getattr(self, field.attname)) for field in fields}
-        text = json.dumps(values, sort_keys=True, ensure_ascii=False)
+    def compute_digest(self, original: Translate = same_key) -> str:
+        """Return the digest of the salt and the sealed values as they are.
+
+        ``original`` leads to the keys that rows had when this one was added.
+        """
+        text = json.dumps(self.sealed_values(original), sort_keys=True, ensure_ascii=False)
         return hashlib.sha256(f"{self.salt}\n{text}".encode()).hexdigest()
+
+    def sealed_values(self, original: Translate) -> dict[str, Any]:
+        """Return the sealed values by name, as every database gives them back."""
+        values: dict[str, Any] = {}
+        for name in self.sealed_fields:
+            field: Any = self._meta.get_field(name)
+            value = getattr(self, field.attname)
+            if field.is_relation and value is not None:
+                value = original(field.related_model, value)
+            values[name] = plain(value)
+        return values
 
     @property
     def is_emptied(self) -> bool:
         """Whether nothing is left of what an erasure empties."""
         return False
 
-    @property
-    def is_genuine(self) -> bool:
-        """Whether the row is as it was added, or as an erasure left it."""
-        return self.is_emptied if self.erased else self.compute_digest() == self.digest
+    def is_genuine(self, original: Translate = same_key) -> bool:
+        """Return whether the row is as it was added, or as an erasure left it."""
+        return self.is_emptied if self.erased else self.compute_digest(original) == self.digest
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return a value as every database gives it back."""
     if isinstance(value, datetime):
         return value.astimezone(UTC).isoformat(timespec="microseconds")
     return json.loads(json.dumps(value, cls=DjangoJSONEncoder))
+
+
+def with_floats(value: Any) -> Any:
+    """Return stored values with all numbers as floats: databases write them in different ways."""
+    match value:
+        case bool() | None | str():
+            return value
+        case int() | float():
+            return float(value) + 0.0  # no negative zero
+        case dict():
+            return {key: with_floats(each) for key, each in value.items()}
+        case list() | tuple():
+            return [with_floats(each) for each in value]
+    return value

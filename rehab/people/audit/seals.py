@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from itertools import takewhile
 from typing import Any, ClassVar
 
 from django.apps import apps
-from django.db import IntegrityError, models, transaction
+from django.db import IntegrityError, connection, models, transaction
 from django.db.models import F, Q
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed, AppendOnlyModel
+from rehab.people.audit.moves import Translate, moves_of, original_keys, same_key
 from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic
 from rehab.people.scope import Scope
@@ -41,6 +42,7 @@ class LogSeal(AppendOnlyModel):
     log = models.CharField(max_length=16)
     clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="+", null=True)
     number = models.PositiveIntegerField()
+    moves = models.PositiveIntegerField(default=0)  # that the clinic had made when it was sealed
     first_id = models.BigIntegerField()
     last_id = models.BigIntegerField()
     last_at = models.DateTimeField()
@@ -69,10 +71,14 @@ class LogSeal(AppendOnlyModel):
         rows = rows_of(self.log, self.clinic_id)
         return rows.filter(pk__range=(self.first_id, self.last_id))
 
-    def compute_digest(self, rows: Iterable[Any]) -> str:
+    def compute_digest(self, rows: Iterable[Any], original: Translate = same_key) -> str:
         """Return the digest of these rows behind the previous seal."""
-        head = f"{self.previous}\n{self.log}\n{self.clinic_id}\n{self.number}\n"
-        lines = (f"{row.pk} {getattr(row, 'count', 1)} {row.digest}\n" for row in rows)
+        clinic = None if self.clinic_id is None else original(Clinic, self.clinic_id)
+        head = f"{self.previous}\n{self.log}\n{clinic}\n{self.number}\n"
+        lines = (
+            f"{original(type(row), row.pk)} {getattr(row, 'count', 1)} {row.digest}\n"
+            for row in rows
+        )
         return hashlib.sha256((head + "".join(lines)).encode()).hexdigest()
 
 
@@ -122,6 +128,18 @@ def seal_logs(now: datetime) -> int:
     return sealed
 
 
+def seal_at_once(clinic_id: int, now: datetime) -> None:
+    """Seal all rows of a clinic's logs, also the newest; who adds one meanwhile waits."""
+    with transaction.atomic(), connection.cursor() as cursor:
+        if connection.vendor == "postgresql":
+            logs: list[type[Any]] = [*sealed_models().values(), LogSeal]
+            tables = [model._meta.db_table for model in logs]
+            cursor.execute(f"LOCK TABLE {', '.join(tables)} IN SHARE ROW EXCLUSIVE MODE")
+        for log in sealed_models():
+            while _seal_batch(log, clinic_id, datetime.max.replace(tzinfo=UTC), now):
+                pass
+
+
 def _seal_batch(log: str, clinic_id: int | None, until: datetime, now: datetime) -> int:
     """Seal a chain's next rows from before a moment, of one day at most. Return how many.
 
@@ -138,6 +156,7 @@ def _seal_batch(log: str, clinic_id: int | None, until: datetime, now: datetime)
         log=log,
         clinic_id=clinic_id,
         number=last.number + 1 if last else 1,
+        moves=len(moves_of(clinic_id)),
         first_id=batch[0].pk,
         last_id=batch[-1].pk,
         last_at=max(row.at for row in batch),
@@ -172,7 +191,7 @@ def find_broken() -> Iterator[str]:
 def find_broken_of(log: str, clinic_id: int | None) -> Iterator[str]:
     """Yield what is wrong with a clinic's log."""
     of = f"{log}, clinic {clinic_id or 'none'}"
-    previous, number = "", 0
+    previous, number, moves = "", 0, moves_of(clinic_id)
     for seal in seals_of(log, clinic_id):
         where = f"{of}, rows {seal.first_id} to {seal.last_id}"
         if (seal.previous, seal.number) != (previous, number + 1):
@@ -180,15 +199,17 @@ def find_broken_of(log: str, clinic_id: int | None) -> Iterator[str]:
         previous, number = seal.digest, seal.number
         if seal.cut_at is not None:
             continue
-        rows = list(seal.rows())
-        if seal.compute_digest(rows) != seal.digest:
+        rows, original = list(seal.rows()), original_keys(moves, seal.moves)
+        if seal.compute_digest(rows, original) != seal.digest:
             yield f"{where}: rows were added, removed or counted anew"
-        yield from _find_changed(where, rows)
-    yield from _find_changed(f"{of}, not sealed yet", unsealed_rows(log, clinic_id).iterator())
+        yield from _find_changed(where, rows, original)
+    unsealed = unsealed_rows(log, clinic_id).iterator()
+    yield from _find_changed(f"{of}, not sealed yet", unsealed, same_key)
 
 
-def _find_changed(where: str, rows: Iterable[Any]) -> Iterator[str]:
-    yield from (f"{where}: row {row.pk} was changed" for row in rows if not row.is_genuine)
+def _find_changed(where: str, rows: Iterable[Any], original: Translate) -> Iterator[str]:
+    changed = (row for row in rows if not row.is_genuine(original))
+    yield from (f"{where}: row {row.pk} was changed" for row in changed)
 
 
 def count_unsealed(before: datetime) -> int:

@@ -98,6 +98,8 @@ class Clinic(ScopedModel):
         help_text=_("How long it is kept who looked at, changed and took out what."),
     )
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)
+    # Since then its rows may be deleted, also those that are only added otherwise.
+    removing_at = models.DateTimeField(null=True, editable=False)
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("clinic")

@@ -9,15 +9,19 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from channels.db import database_sync_to_async
+from django.db.models import Q
 from django.utils import timezone
 
 from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
+from rehab.sessions.live.database import owners
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
 from rehab.sessions.live.session.instruments import LATE_S
+from rehab.sessions.ownership import ClinicOwner
+from rehab.sessions.seals import PAUSE_S, seal_sessions
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
@@ -130,6 +134,10 @@ class Routines:
 
     async def _seal_logs(self) -> None:
         await database_sync_to_async(seal_logs)(timezone.now())
+        mine = Q(clinic__in=ClinicOwner.everywhere.filter(owner__in=("", owners.own_name())))
+        # In a thread apart: it pauses between batches, and pages must not wait for it.
+        seal = database_sync_to_async(seal_sessions, thread_sensitive=False)
+        await seal(timezone.now(), mine, PAUSE_S)
 
     async def check_sign_ins(self) -> None:
         """Extend sign-ins at a running session; close sockets that are no longer authorized.

@@ -110,8 +110,7 @@ def add_app(user: User, secret: str, code: str, now: datetime) -> list[str] | No
     if time_step is None:
         return None
     kind = Authenticator.Kind.APP
-    encrypted = _cipher().encrypt(secret.encode()).decode()
-    return add_authenticator(user, kind, str(kind.label), encrypted, time_step)
+    return add_authenticator(user, kind, str(kind.label), close_secret(secret), time_step)
 
 
 def remove_authenticator(user: User, authenticator_id: int) -> bool:
@@ -157,7 +156,7 @@ def verify_code(user: User, code: str, now: datetime) -> bool:
     """Return whether a code, of an app or for recovery, signs an account in. Each does so once."""
     for app in authenticators_of(user).filter(kind=Authenticator.Kind.APP):
         try:
-            secret = _cipher().decrypt(app.credential).decode()
+            secret = open_secret(app.credential)
         except InvalidToken:  # the server's secret key has changed; recovery codes still work
             continue
         time_step = matching_time_step(secret, code, now.timestamp())
@@ -166,6 +165,16 @@ def verify_code(user: User, code: str, now: datetime) -> bool:
     typed = hash_code(code, user.pk, user.date_joined)
     used, _ = RecoveryCode.everywhere.filter(user=user, code_hash=typed).delete()
     return bool(used)
+
+
+def open_secret(encrypted: str) -> str:
+    """Return an app's secret. Raises InvalidToken where the server has another key now."""
+    return _cipher().decrypt(encrypted).decode()
+
+
+def close_secret(secret: str) -> str:
+    """Return an app's secret, encrypted with the server's own key."""
+    return _cipher().encrypt(secret.encode()).decode()
 
 
 def _cipher() -> Fernet:

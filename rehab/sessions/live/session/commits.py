@@ -120,6 +120,9 @@ def commit(jobs: Sequence[Job]) -> None:
         if events:
             SessionEvent.everywhere.bulk_create(events)
             _note_robot_orders(events)
+            after_end = {event.session_id for event in events if event.session.ended_at}
+            if after_end:  # they may be sealed to their end already
+                TrainingSession.everywhere.filter(pk__in=after_end).update(unsealed=True)
         metrics = [row for job in jobs for row in job.rows if isinstance(row, SessionMetric)]
         if metrics:
             SessionMetric.everywhere.bulk_create(metrics)

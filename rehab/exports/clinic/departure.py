@@ -1,0 +1,186 @@
+"""Removes a clinic from this installation, with a certificate of what is gone."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from typing import Any
+
+from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
+from django.core.serializers.json import DjangoJSONEncoder
+from django.db import transaction
+from django.utils import timezone
+
+from rehab.exports.clinic.rows import CannotMove, ClinicRows
+from rehab.exports.clinic.sealed_file import (
+    Content,
+    check_no_session_runs,
+    recordings_of,
+    seal_everything,
+)
+from rehab.exports.clinic.tables import clinic_paths, removed_models
+from rehab.people.audit import audit_log, seals
+from rehab.people.audit.audit_log import Act
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
+from rehab.sessions import seals as session_seals
+from rehab.sessions.live.database import owners
+from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Device
+
+BATCH_ROWS = 1000
+LEAVES_WITHIN_S = 90.0  # until servers have closed the sockets of accounts and devices
+# What only says how the server is used: it grows by being looked at.
+GROWS = {"auditentry", "logseal", "sessionseal", "user", "device", "apitoken", "familylink"}
+
+
+def remove_clinic(
+    clinic: Clinic, content: Content | None, by: str, now: datetime, *, wait_s: float
+) -> dict[str, Any]:
+    """Remove a clinic and all that is its; return the certificate.
+
+    ``content``: of the file that it leaves with; None: its data is to be destroyed. Raises
+    CannotMove while sessions run, where the file is not of this clinic as it is, and where servers
+    do not let it go.
+    """
+    check_no_session_runs(clinic)
+    _read_all(clinic, content, now)  # first, so that nobody is shut out in vain
+    with _shut(clinic, now):
+        _wait_for_servers(clinic, wait_s)
+        check_no_session_runs(clinic)
+        rows = _read_all(clinic, content, now)
+    certificate = {
+        "certificate": "This clinic was removed from this installation of GARRY.",
+        "clinic": clinic.name,
+        "removed_at": now,
+        "by": by,
+        "left_with_file": content.header["file"] if content else None,
+        "rows": rows.counts,
+        "digests_of_rows": rows.digests,
+        "last_seals": last_seals(clinic.pk),
+        "recordings": _delete_recordings(clinic),
+        "not_in_here": "Backups from before hold it until they are deleted: see docs/hosting.md.",
+    }
+    name = clinic.name
+    certificate["deleted"] = delete_rows(clinic.pk)
+    text = json.dumps(certificate, cls=DjangoJSONEncoder, indent=1, ensure_ascii=False)
+    digest = hashlib.sha256(f"{text}\n".encode()).hexdigest()
+    audit_log.record(
+        Act.CLINIC_OUT, None, about=f"{name[:100]}: {by[:30]}, certificate {digest}", now=now
+    )
+    return {"text": f"{text}\n", "digest": digest}
+
+
+def _read_all(clinic: Clinic, content: Content | None, now: datetime) -> ClinicRows:
+    """Return all rows with counts and digests. Raises CannotMove where the file has others."""
+    seal_everything(clinic, now)
+    rows = ClinicRows(clinic.pk, with_tokens=content is not None and content.header["tokens"])
+    for _ in rows.lines():
+        pass
+    if content is not None:
+        compare_with_file(clinic, content, rows.digests)
+    return rows
+
+
+@contextmanager
+def _shut(clinic: Clinic, now: datetime) -> Iterator[None]:
+    """End all sign-ins and tokens of a clinic's people and devices, for good unless this fails."""
+    people = User.everywhere.filter(clinic=clinic, is_active=True)
+    devices = Device.everywhere.filter(clinic=clinic, revoked_at=None)
+    keys = [list(rows.values_list("pk", flat=True)) for rows in (people, devices)]
+    with transaction.atomic():
+        people.update(is_active=False)
+        devices.update(revoked_at=now)
+    try:
+        yield
+    except BaseException:
+        with transaction.atomic():
+            User.everywhere.filter(pk__in=keys[0]).update(is_active=True)
+            Device.everywhere.filter(pk__in=keys[1]).update(revoked_at=None)
+        owners.release([clinic.pk])
+        raise
+
+
+def _wait_for_servers(clinic: Clinic, wait_s: float) -> None:
+    """Own the clinic, so that no server writes to it any more. Raises CannotMove."""
+    until_s = time.monotonic() + wait_s
+    while True:
+        try:
+            owners.claim(clinic.pk)
+            return
+        except owners.OwnedElsewhere as problem:
+            if time.monotonic() > until_s:
+                raise CannotMove(
+                    f"A server still has {clinic}, though nobody could sign in meanwhile. Restart "
+                    "the server, then run this again."
+                ) from problem
+            time.sleep(0.5)
+
+
+def compare_with_file(clinic: Clinic, content: Content, found: dict[str, str]) -> None:
+    """Raise CannotMove where a file is not of a clinic as it is now."""
+    differing = [
+        label.removeprefix("rehab.")
+        for label, digest in content.digests.items()
+        if found[label] != digest and label.removeprefix("rehab.") not in GROWS
+    ]
+    if differing:
+        raise CannotMove(
+            f"{clinic} is not as the file has it ({', '.join(differing)}): it was changed since, "
+            "or the file is of another one. Export it again."
+        )
+
+
+def last_seals(clinic_id: int) -> dict[str, str]:
+    """Return the digest at the end of each chain of a clinic."""
+    found: dict[str, Any] = {
+        log: seals.seals_of(log, clinic_id).last() for log in seals.sealed_models()
+    }
+    found["steps and events"] = session_seals.last_seal(clinic_id)
+    return {log: seal.digest for log, seal in found.items() if seal is not None}
+
+
+def _delete_recordings(clinic: Clinic) -> list[str]:
+    """Delete the recordings that only this clinic's sessions name; return their names."""
+    gone = []
+    for path in recordings_of(clinic):
+        others = TrainingSession.everywhere.exclude(clinic=clinic)
+        if not others.filter(source=f"recording {path.name}").exists():
+            path.unlink(missing_ok=True)
+            gone.append(path.name)
+    return gone
+
+
+def delete_rows(clinic_id: int) -> dict[str, int]:
+    """Delete all rows of a clinic, in small transactions; return how many of each model."""
+    # From here on the database lets rows go that are only added otherwise.
+    Clinic.everywhere.filter(pk=clinic_id).update(removing_at=timezone.now())
+    _hand_accounts_on(clinic_id)
+    deleted: dict[str, int] = {}
+    for model in removed_models():
+        mine, count = model._base_manager.filter(**{clinic_paths()[model]: clinic_id}), 0
+        while keys := list(mine.order_by("pk").values_list("pk", flat=True)[:BATCH_ROWS]):
+            some = model._base_manager.filter(pk__in=keys)
+            with transaction.atomic():
+                count += some._raw_delete(some.db)  # noqa: SLF001
+        deleted[model._meta.label_lower] = count
+    return deleted
+
+
+def _hand_accounts_on(clinic_id: int) -> None:
+    """Leave accounts that did something elsewhere there, where the log names them: shut."""
+    for model, path in clinic_paths().items():
+        for one in model._meta.concrete_fields:
+            if one.related_model is not User:
+                continue
+            elsewhere = model._base_manager.filter(**{f"{one.name}__clinic": clinic_id})
+            elsewhere = elsewhere.exclude(**{path: clinic_id}).order_by()
+            for account, other in elsewhere.values_list(one.attname, path).distinct():
+                role = {"role": Role.HOST} if other is None else {}
+                User.everywhere.filter(pk=account).update(
+                    clinic_id=other, is_active=False, password=UNUSABLE_PASSWORD_PREFIX, **role
+                )

@@ -1,0 +1,164 @@
+"""`manage.py clinic export | import | remove | verify`: a clinic as a unit that moves."""
+
+from __future__ import annotations
+
+import getpass
+import os
+from argparse import ArgumentParser
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from django.conf import settings
+from django.core.management import BaseCommand, CommandError
+from django.utils import timezone
+
+from rehab.exports.clinic.arrival import import_clinic
+from rehab.exports.clinic.departure import LEAVES_WITHIN_S, compare_with_file, remove_clinic
+from rehab.exports.clinic.rows import CannotMove, ClinicRows
+from rehab.exports.clinic.sealed_file import inspect, write_clinic
+from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities, read_recipients
+from rehab.management.new_file import new_file
+from rehab.people.audit import audit_log, seals
+from rehab.people.audit.audit_log import Act
+from rehab.people.models import Clinic
+from rehab.sessions import seals as session_seals
+
+
+class Command(BaseCommand):
+    """Takes a clinic out, in, away, or compares it."""
+
+    help = "Export, import, remove or verify one clinic."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the subcommands."""
+        parts = parser.add_subparsers(dest="part", required=True)
+        out = parts.add_parser("export", help="write a clinic into FILE, encrypted")
+        out.add_argument("clinic", help="its name")
+        out.add_argument("file", type=Path, metavar="FILE")
+        out.add_argument("--to", action="append", metavar="KEY", help="age1…, of who takes it in")
+        tokens = "with tokens of devices, programs and families; else they need new ones"
+        out.add_argument("--tokens", action="store_true", help=tokens)
+        into = parts.add_parser("import", help="take in the clinic of FILE")
+        into.add_argument("file", type=Path, metavar="FILE")
+        into.add_argument("--key", type=Path, required=True, metavar="KEYFILE")
+        into.add_argument("--name", default="", help="of the clinic here, if it is to be another")
+        away = parts.add_parser("remove", help="remove a clinic, once it is in FILE")
+        away.add_argument("clinic", help="its name")
+        away.add_argument("certificate", type=Path, help="where to write what is gone")
+        away.add_argument("--file", type=Path, metavar="FILE")
+        away.add_argument("--key", type=Path, metavar="KEYFILE")
+        away.add_argument("--destroy", action="store_true", help="without a file: all is lost")
+        check = parts.add_parser("verify", help="compare a clinic with its seals, and with FILE")
+        check.add_argument("clinic", help="its name")
+        check.add_argument("--file", type=Path, metavar="FILE")
+        check.add_argument("--key", type=Path, metavar="KEYFILE")
+
+    def handle(self, *args: Any, part: str, **options: Any) -> None:
+        """Run a subcommand. Raises CommandError, with the cure."""
+        try:
+            getattr(self, f"_{part}")(**options)
+        except CannotDecrypt as problem:
+            raise CommandError(f"{options['file']} cannot be read. {problem}") from problem
+        except (CannotMove, InvalidKey) as problem:
+            raise CommandError(str(problem)) from problem
+
+    def _export(
+        self, clinic: str, file: Path, to: list[str] | None, tokens: bool, **_: Any
+    ) -> None:
+        one, now = _find(clinic), timezone.now()
+        recipients = read_recipients(to or settings.BACKUP_KEYS)
+        about = f"manage.py clinic export, to {', '.join(to or settings.BACKUP_KEYS)}"
+        audit_log.record(Act.EXPORT, None, clinic_id=one.pk, about=about, now=now)
+        with new_file(file) as out:
+            rows = write_clinic(one, out, recipients, now, with_tokens=tokens)
+        self._tell(f"{file}: {one}", rows.counts)
+
+    def _import(self, file: Path, key: Path, name: str, **_: Any) -> None:
+        os.nice(10)  # sessions of other clinics go first
+        with _opened(file) as opened:
+            log = self.stdout.write
+            clinic = import_clinic(opened, _keys(key), timezone.now(), name=name, log=log)
+        self._tell(f"{clinic} is here and as the file says", ClinicRows(clinic.pk).count())
+        self.stdout.write(
+            "Passwords and authenticator apps go on; recovery codes do not, and passkeys at the "
+            "same address alone. Give devices new tokens, unless it was exported with --tokens."
+        )
+
+    def _remove(
+        self,
+        clinic: str,
+        certificate: Path,
+        file: Path | None,
+        key: Path | None,
+        destroy: bool,
+        **_: Any,
+    ) -> None:
+        one, content = _find(clinic), None
+        if file is None and not destroy:
+            raise CommandError("Name the file that it leaves with: --file FILE --key KEYFILE.")
+        if file is not None:
+            with _opened(file) as opened:
+                content = inspect(opened, _keys(key))
+        if certificate.exists():
+            raise CommandError(f"{certificate} is there already. Name another file.")
+        by = f"{getpass.getuser()}, server console"
+        with new_file(certificate) as out:  # first: a place that cannot be written costs nothing
+            gone = remove_clinic(one, content, by, timezone.now(), wait_s=LEAVES_WITHIN_S)
+            out.write(gone["text"].encode())
+        self.stdout.write(f"{clinic} is gone. {certificate}: SHA-256 {gone['digest']}.")
+
+    def _verify(self, clinic: str, file: Path | None, key: Path | None, **_: Any) -> None:
+        one = _find(clinic)
+        broken = list(session_seals.find_broken_of(one.pk))
+        for log in seals.sealed_models():
+            broken += seals.find_broken_of(log, one.pk)
+        for problem in broken[:20]:
+            self.stderr.write(problem)
+        if broken:
+            raise CommandError(
+                f"{len(broken)} are not as they were sealed. Compare with a backup from before, "
+                "and find out who was there."
+            )
+        if file is not None:
+            with _opened(file) as opened:
+                content = inspect(opened, _keys(key))
+            move = one.moves.filter(file=content.header["file"]).first()
+            rows = ClinicRows(one.pk, content.header["tokens"], move)
+            compare_with_file(one, content, rows.digest())
+        self._tell(f"{one} is as it was sealed", ClinicRows(one.pk).count())
+
+    def _tell(self, what: str, counts: dict[str, int]) -> None:
+        names = {"patient": "patients", "trainingsession": "sessions", "step": "steps"}
+        told = ", ".join(f"{counts[f'rehab.{name}']} {word}" for name, word in names.items())
+        self.stdout.write(f"{what}: {told}.")
+
+
+def _find(name: str) -> Clinic:
+    clinic = Clinic.everywhere.filter(name=name).first()
+    if clinic is None:
+        names = ", ".join(Clinic.everywhere.values_list("name", flat=True)) or "none"
+        raise CommandError(f"There is no clinic {name}. Clinics here: {names}.")
+    return clinic
+
+
+def _keys(path: Path | None) -> Any:
+    if path is None:
+        raise CommandError("Name the file with the secret key: --key KEYFILE.")
+    try:
+        return read_identities(path.read_text())
+    except OSError as problem:
+        raise CommandError(f"{path} cannot be read: {problem.strerror}.") from problem
+    except ValueError as problem:  # InvalidKey, or no text at all
+        raise CommandError(f"{path} holds no key. {problem}") from problem
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    try:
+        opened = path.open("rb")
+    except OSError as problem:
+        raise CommandError(f"{path} cannot be read: {problem.strerror}.") from problem
+    with opened:
+        yield opened
