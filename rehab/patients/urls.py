@@ -2,10 +2,11 @@
 
 from django.urls import path
 
-from rehab.patients.pages import ending, family, first_steps, records, start, visits
+from rehab.patients.pages import caseload, ending, family, first_steps, records, start, visits
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
+    path("caseload/", caseload.show_caseload, name="caseload"),
     path("first-steps/", first_steps.first_steps, name="first-steps"),
     path("first-steps/state/", first_steps.first_steps_state, name="first-steps-state"),
     path("patients/new/", start.add_patient, name="new-patient"),

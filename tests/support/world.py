@@ -38,6 +38,7 @@ from rehab.sessions.live.session.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
+from rehab.sessions.assessments import Assessment
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
@@ -369,6 +370,9 @@ def build_world(name: str) -> World:
             token_hash=f"family-{name}",
             created_at=NOW,
             expires_at=NOW,
+        ),
+        Assessment.everywhere.create(
+            clinic=clinic, patient=patient, test="tug", value=17.5, device=mark(name, Assessment)
         ),
         Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
