@@ -52,6 +52,10 @@ def _metric_column(slug: str, label: str, unit: str) -> Column:
     return Column.number(slug, unit, f"{label} of the session.", lambda row: row.metrics.get(slug))
 
 
+def _condition_column(name: str, kind: Remark, unit: str, meaning: str) -> Column:
+    return Column.number(name, unit, meaning, lambda row: row.conditions.get(kind))
+
+
 def _option_column(option: Option, column: OptionColumn) -> Column:
     """Return the column of a set-up option, in the unit of the plan."""
     types = {bool: Type.BOOLEAN, int: Type.INTEGER, float: Type.NUMBER}
@@ -88,7 +92,7 @@ CONDITIONS = tuple(
 )
 # How the patient walked, weighted by the steps that each condition held for.
 WALKED = tuple(
-    Column.number(name, unit, meaning, lambda row, kind=kind: row.conditions.get(kind))
+    _condition_column(name, kind, unit, meaning)
     for name, kind, unit, meaning in (
         ("mean_belt_speed", Remark.BELT_SPEED, "m/s", "Mean speed of the belt over the steps."),
         ("mean_weight_support", Remark.WEIGHT_SUPPORT, "%", "Mean support over the steps."),

@@ -157,5 +157,5 @@ def _to_case(patient: Patient, walks: Sequence[Walk], visits: Sequence[Visit], t
         sum(walk.day > today - COMING for walk in walks),
         coming,
         missed,
-        judge(walks, coming and coming.day, missed, today),
+        judge(walks, coming.day if coming else None, missed, today),
     )

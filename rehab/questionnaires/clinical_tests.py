@@ -68,8 +68,8 @@ class ClinicalTest:
 
     def check(self, value: float) -> None:
         """Raise InvalidSetting for a result that this test does not have."""
-        whole = self.way is not Way.SCORE or value == int(value)
-        if not (isfinite(value) and self.least <= value <= self.most and whole):
+        whole = self.way is not Way.SCORE or (isfinite(value) and value == int(value))
+        if not (whole and self.least <= value <= self.most):
             raise InvalidSetting(
                 "Results of this test lie between {least:g} and {most:g} {unit}. Check what was "
                 "measured.",

@@ -82,15 +82,15 @@ def summarize_conditions(
         marks[kind].append((0, value))
     highest: dict[str, float] = {}
     for event in events:
-        kind, value = event.kind, event.value
-        if value is None:
+        kind, noted = event.kind, event.value
+        if noted is None:
             continue
         if kind in RATED:
-            highest[kind] = max(value, highest.get(kind, value))
+            highest[kind] = max(noted, highest.get(kind, noted))
         elif kind in CONDITIONS:
             if kind in ASSISTANCE and not marks[kind]:
                 marks[kind].append((0, 0.0))  # until now without it
-            marks[kind].append((event.after_number, value))
+            marks[kind].append((event.after_number, noted))
     means = {kind: _mean_over_steps(held, session.last_number) for kind, held in marks.items()}
     return {kind: mean for kind, mean in means.items() if mean is not None} | highest
 

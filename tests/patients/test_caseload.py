@@ -8,10 +8,11 @@ import pytest
 
 from rehab.patients.caseload import Walk, judge, load_caseload
 from rehab.patients.visits import Visit, plan_visit
+from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from tests.support.walks import HIT, walk
-from tests.support.world import NOW, client_of, make_world
+from tests.support.world import NOW, build_world, client_of
 
 TODAY = date(2026, 11, 21)
 
@@ -47,14 +48,16 @@ def test_flags(newest_first, next_day, missed, flags):
 
 @pytest.mark.django_db
 def test_the_page_lists_patients_of_this_clinic_alone(world):
-    other = make_world("cobalt")
+    other = build_world("cobalt")
     TrainingSession.everywhere.filter(patient=world.patient).update(
         simulated=False, active_s=60, created_at=NOW - timedelta(9), started_at=None
     )
     Visit.everywhere.all().delete()
     now = clinic_time(NOW, world.clinic)
     plan_visit(world.patient, now.date() - timedelta(2), None)
-    (case,) = [case for case in load_caseload(world.pt, now) if case.patient == world.patient]
+    (case,) = [
+        case for case in load_caseload(world.people[Role.PT], now) if case.patient == world.patient
+    ]
     assert case.missed == now.date() - timedelta(2)
     page = client_of(world).get("/caseload/?only=due").content.decode()
     assert world.patient.nickname in page
@@ -62,6 +65,8 @@ def test_the_page_lists_patients_of_this_clinic_alone(world):
     assert other.patient.nickname not in page
     walk(world.patient, "positive", [HIT, HIT])
     TrainingSession.everywhere.filter(patient=world.patient).update(simulated=False, active_s=60)
-    (case,) = [case for case in load_caseload(world.pt, now) if case.patient == world.patient]
+    (case,) = [
+        case for case in load_caseload(world.people[Role.PT], now) if case.patient == world.patient
+    ]
     assert case.missed is None
     assert client_of(world).get("/caseload/?only=nonsense").status_code == 200

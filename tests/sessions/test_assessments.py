@@ -10,7 +10,7 @@ from rehab.exports.research.fhir import make_bundle
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment, assessments_with, load_courses
 from tests.support.walks import HIT, make_session, walk
-from tests.support.world import NOW, client_of, make_world
+from tests.support.world import NOW, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -41,7 +41,7 @@ def test_a_result_is_stored_as_measured(world, slug, data, value):
     assert page.redirect_chain[-1][0] == f"/patients/{world.patient.pk}/tests/"
     (row,) = Assessment.everywhere.all()
     assert (row.test, row.value) == (slug, pytest.approx(value))
-    assert (row.device, row.by) == (data.get("device", ""), world.pt)
+    assert (row.device, row.by) == (data.get("device", ""), world.people[Role.PT])
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_course_leaves_out_what_was_struck_out(world):
     wrong = Assessment.everywhere.get(value=99)
     client = client_of(world)
     client.post(f"/patients/{world.patient.pk}/tests/strike-out/", {"result": wrong.pk})
-    (course,) = [c for c in load_courses(world.pt, world.patient) if c.results]
+    (course,) = [c for c in load_courses(world.people[Role.PT], world.patient) if c.results]
     assert (course.summary, course.verdict) == ("28.0 s, at first 31.0 s", 1)
     assert course.spark == "4.0,28.0 116.0,4.0"
     wrong.refresh_from_db()
@@ -81,7 +81,7 @@ def test_a_course_leaves_out_what_was_struck_out(world):
 
 def test_another_clinic_neither_sees_nor_strikes_out(world):
     take(world, "tug", measured="31")
-    row, other = Assessment.everywhere.get(), make_world("cobalt")
+    row, other = Assessment.everywhere.get(), build_world("cobalt")
     stranger = client_of(other)
     address = f"/patients/{world.patient.pk}/tests/"
     assert stranger.get(address).status_code == 404
@@ -112,7 +112,8 @@ def test_each_result_goes_with_one_session(world):
             at=NOW - timedelta(days=days_ago, hours=1),
         )
     values = [
-        [row.value for row in assessments_with(world.pt, session)] for session in (first, later)
+        [row.value for row in assessments_with(world.people[Role.PT], session)]
+        for session in (first, later)
     ]
     assert values == [[230, 220, 212], [205, 200]]
 
@@ -123,7 +124,7 @@ def test_fhir_has_it_with_its_loinc_code(world):
         Assessment.everywhere.create(
             clinic=world.clinic, patient=world.patient, test=test, value=value, at=NOW
         )
-    bundle = make_bundle(world.pt, session, timedelta())
+    bundle = make_bundle(world.people[Role.PT], session, timedelta())
     found = {
         code["code"]: entry["resource"]
         for entry in bundle["entry"]

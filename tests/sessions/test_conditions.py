@@ -1,11 +1,11 @@
-"""How a patient walks: what a treadmill reports, what holds for how many steps, where it is read."""
+"""How a patient walks: what a treadmill reports, and what holds for how many steps."""
 
 from __future__ import annotations
 
 import pytest
 
 from rehab.sessions.conditions import find_reported, format_noted, summarize_conditions
-from rehab.sessions.log import Remark, SessionEvent
+from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.insight import Walked, compare
 from tests.support.world import NOW
@@ -82,23 +82,3 @@ def test_sessions_are_compared_by_what_they_were_walked_with(world):
         "handrail": 1,
         "without help, as far as noted": 3,
     }
-
-
-async def test_a_reported_speed_is_a_mark_and_holds_after_a_restart(place, begun):
-    session = await begun(place)
-    monitor = await place.monitor(session).open()
-    source = await place.source().open()
-    await source.hear("welcome")
-    for number, speed in enumerate((0.8, 0.81, 1.0), 1):
-        step = {"number": number, "time_s": number * 1.1, "side": "left", "value": 4.0}
-        await source.say({"type": "steps", "steps": [step | {"extra": {"belt_speed_m_s": speed}}]})
-    await monitor.until_step(3)
-    marks = [event for event in monitor.events if event["kind"] == "remark"]
-    assert [(one["what"], one["value"], one["number"]) for one in marks] == [
-        ("belt_speed", 0.8, 1),
-        ("belt_speed", 1.0, 3),
-    ]
-    snapshot = await place.monitor(session).watch()
-    assert snapshot["conditions"] == {"belt_speed": 1.0}
-    rows = SessionEvent.everywhere.filter(session=session, kind=Remark.BELT_SPEED)
-    assert [row.by_id async for row in rows] == [None, None]

@@ -31,6 +31,7 @@ from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item
+from rehab.sessions.assessments import Assessment
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
@@ -38,7 +39,6 @@ from rehab.sessions.live.session.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
-from rehab.sessions.assessments import Assessment
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset

@@ -50,9 +50,9 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     except InvalidVisitDay as problem:
         messages.error(request, str(problem))
     else:
-        days = [day + timedelta(weeks=each) for each in range(weeks)]
-        visits_planned = [plan_visit(patient, each, at) for each in days]
-        visit = visits_planned[0]
+        visit, *_later = [
+            plan_visit(patient, day + timedelta(weeks=week), at) for week in range(weeks)
+        ]
         when = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
         names = {"name": patient.nickname, "when": when, "count": weeks}
         message = ngettext(

@@ -19,7 +19,7 @@ from rehab.sessions.formatting import (
     format_quantity,
     format_significant,
 )
-from rehab.sessions.log import EVENTS, REMARK_RANGES, Remark, RobotEntry, SessionEvent, Step
+from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.noted import ADVERSE, read_noted
@@ -118,9 +118,11 @@ def _summarize_remarks(
 ) -> list[dict[str, Any]]:
     """Return each kind of remark with its times and values, adverse ones first."""
     times: defaultdict[Remark, list[str]] = defaultdict(list)
+    with_value: set[Remark] = set()
     for one in read_noted(events):
         text = f"{clinic_time(one.at, session.clinic):%H:%M}"
         if value := format_noted(one.kind, one.value):
+            with_value.add(one.kind)
             text = f"{value} ({text})"
         elif one.severity is not None:
             text = f"{text} ({one.severity.label})"
@@ -129,7 +131,7 @@ def _summarize_remarks(
     return [
         {
             "name": capfirst(EVENTS[kind]),
-            "count": 0 if kind in REMARK_RANGES else len(times[kind]),
+            "count": 0 if kind in with_value else len(times[kind]),
             "times": _join(times[kind]),
             "adverse": kind in ADVERSE,
         }

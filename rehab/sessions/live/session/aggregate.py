@@ -79,8 +79,9 @@ class SessionAggregate:
         alarms = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS)
         aggregate.alarms = OpenAlarms(alarms.order_by("pk"))
         noted = SessionEvent.everywhere.filter(session=session, kind__in=CONDITIONS)
-        noted = noted.exclude(value=None).order_by("pk")
-        aggregate.conditions |= dict(noted.values_list("kind", "value"))
+        for kind, value in noted.order_by("pk").values_list("kind", "value"):
+            if value is not None:
+                aggregate.conditions[kind] = value
         return aggregate
 
     @classmethod
