@@ -14,6 +14,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/", start.show_patient, name="patient"),
     path("patients/<int:patient_id>/details/", start.edit_patient, name="edit-patient"),
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
+    path("patients/<int:patient_id>/screen/check/", start.check_screen, name="check-screen"),
     path("sessions/<int:session_id>/ending/", ending.show_ending, name="ending"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),
