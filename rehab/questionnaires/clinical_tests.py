@@ -175,7 +175,7 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                     "Start at “go”: stand up, walk to the mark, turn, walk back, sit down."
                 ),
                 gettext_noop(
-                    "Stop when the back touches the chair. One trial before that counts not."
+                    "Stop when the back touches the chair. One trial before does not count."
                 ),
             ),
             norms=((60, 8.1, 8.1), (70, 9.2, 9.2), (80, 11.3, 11.3)),

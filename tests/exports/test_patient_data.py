@@ -103,6 +103,7 @@ def test_the_file_says_what_is_in_it_in_the_language_of_whoever_asks(world):
 TOLD_IN = {
     "Consent": "consent.json",
     "Visit": "visits.json",
+    "Assessment": "tests.json",
     "FamilyLink": "family.json",
     "Leaderboard_group": "boards.json",
     "TrainingSession": "sessions.csv",

@@ -13,6 +13,7 @@ const FORMATS = {
   choice: (value, choices) => choices[value] ?? value,
 };
 const ASSISTANCE = new Set(["walking_aid", "orthosis", "handrail", "helping_hand"]);
+const PLACES = { belt_speed: 2 };
 const REMARK_BADGE = "▲";
 
 export const badgeOf = ({ kind }) => MARKS[kind]?.badge ?? REMARK_BADGE;
@@ -26,7 +27,7 @@ export function describe({ kind, value }) {
   const name = mark?.label ?? remarkName(kind);
   if (value == null) return name;
   if (ASSISTANCE.has(kind)) return value ? name : fill(_("without %(help)s"), { help: name });
-  const text = mark ? FORMATS[mark.format](value, mark.choices) : number(value);
+  const text = mark ? FORMATS[mark.format](value, mark.choices) : number(value, PLACES[kind] ?? 0);
   return text === "" ? name : `${name} ${text}`;
 }
 

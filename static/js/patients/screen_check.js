@@ -10,8 +10,7 @@ const footer = document.querySelector("footer");
 const count = footer.querySelector("[role=status]");
 let seen = "";
 
-if (pxPerMm)
-  document.body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
+if (pxPerMm) document.body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
 
 function show() {
   const next = letters[seen.length];
