@@ -14,7 +14,8 @@ from typing import Any
 from django.db.models import Case, F, Prefetch, QuerySet, Value, When
 
 from rehab.people.models import User
-from rehab.sessions.log import SessionMetric
+from rehab.sessions.conditions import CONDITIONS, RATED
+from rehab.sessions.log import SessionEvent, SessionMetric
 from rehab.sessions.models import TrainingSession
 
 PAGE_ROWS = 2_000  # rows held in memory
@@ -37,8 +38,14 @@ class Selection:
     def read_sessions(self) -> Iterator[TrainingSession]:
         """Yield the sessions with their metrics, oldest first."""
         metrics = Prefetch("metrics", SessionMetric.objects.visible_to(self.user))
+        noted = SessionEvent.objects.visible_to(self.user).filter(
+            kind__in=[kind.value for kind in (*CONDITIONS, *RATED)]
+        )
+        events = Prefetch("events", noted.order_by("pk").defer("data"), to_attr="walked_under")
         related = ("patient", "measure", "protocol")
-        chosen = self.sessions.select_related(*related).prefetch_related(metrics).order_by("pk")
+        chosen = (
+            self.sessions.select_related(*related).prefetch_related(metrics, events).order_by("pk")
+        )
         for first in range(0, len(self.keys), SESSIONS_PAGE):
             yield from chosen.filter(pk__in=self.keys[first : first + SESSIONS_PAGE])
 

@@ -34,7 +34,9 @@ class SessionRow:
     @cached_property
     def conditions(self) -> dict[str, float]:
         """How the patient walked, by the kinds of remarks (`summarize_conditions`)."""
-        return summarize_conditions(self.session, self.session.events.order_by("pk"))
+        noted: Any = getattr(self.session, "walked_under", None)  # `Selection` reads them at once
+        events = self.session.events.order_by("pk") if noted is None else noted
+        return summarize_conditions(self.session, events)
 
     @cached_property
     def metrics(self) -> dict[str, float]:

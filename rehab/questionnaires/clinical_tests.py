@@ -101,7 +101,7 @@ WALK_SPEED = (
     gettext_noop("Stop it when the first foot crosses the last mark."),
     gettext_noop("Walking aid and orthosis as usual; walk beside, never ahead."),
 )
-# Bohannon & Williams Andrews 2011; Steffen 2002; Bohannon 2006 (docs/reference/questionnaires.md).
+# Bohannon & Williams Andrews 2011; Steffen 2002; Bohannon 2006.
 CLINICAL_TESTS: dict[str, ClinicalTest] = {
     test.slug: test
     for test in (

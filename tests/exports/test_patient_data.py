@@ -79,7 +79,7 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
         *("README.txt", "patient.json", "consent.json", "codebook.csv"),
         *("visits.json", "family.json", "boards.json", "studies.json", "changes.json"),
         *("sessions.csv", "steps.csv", "events.csv", "corrections.csv", "incidents.csv"),
-        *("feedback.csv", "answers.csv", "study_visits.csv"),
+        *("feedback.csv", "answers.csv", "study_visits.csv", "assessments.csv", "tests.json"),
     }
     who = json.loads(files["patient.json"])
     assert (who["nickname"], who["code"]) == (world.patient.nickname, world.patient.code)
