@@ -7,10 +7,12 @@ and not by a check, which only Django's own commands run.
 
 import os
 from pathlib import Path
+from urllib.parse import urlsplit
 from zoneinfo import available_timezones
 
 from csp.constants import NONCE, NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
+from platformdirs import user_data_path
 
 from garry_site import environment
 from garry_site.data_folder import close_data_folder, read_secret_key
@@ -19,13 +21,22 @@ from garry_site.environment import flag, number, string_list, text
 
 os.umask(0o077)
 BASE_DIR = Path(__file__).resolve().parent.parent
+# An installed package has the pages' files inside and the data in the user's own folder (setup.py).
+IS_INSTALLED = (BASE_DIR / "garry_site" / "files").is_dir()
+FILES_DIR = BASE_DIR / "garry_site" / "files" if IS_INSTALLED else BASE_DIR
 VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are read
 
 # --- where and how it runs ----------------------------------------------------------------------
 
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
-DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
+DATA_DIR = Path(
+    text(
+        "GARRY_DATA_DIR",
+        str(user_data_path("garry", appauthor=False) if IS_INSTALLED else BASE_DIR / "var"),
+        "folder of database and secrets",
+    )
+)
 BACKUP_KEYS = string_list(
     "GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)"
 )
@@ -96,7 +107,7 @@ ASGI_APPLICATION = "garry_site.asgi.application"
 TEMPLATES = [
     {
         "BACKEND": "django.template.backends.django.DjangoTemplates",
-        "DIRS": [BASE_DIR / "templates"],
+        "DIRS": [FILES_DIR / "templates"],
         "APP_DIRS": True,
         "OPTIONS": {
             "context_processors": [
@@ -148,6 +159,19 @@ AUTHENTICATION_BACKENDS = [
     "rehab.people.sign_in.backends.PasskeyBackend",
 ]
 LOGIN_URL = "sign-in"
+OIDC_ISSUER = text("GARRY_OIDC_ISSUER", "", "address of the hospital's sign-on (OpenID Connect)")
+OIDC_CLIENT_ID = text("GARRY_OIDC_CLIENT_ID", "garry", "GARRY's name at the sign-on")
+OIDC_CLIENT_SECRET = text("GARRY_OIDC_CLIENT_SECRET", "", "GARRY's secret at the sign-on")
+OIDC_NAME = text("GARRY_OIDC_NAME", "Hospital account", "what the button of the sign-on says")
+OIDC_SCOPE = text("GARRY_OIDC_SCOPE", "openid profile", "what the sign-on is asked to tell")
+OIDC_GROUPS_CLAIM = text("GARRY_OIDC_GROUPS_CLAIM", "groups", "claim that lists a person's groups")
+OIDC_CREATE = flag("GARRY_OIDC_CREATE", False, "make accounts for people whom a group lets in")
+OIDC_MFA_ACR = string_list(
+    "GARRY_OIDC_MFA_ACR", "", "values of acr by which the sign-on vouches for a second factor"
+)
+OIDC_ORIGIN = "{0.scheme}://{0.netloc}".format(urlsplit(OIDC_ISSUER))
+if OIDC_ISSUER and urlsplit(OIDC_ISSUER).scheme != "https" and HOSTED:
+    raise ImproperlyConfigured("GARRY_OIDC_ISSUER must begin with https:// on a hosted server.")
 SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
 SESSION_COOKIE_AGE = 12 * 3600  # one working day, whatever the activity
 SESSION_COOKIE_SAMESITE = "Lax"
@@ -176,7 +200,7 @@ LANGUAGES = [
     ("de", "Deutsch (Entwurf)"),
     ("fr", "Français (ébauche)"),
 ]
-LOCALE_PATHS = [BASE_DIR / "locale"]
+LOCALE_PATHS = [FILES_DIR / "locale"]
 USE_TZ = True
 TIME_ZONE = text("GARRY_TIME_ZONE", "UTC", "time zone of dates in admin and reports")
 if TIME_ZONE not in available_timezones():
@@ -186,19 +210,19 @@ if TIME_ZONE not in available_timezones():
 STATIC_URL = "static/"
 STATIC_ROOT = DATA_DIR / "static"
 BROWSER_LIBRARIES = {  # browser libraries come from node_modules and are never committed
-    "uplot": BASE_DIR / "node_modules" / "uplot" / "dist",
-    "canvas-confetti": BASE_DIR / "node_modules" / "canvas-confetti" / "dist",
-    "atkinson": BASE_DIR
+    "uplot": FILES_DIR / "node_modules" / "uplot" / "dist",
+    "canvas-confetti": FILES_DIR / "node_modules" / "canvas-confetti" / "dist",
+    "atkinson": FILES_DIR
     / "node_modules"
     / "@fontsource-variable"
     / "atkinson-hyperlegible-next"
     / "files",
 }
 STATICFILES_DIRS = [
-    BASE_DIR / "static",
+    FILES_DIR / "static",
     *(
         (name, folder)
-        for name, folder in [("docs", BASE_DIR / "docs" / "images")]
+        for name, folder in [("docs", FILES_DIR / "docs" / "images")]
         if folder.is_dir()
     ),
     *((name, folder) for name, folder in BROWSER_LIBRARIES.items() if folder.is_dir()),
@@ -227,7 +251,8 @@ CONTENT_SECURITY_POLICY = {
         "connect-src": [SELF],
         "object-src": [NONE],
         "base-uri": [NONE],
-        "form-action": [SELF],
+        # A sign-out goes on to the hospital's.
+        "form-action": [SELF, *([OIDC_ORIGIN] if OIDC_ISSUER else [])],
         "frame-ancestors": [NONE],
     }
 }

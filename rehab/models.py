@@ -17,6 +17,7 @@ from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station
 from rehab.studies import participants, power_runs  # noqa: F401
+from rehab.studies.record import adverse_events  # noqa: F401
 
 # People and settings. Sessions, consents and studies are logs themselves.
 TRACKED = (

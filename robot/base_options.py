@@ -86,6 +86,17 @@ def add_base_arguments(parser: ArgumentParser, names: Collection[str] = BASES) -
             metavar="WORDS",
             help=f"what a base that talks says to a {window} window",
         )
+    parser.add_argument(
+        "--face-port",
+        type=int,
+        metavar="N",
+        help="show a face for a screen on a Kobuki's mast at http://HOST:N/?face (default: none)",
+    )
+    parser.add_argument(
+        "--face-host",
+        default="127.0.0.1",
+        help="who may open that page: 127.0.0.1 this computer, 0.0.0.0 every one in its network",
+    )
     for name in names:
         BASES[name].add_arguments(parser.add_argument_group(f"--base {name}"))
 

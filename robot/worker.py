@@ -138,7 +138,9 @@ class Worker:
                 self._notice("The server is silent; standing still, dialing in again.")
                 self._link.hang_up()
             self._allow_originals()
-            if self.performer.reports or (self._black_box and self._black_box.incidents):
+            if self.performer.reports or (
+                self._black_box and (self._black_box.incidents or self._black_box.motion)
+            ):
                 self._reported.set()
             if problem != self._base.problem:
                 problem = self._base.problem
@@ -169,7 +171,11 @@ class Worker:
 
     async def _send_incidents(self) -> None:
         """Send each incident to the session that it is of; the others stay on this disk."""
-        incidents = self._black_box.incidents if self._black_box is not None else deque[Incident]()
+        box = self._black_box
+        for waiting in () if box is None else (box.incidents, box.motion):
+            await self._send_recordings(waiting)
+
+    async def _send_recordings(self, incidents: deque[Incident]) -> None:
         while incidents and self.performer.is_linked:
             incident = incidents[0]
             is_of_this = incident.session is not None and incident.session == self.performer.session

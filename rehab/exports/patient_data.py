@@ -26,6 +26,7 @@ from rehab.people.models import Patient, User
 from rehab.sessions.assessments import Assessment
 from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import Enrollment, Screening
+from rehab.studies.record.adverse_events import AdverseEvent
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {
@@ -173,6 +174,10 @@ def list_studies(user: User, patient: Patient) -> list[dict[str, Any]]:
                 for visit in row.visits.all()
             ],
             "events": [{"at": event.at, "what": event.kind} for event in row.events.all()],
+            "adverse_events": [
+                describe(event)
+                for event in AdverseEvent.objects.visible_to(user).filter(enrollment=row)
+            ],
         }
         for row in rows.order_by("pk")
     ] + [

@@ -11,12 +11,25 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from django.db.models import Case, F, Prefetch, QuerySet, Value, When
+from django.db.models import (
+    Case,
+    Count,
+    F,
+    OuterRef,
+    Prefetch,
+    QuerySet,
+    Subquery,
+    TextField,
+    Value,
+    When,
+)
+from django.db.models.functions import Cast, Coalesce
 
 from rehab.people.models import User
 from rehab.sessions.conditions import CONDITIONS, RATED
-from rehab.sessions.log import SessionEvent, SessionMetric
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.training.steps import InvalidReason
 
 PAGE_ROWS = 2_000  # rows held in memory
 SESSIONS_PAGE = 200
@@ -36,16 +49,29 @@ class Selection:
         object.__setattr__(self, "keys", list(keys))
 
     def read_sessions(self) -> Iterator[TrainingSession]:
-        """Yield the sessions with their metrics, oldest first."""
+        """Yield the sessions with their metrics, oldest first.
+
+        ``late_strides`` of each: those of the trained leg that do not count as they came late.
+        """
         metrics = Prefetch("metrics", SessionMetric.objects.visible_to(self.user))
         noted = SessionEvent.objects.visible_to(self.user).filter(
             kind__in=[kind.value for kind in (*CONDITIONS, *RATED)]
         )
         events = Prefetch("events", noted.order_by("pk").defer("data"), to_attr="walked_under")
         related = ("patient", "measure", "protocol")
+        late = (
+            Step.objects.visible_to(self.user)
+            .filter(session=OuterRef("pk"), side=OuterRef("trained_side"), valid=False)
+            .annotate(why=Cast("reasons", TextField()))
+            .filter(why__contains=f'"{InvalidReason.LATE}"')
+            .order_by()
+            .values("session")
+            .annotate(count=Count("pk"))
+        )
         chosen = (
             self.sessions.select_related(*related).prefetch_related(metrics, events).order_by("pk")
         )
+        chosen = chosen.annotate(late_strides=Coalesce(Subquery(late.values("count")), 0))
         for first in range(0, len(self.keys), SESSIONS_PAGE):
             yield from chosen.filter(pk__in=self.keys[first : first + SESSIONS_PAGE])
 

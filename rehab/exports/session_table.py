@@ -140,6 +140,12 @@ SESSIONS = Table(
         Column.number("goal", MEASURE_UNIT, "Goal in force at the end.", "session.goal"),
         Column.number("walked", "s", "Time of walking, without pauses.", "session.active_s"),
         Column(
+            "late_strides",
+            "Strides of the trained leg that do not count as their samples came late from the lab.",
+            "session.late_strides",
+            Type.INTEGER,
+        ),
+        Column(
             "protocol",
             "Name of the list of phases it was built from.",
             lambda row: row.session.protocol and row.session.protocol.name,

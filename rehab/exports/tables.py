@@ -67,11 +67,11 @@ CORRECTIONS = Table(
 )
 INCIDENTS = Table(
     "incidents.csv",
-    _("what the robot recorded around its stops"),
+    _("what the robot recorded: around its stops, and of its motion"),
     _read_columns(RobotIncident, "at", "reason", "recording"),
     (
-        Column.time("at", "When the robot was stopped."),
-        Column("reason", "Why, as a code (docs/safety.md)."),
+        Column.time("at", "When the robot was stopped; of its motion, when the part ended."),
+        Column("reason", "Why, as a code (docs/safety.md); motion: a part of how it moved."),
         Column("recording", "What it received, ordered and did: base64 of zlib of JSON lines."),
     ),
 )

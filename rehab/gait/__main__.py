@@ -25,7 +25,7 @@ from rehab.gait.recordings.plot import load_pyplot, plot_strides
 from rehab.gait.recordings.readers import read_any_table, read_signals, require_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.settings import check_mass
-from rehab.gait.setup.check import check_setup, compare_with_setup
+from rehab.gait.setup.check import add_own, check_setup, compare_with_setup
 from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.frames import find_frame_problem
@@ -217,7 +217,7 @@ def _check_walk(options: argparse.Namespace) -> int:
     for text in wrong:
         print(text, file=sys.stderr)
     if options.save and not wrong:
-        columns = given or check.columns
+        columns = add_own(given, table) if given else check.columns
         require_columns(options.files[0], table, columns)
         frame = columns.frame or check.columns.frame
         frames = None if frame is None else table[frame.name]

@@ -14,6 +14,7 @@ from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.samples import FORCE
 from rehab.gait.stances.analysis import Stance, StanceAnalyzer
+from rehab.gait.stances.limb import find_knee_flexion
 from rehab.gait.stances.plausibility import FULL_LOAD, STANCE_MAX_S, STANCE_MIN_S
 from rehab.gait.strides import Flag, RejectionReason, Stride, read_figures
 
@@ -52,6 +53,8 @@ class OtherLeg:
     first_double_support_s: float | None = None
     second_double_support_s: float | None = None
     double_support_s: float | None = None
+    walking_ratio_mm_min: float | None = None
+    margin_m: float | None = None
     weight_ratio: float | None = None
 
 
@@ -71,6 +74,8 @@ class OneLegStride:
         Where the cycle before it began; None where that was not observed whole.
     stride_s, swing_s
         Of that cycle [s].
+    knee_flexion_deg
+        As in ``Stride``.
     """
 
     index: int
@@ -80,6 +85,7 @@ class OneLegStride:
     cycle_index: int | None
     stride_s: float | None
     swing_s: float | None
+    knee_flexion_deg: float | None = None
 
 
 class LegDetector:
@@ -96,7 +102,7 @@ class LegDetector:
     """
 
     def __init__(self, buffer: LegBuffer, settings: DetectorSettings, side: str | None) -> None:
-        rate_hz = settings.rate_hz
+        rate_hz = self.rate_hz = settings.rate_hz
         self.buffer = buffer
         self.mass_kg = float(settings.mass_kg)
         self.weight_n = self.mass_kg * GRAVITY_M_S2
@@ -221,11 +227,15 @@ class LegDetector:
         end_s = contact.end_s or 0.0
         stance = self._analyzer.measure(contact, due + 1)
         cycle = self._find_cycle(contact)
+        swing = self._last_terminal if cycle[0] is not None else None
         reasons = stance.reasons
         if self._is_unusual(end_s - contact.begin_s):
             reasons = [*reasons, RejectionReason.IRREGULAR]
         self._previous, self._last_terminal = contact, (contact.end_index or 0, end_s)
-        return OneLegStride(due, contact, stance, reasons, *cycle)
+        flexion_deg = swing and find_knee_flexion(
+            self.buffer, swing[0], contact.begin_index, self.rate_hz
+        )
+        return OneLegStride(due, contact, stance, reasons, *cycle, flexion_deg)
 
     def _find_cycle(self, contact: Contact) -> tuple[int | None, float | None, float | None]:
         """Return begin, stride and swing time of the cycle before a contact, if observed whole."""

@@ -37,6 +37,10 @@ class StrideDetector(Detector):
         angle_rad: ArrayLike,
         forward_n: ArrayLike | None = None,
         position_m: ArrayLike | None = None,
+        foot_up_m: ArrayLike | None = None,
+        hip_forward_m: ArrayLike | None = None,
+        hip_up_m: ArrayLike | None = None,
+        knee_angle_rad: ArrayLike | None = None,
         *,
         frame: ArrayLike | None = None,
     ) -> list[Stride]:
@@ -54,6 +58,9 @@ class StrideDetector(Detector):
         forward_n, position_m
             Forward force on the foot [N] and forward position of the foot [m], shape (n,), if there
             are any.
+        foot_up_m, hip_forward_m, hip_up_m, knee_angle_rad
+            The same place of the foot's height above the floor, the hip's forward position and
+            height [m], and the knee's angle [rad, flexion positive], shape (n,), if there are any.
         frame
             The samples' numbers by the device's own count, shape (n,), if it has one
             (``signals.frames``). They may begin in the middle of a walk: the clock then starts
@@ -64,7 +71,8 @@ class StrideDetector(Detector):
         GaitInputError
             For channels of different lengths.
         """
-        return self._feed((t_s, force_n, moment_nm, angle_rad, forward_n, position_m), frame)
+        leg = (force_n, moment_nm, angle_rad, forward_n, position_m, foot_up_m)
+        return self._feed((t_s, *leg, hip_forward_m, hip_up_m, knee_angle_rad), frame)
 
     def _detect(self, start: int, stop: int) -> list[Stride]:
         return [self._complete(stride) for stride in self._leg.advance(start, stop)]

@@ -102,6 +102,16 @@ class Stride(NamedTuple):
     stance_ratio_percent, swing_ratio_percent, step_time_ratio_percent, step_length_ratio_percent
         This leg's newest by the other's before it, 1 where both are alike (Patterson 2010, Gait
         Posture 31:241).
+    trailing_limb_deg
+        Largest angle of the line from foot to hip before the vertical, in late stance
+        (``stances.limb``), if hip and foot are sent.
+    knee_flexion_deg
+        Largest knee flexion of the swing that ended at this initial contact, if it is sent.
+    walking_ratio_mm_min
+        Step length by cadence, of the two last steps [mm per step a minute].
+    margin_m
+        Backward margin of stability at initial contact, if both hips are sent. Sources of all four:
+        docs/reference/gait.md#posture.
     weight_ratio
         Mean force of both plates over the cycle that ended here, by body weight.
     """
@@ -141,6 +151,10 @@ class Stride(NamedTuple):
     swing_ratio_percent: float | None = None
     step_time_ratio_percent: float | None = None
     step_length_ratio_percent: float | None = None
+    trailing_limb_deg: float | None = None
+    knee_flexion_deg: float | None = None
+    walking_ratio_mm_min: float | None = None
+    margin_m: float | None = None
     weight_ratio: float | None = None
 
 

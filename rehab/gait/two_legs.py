@@ -16,6 +16,7 @@ from rehab.gait.one_leg import LegDetector, OneLegStride, OtherLeg
 from rehab.gait.signals.filters import find_maximum
 from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, POSITION, LegSamples
 from rehab.gait.stances.analysis import Stance
+from rehab.gait.stances.limb import find_margin
 from rehab.gait.stances.plausibility import check_whole_foot
 from rehab.gait.strides import Flag, RejectionReason, Stride
 
@@ -134,6 +135,8 @@ class TwoLegDetector(Detector):
             if RejectionReason.LONG_STANCE not in stride.reasons:
                 reasons.append(RejectionReason.CROSS_STEP)
             first = second = None
+        if first is not None and first.begin_index >= this.begin_index:  # it stepped here from
+            first, second = None, first  # beside the plates
         plates, zeros_n = (leg, other), (this.offset_n, known[-1].offset_n if known else 0.0)
         ratio = carried = _find_weight_ratio(stride.cycle_index, this.begin_index, plates, zeros_n)
         if ratio is None and second is not None:
@@ -161,6 +164,10 @@ class TwoLegDetector(Detector):
         self._latest[leg.side] = step
         if last is None or not this.begin_s - last.begin_s < LATEST_S:
             last = StepFigures(begin_s=this.begin_s)
+        margin_m, foot_m, belt_m_s = None, stride.stance.position_m, stride.stance.belt_m_s
+        if first is not None and foot_m is not None and belt_m_s is not None:
+            buffers = (leg.buffer, other.buffer)
+            margin_m = find_margin(buffers, this.begin_index, foot_m, belt_m_s, leg.rate_hz)
         doubles = (
             _find_time(this.begin_s, first.end_s) if first else None,
             _find_time(second.begin_s, this.end_s) if second else None,
@@ -179,6 +186,8 @@ class TwoLegDetector(Detector):
             first_double_support_s=doubles[0],
             second_double_support_s=doubles[1],
             double_support_s=None if None in doubles else math.fsum(filter(None, doubles)),
+            walking_ratio_mm_min=_find_walking_ratio(step, last),
+            margin_m=margin_m,
             weight_ratio=ratio,
         )
 
@@ -256,6 +265,15 @@ def _find_symmetry(this_m: float | None, other_m: float | None) -> float | None:
     if this_m is None or other_m is None or not this_m + other_m > 0:
         return None
     return (this_m - other_m) / (this_m + other_m)
+
+
+def _find_walking_ratio(this: StepFigures, last: StepFigures) -> float | None:
+    """Return step length by cadence [mm per step a minute], of the two last steps."""
+    lengths, times = (this.length_m, last.length_m), (this.step_s, last.step_s)
+    if None in lengths or None in times:
+        return None
+    length_m, time_s = (math.fsum(filter(None, two)) / 2 for two in (lengths, times))
+    return 1000 * length_m * time_s / 60
 
 
 def _find_ratio(this: float | None, other: float | None) -> float | None:

@@ -262,6 +262,10 @@ class Migration(migrations.Migration):
                         verbose_name="language",
                     ),
                 ),
+                (
+                    "subject",
+                    models.CharField(editable=False, max_length=255, null=True, unique=True),
+                ),
                 ("sign_in_generation", models.PositiveIntegerField(default=0, editable=False)),
                 (
                     "groups",
@@ -1994,6 +1998,7 @@ class Migration(migrations.Migration):
                             ("factor_removed", "Removed a second factor"),
                             ("recovery_codes", "Made new recovery codes"),
                             ("password", "Changed a password"),
+                            ("sign_on", "Linked or unlinked a hospital account"),
                             ("token_use", "Used a token from a new network"),
                             ("refused", "Was refused"),
                             ("token", "Gave a new token"),
@@ -2498,6 +2503,191 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
+            name="SessionEvent",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "after_number",
+                    models.PositiveIntegerField(
+                        help_text="The last step before it; 0 for none.",
+                        verbose_name="after number",
+                    ),
+                ),
+                (
+                    "kind",
+                    models.CharField(
+                        choices=[
+                            ("start", "start"),
+                            ("pause", "pause"),
+                            ("resume", "resume"),
+                            ("finish", "finish"),
+                            ("abort", "abort"),
+                            ("goal", "goal"),
+                            ("goal_adaptation", "automatic goal"),
+                            ("gain", "gain"),
+                            ("phase", "phase"),
+                            ("activation_threshold", "activation threshold"),
+                            ("robot_intensity", "robot intensity"),
+                            ("valence", "feedback type"),
+                            ("valence_now", "feedback type from the next step"),
+                            ("feedback_text", "words"),
+                            ("words_shown", "words shown"),
+                            ("chart_style", "chart style"),
+                            ("goal_followed", "goal followed"),
+                            ("planned_rest", "planned rest"),
+                            ("robot_stop", "robot stop"),
+                            ("robot_arm", "robot arm"),
+                            ("robot_decision", "robot decision"),
+                            ("robot_gesture", "robot gesture"),
+                            ("rest", "rest"),
+                            ("pain", "pain"),
+                            ("dizziness", "dizziness"),
+                            ("near_fall", "near fall"),
+                            ("fall", "fall"),
+                            ("fall_severity", "hurt by the fall"),
+                            ("fall_withdrawn", "it was no fall"),
+                            ("fall_acknowledged", "fall seen by a therapist"),
+                            ("stop_acknowledged", "robot’s stop seen by a therapist"),
+                            ("verbal_cue", "verbal cue"),
+                            ("borg", "exertion"),
+                            ("belt_speed", "belt speed"),
+                            ("weight_support", "body-weight support"),
+                            ("walking_aid", "walking aid"),
+                            ("orthosis", "orthosis"),
+                            ("handrail", "handrail"),
+                            ("helping_hand", "therapist’s hand"),
+                        ],
+                        max_length=32,
+                        verbose_name="kind",
+                    ),
+                ),
+                ("old", models.FloatField(null=True, verbose_name="old")),
+                ("value", models.FloatField(null=True, verbose_name="value")),
+                ("at", models.DateTimeField(verbose_name="at")),
+                ("data", models.JSONField(default=dict, verbose_name="data")),
+                (
+                    "by",
+                    models.ForeignKey(
+                        null=True,
+                        on_delete=django.db.models.deletion.SET_NULL,
+                        related_name="+",
+                        to=settings.AUTH_USER_MODEL,
+                        verbose_name="by",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "session event",
+                "verbose_name_plural": "session events",
+                "ordering": ["session", "pk"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="AdverseEvent",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "what",
+                    models.CharField(blank=True, max_length=200, verbose_name="what happened"),
+                ),
+                (
+                    "grade",
+                    models.PositiveSmallIntegerField(
+                        choices=[
+                            (0, "no adverse event"),
+                            (1, "mild"),
+                            (2, "moderate"),
+                            (3, "severe"),
+                            (4, "a danger to life"),
+                            (5, "death"),
+                        ],
+                        verbose_name="how bad",
+                    ),
+                ),
+                (
+                    "serious",
+                    models.BooleanField(
+                        default=False,
+                        help_text="Death, danger to life, hospital, lasting disability.",
+                        verbose_name="serious",
+                    ),
+                ),
+                (
+                    "relation",
+                    models.CharField(
+                        choices=[
+                            ("none", "not related"),
+                            ("possible", "possibly related"),
+                            ("probable", "probably related"),
+                            ("certain", "certainly related"),
+                        ],
+                        max_length=8,
+                        verbose_name="caused by the study",
+                    ),
+                ),
+                ("expected", models.BooleanField(default=False, verbose_name="expected")),
+                (
+                    "at",
+                    models.DateTimeField(
+                        default=django.utils.timezone.now, verbose_name="known since"
+                    ),
+                ),
+                ("reported_at", models.DateTimeField(null=True, verbose_name="reported")),
+                (
+                    "by",
+                    models.ForeignKey(
+                        null=True,
+                        on_delete=django.db.models.deletion.SET_NULL,
+                        related_name="+",
+                        to=settings.AUTH_USER_MODEL,
+                    ),
+                ),
+                (
+                    "enrollment",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="adverse_events",
+                        to="rehab.enrollment",
+                    ),
+                ),
+                (
+                    "entry",
+                    models.OneToOneField(
+                        null=True,
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="adverse_event",
+                        to="rehab.sessionevent",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "adverse event",
+                "ordering": ["pk"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
             name="SignInAttempts",
             fields=[
                 (
@@ -2523,6 +2713,56 @@ class Migration(migrations.Migration):
             ],
             options={
                 "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="SignOnGroup",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "name",
+                    models.CharField(
+                        help_text="As the hospital's sign-on names it.",
+                        max_length=200,
+                        verbose_name="group",
+                    ),
+                ),
+                (
+                    "role",
+                    models.CharField(
+                        choices=[
+                            ("lead", "Clinic lead"),
+                            ("pt", "Physical therapist"),
+                            ("researcher", "Researcher"),
+                        ],
+                        max_length=16,
+                        verbose_name="role",
+                    ),
+                ),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="sign_on_groups",
+                        to="rehab.clinic",
+                        verbose_name="clinic",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "sign-on group",
+                "verbose_name_plural": "sign-on groups",
+                "ordering": ["clinic", "name"],
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
             },
@@ -2796,6 +3036,46 @@ class Migration(migrations.Migration):
                     models.JSONField(blank=True, default=list, verbose_name="secondary outcomes"),
                 ),
                 (
+                    "margin",
+                    models.FloatField(
+                        blank=True,
+                        help_text="By how much a later arm may be worse than an earlier one in the primary outcome, in its unit. Empty: the study asks which arm is better.",
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(0.001),
+                            django.core.validators.MaxValueValidator(1000),
+                        ],
+                        verbose_name="margin of non-inferiority",
+                    ),
+                ),
+                (
+                    "spending",
+                    models.CharField(
+                        blank=True,
+                        choices=[
+                            ("obrien_fleming", "Seldom early (O’Brien and Fleming)"),
+                            ("pocock", "Alike at each look (Pocock)"),
+                        ],
+                        help_text="How alpha, the chance of a false finding (0.05), is spent. Without it no look may stop the study.",
+                        max_length=16,
+                        verbose_name="looks before the end",
+                    ),
+                ),
+                (
+                    "planned_sd",
+                    models.FloatField(
+                        blank=True,
+                        help_text="Between people, of the primary outcome. A look then says how many participants the spread of all together needs.",
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(0.001),
+                            django.core.validators.MaxValueValidator(1000),
+                        ],
+                        verbose_name="SD that the size rests on",
+                    ),
+                ),
+                ("facts", models.JSONField(default=dict, editable=False)),
+                (
                     "created_at",
                     models.DateTimeField(default=django.utils.timezone.now, editable=False),
                 ),
@@ -3067,10 +3347,13 @@ class Migration(migrations.Migration):
                             ("withdrawn", "Withdrew"),
                             ("marked", "Mark given"),
                             ("unmarked", "Mark taken"),
+                            ("consented", "Agreed to a new version"),
+                            ("asked", "A second person is asked to reveal the arm"),
                             ("unblinded", "Arm revealed"),
                             ("emergency", "Arm revealed in an emergency"),
                             ("refused", "Revealing the arm was refused"),
                             ("looked", "Looked at results before the end"),
+                            ("guessed", "Group guessed"),
                         ],
                         max_length=12,
                         verbose_name="what",
@@ -3136,6 +3419,7 @@ class Migration(migrations.Migration):
                         choices=[
                             ("assessor", "Assesses, and must not know the arm"),
                             ("interim", "May look before the study is closed"),
+                            ("monitor", "Monitors harms by arm"),
                         ],
                         max_length=8,
                         verbose_name="task",
@@ -3195,6 +3479,12 @@ class Migration(migrations.Migration):
                 (
                     "reason",
                     models.TextField(blank=True, max_length=1000, verbose_name="why it is changed"),
+                ),
+                (
+                    "needs_consent",
+                    models.BooleanField(
+                        default=False, verbose_name="participants have to agree again"
+                    ),
                 ),
                 ("at", models.DateTimeField(default=django.utils.timezone.now)),
                 (
@@ -3621,105 +3911,15 @@ class Migration(migrations.Migration):
                 ("everywhere", django.db.models.manager.Manager()),
             ],
         ),
-        migrations.CreateModel(
-            name="SessionEvent",
-            fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                (
-                    "after_number",
-                    models.PositiveIntegerField(
-                        help_text="The last step before it; 0 for none.",
-                        verbose_name="after number",
-                    ),
-                ),
-                (
-                    "kind",
-                    models.CharField(
-                        choices=[
-                            ("start", "start"),
-                            ("pause", "pause"),
-                            ("resume", "resume"),
-                            ("finish", "finish"),
-                            ("abort", "abort"),
-                            ("goal", "goal"),
-                            ("goal_adaptation", "automatic goal"),
-                            ("gain", "gain"),
-                            ("phase", "phase"),
-                            ("activation_threshold", "activation threshold"),
-                            ("robot_intensity", "robot intensity"),
-                            ("valence", "feedback type"),
-                            ("valence_now", "feedback type from the next step"),
-                            ("feedback_text", "words"),
-                            ("words_shown", "words shown"),
-                            ("chart_style", "chart style"),
-                            ("goal_followed", "goal followed"),
-                            ("planned_rest", "planned rest"),
-                            ("robot_stop", "robot stop"),
-                            ("robot_arm", "robot arm"),
-                            ("robot_decision", "robot decision"),
-                            ("robot_gesture", "robot gesture"),
-                            ("rest", "rest"),
-                            ("pain", "pain"),
-                            ("dizziness", "dizziness"),
-                            ("near_fall", "near fall"),
-                            ("fall", "fall"),
-                            ("fall_severity", "hurt by the fall"),
-                            ("fall_withdrawn", "it was no fall"),
-                            ("fall_acknowledged", "fall seen by a therapist"),
-                            ("stop_acknowledged", "robot’s stop seen by a therapist"),
-                            ("verbal_cue", "verbal cue"),
-                            ("borg", "exertion"),
-                            ("belt_speed", "belt speed"),
-                            ("weight_support", "body-weight support"),
-                            ("walking_aid", "walking aid"),
-                            ("orthosis", "orthosis"),
-                            ("handrail", "handrail"),
-                            ("helping_hand", "therapist’s hand"),
-                        ],
-                        max_length=32,
-                        verbose_name="kind",
-                    ),
-                ),
-                ("old", models.FloatField(null=True, verbose_name="old")),
-                ("value", models.FloatField(null=True, verbose_name="value")),
-                ("at", models.DateTimeField(verbose_name="at")),
-                ("data", models.JSONField(default=dict, verbose_name="data")),
-                (
-                    "by",
-                    models.ForeignKey(
-                        null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
-                        related_name="+",
-                        to=settings.AUTH_USER_MODEL,
-                        verbose_name="by",
-                    ),
-                ),
-                (
-                    "session",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="events",
-                        to="rehab.trainingsession",
-                        verbose_name="session",
-                    ),
-                ),
-            ],
-            options={
-                "verbose_name": "session event",
-                "verbose_name_plural": "session events",
-                "ordering": ["session", "pk"],
-                "abstract": False,
-                "base_manager_name": "everywhere",
-                "default_manager_name": "everywhere",
-            },
-            managers=[
-                ("everywhere", django.db.models.manager.Manager()),
-            ],
+        migrations.AddField(
+            model_name="sessionevent",
+            name="session",
+            field=models.ForeignKey(
+                on_delete=django.db.models.deletion.PROTECT,
+                related_name="events",
+                to="rehab.trainingsession",
+                verbose_name="session",
+            ),
         ),
         migrations.CreateModel(
             name="SessionCorrection",
@@ -4164,6 +4364,14 @@ class Migration(migrations.Migration):
             model_name="resetrequest",
             constraint=models.UniqueConstraint(
                 fields=("account", "asked_by"), name="reset_request_once_per_host"
+            ),
+        ),
+        migrations.AddConstraint(
+            model_name="signongroup",
+            constraint=models.UniqueConstraint(
+                fields=("name", "clinic"),
+                name="sign_on_group_once_a_clinic",
+                violation_error_message="This clinic has this group already.",
             ),
         ),
         migrations.AddConstraint(

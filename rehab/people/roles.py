@@ -42,6 +42,7 @@ _OF_A_LEAD = {Role.LEAD: Right.ALL, Role.PT: Right.VIEW}
 RIGHTS: dict[str, dict[Role, Right]] = {
     "Clinic": {Role.HOST: Right.EDIT, Role.LEAD: Right.VIEW | Right.CHANGE},
     "User": {Role.HOST: Right.EDIT, Role.LEAD: Right.EDIT},
+    "SignOnGroup": {Role.HOST: Right.ALL, Role.LEAD: Right.VIEW},
     "ApiToken": {Role.LEAD: Right.EDIT},
     "Authenticator": {},
     "RecoveryCode": {},

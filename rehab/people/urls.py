@@ -2,13 +2,18 @@
 
 from django.urls import path
 
-from rehab.people.pages import account, confirm, consent, home, second_factor, sign_in
+from rehab.people.pages import account, confirm, consent, home, second_factor, sign_in, sign_on
 
 urlpatterns = [
     path("", home.home, name="home"),
     path("js/<str:language>/catalog.js", home.show_catalog, name="catalog"),
     path("sign-in/", sign_in.sign_in, name="sign-in"),
     path("sign-in/code/", sign_in.verify_second_factor, name="second-factor"),
+    path("sign-in/hospital/", sign_on.begin, name="sign-on"),
+    path("sign-in/hospital/back/", sign_on.complete, name="sign-on-complete"),
+    path("sign-in/hospital/ended/", sign_on.end, name="sign-on-ended"),
+    path("account/confirm/hospital/", sign_on.confirm, name="sign-on-confirm"),
+    path("account/hospital/", sign_on.link, name="sign-on-link"),
     path("sign-out/", sign_in.sign_out, name="sign-out"),
     path("help/", home.show_help, name="help"),
     path("account/", account.show_account, name="account"),

@@ -1,4 +1,4 @@
-"""What a session's robot recorded around a stop: its black box, as far as it was sent."""
+"""What a session's robot recorded: around its stops, and how it moved, as far as it was sent."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import personal_fields, retained
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession
-from robot.wire.incident import unpack
+from robot.wire.incident import MOTION, unpack
 
 MAX_INCIDENTS = 40  # of a session, each of at most 60 kB
+MAX_PARTS = 240  # of its motion: minutes
 
 
 class RobotIncident(ScopedModel):
-    """One incident. Rows are only ever added.
+    """One incident, or with the reason ``MOTION`` a part of how it moved. Rows are only ever added.
 
     ``recording`` is packed as it came (``robot.wire.incident``).
     """
@@ -58,8 +59,12 @@ class RobotIncident(ScopedModel):
 
 
 def store_incident(session_id: int, at: datetime, reason: str, recording: str) -> int | None:
-    """Store an incident and return its key; None where its session has too many already."""
-    if RobotIncident.everywhere.filter(session=session_id).count() >= MAX_INCIDENTS:
+    """Store a recording and return its key; None where its session has too many already."""
+    rows = RobotIncident.everywhere.filter(session=session_id)
+    alike, most = rows.filter(reason=MOTION), MAX_PARTS
+    if reason != MOTION:
+        alike, most = rows.exclude(reason=MOTION), MAX_INCIDENTS
+    if alike.count() >= most:
         return None
     incident = RobotIncident.everywhere.create(
         session_id=session_id, at=at, reason=reason, recording=recording

@@ -6,7 +6,7 @@ from typing import Any
 
 from django.utils.translation import gettext, override
 
-from rehab.training.changes import ChangeValue, State
+from rehab.training.changes import ChangeKind, ChangeValue, PauseReason, State
 from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Tally
@@ -14,8 +14,12 @@ from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES, Valence
+from robot.wire.cue_limits import VARIED
 
 Message = dict[str, Any]
+
+# The pool that a robot performs from at a change of the session's state.
+MOMENTS: dict[str, str] = {ChangeKind.START: "greeting", ChangeKind.FINISH: "farewell"}
 
 
 def describe_walked(walked: SessionFold) -> Message:
@@ -105,9 +109,34 @@ def describe_cue(fold: SessionFold) -> Message:
         "rest_s": timing.rest_s,
         "intensity": fold.robot_intensity,
         "only_informs": not fold.valence.has_points,
+        "idles": has_free_robot(fold),
         "seed": fold.plan.seed or None,
         "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
     }
+
+
+def has_free_robot(fold: SessionFold) -> bool:
+    """Return whether the robot may also greet, rest, take leave and idle, as of now.
+
+    Only where it chooses its answers itself, in a phase whose steps it answers, and never with a
+    type that only informs: elsewhere any motion could distract.
+    """
+    phase, cue = fold.phase, fold.valence.cue
+    varies = VARIED in (cue.above, cue.below)
+    answers = phase.feedback and phase.robot and fold.valence.has_points
+    return varies and answers and fold.robot_intensity > 0
+
+
+def describe_robot_state(fold: SessionFold, kind: str) -> Message:
+    """Return the state that a robot obeys, and what it performs at this change of it, if anything.
+
+    ``kind``: of the change. A person starts and finishes a session, and its plan has rests; other
+    pauses may be in need, and order nothing.
+    """
+    rests = kind == ChangeKind.PAUSE and fold.pause_reason is PauseReason.REST
+    pool = "rest" if rests else MOMENTS.get(kind)
+    gesture = pool if has_free_robot(fold) else None
+    return {"type": "state", "state": fold.state.value, "gesture": gesture}
 
 
 def describe_state(fold: SessionFold) -> Message:

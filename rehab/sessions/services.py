@@ -27,7 +27,7 @@ from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.closeness import CloseSteps
-from rehab.training.measures import A2, InvalidSetting
+from rehab.training.measures import A2, InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.plans import PlanSettings, SessionPlan
 from rehab.training.steps import Side
@@ -57,10 +57,10 @@ class StationTaken(InvalidSetting):
 class SessionRequest(PlanSettings):
     """What a new session is created from: the settings of its plan, and what the rest follows from.
 
-    ``phases``: those of the protocol unless given. ``measure``: A2 unless given.
-    ``trained_side``: the patient's paretic side unless given. ``cue``: that of the feedback type
-    unless given. ``source_args``: arguments of `python -m rehab.sources` for a source that the
-    server runs beside the session.
+    ``phases``: those of the protocol unless given. ``measure``: A2 unless given. ``rule``: how that
+    is scored, as its row says unless given. ``trained_side``: the patient's paretic side unless
+    given. ``cue``: that of the feedback type unless given. ``source_args``: arguments of
+    `python -m rehab.sources` for a source that the server runs beside the session.
     """
 
     patient: Patient
@@ -68,6 +68,7 @@ class SessionRequest(PlanSettings):
     phases: Iterable[Phase] | None = None
     protocol: Protocol | None = None
     measure: MeasureDefinition | None = None
+    rule: Measure | None = None
     trained_side: Side | None = None
     cue: CueGestures | None = None
     station: Station | None = None
@@ -163,7 +164,7 @@ def _make_plan(request: SessionRequest, measure: MeasureDefinition) -> SessionPl
             cue = CueGestures()
         alternatives.append(replace(other, cue=cue))
     return SessionPlan(
-        measure=measure.to_rule(),
+        measure=request.rule or measure.to_rule(),
         valence=valence,
         phases=tuple(phases),
         trained_side=side,

@@ -132,7 +132,7 @@ def check_stream(name: str, options: Namespace) -> int:
 
     async def listen(source: LiveSource, check: StreamCheck) -> None:
         reading = asyncio.create_task(source.read(check))
-        done = asyncio.create_task(check.is_done.wait())
+        done = asyncio.create_task(check.wait_until_done())
         finished, _ = await asyncio.wait({reading, done}, return_when=asyncio.FIRST_COMPLETED)
         for task in (reading, done):
             task.cancel()

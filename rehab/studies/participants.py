@@ -200,10 +200,13 @@ class StudyEvent(SealableModel):
         WITHDRAWN = "withdrawn", _("Withdrew")
         MARKED = "marked", _("Mark given")
         UNMARKED = "unmarked", _("Mark taken")
+        CONSENTED = "consented", _("Agreed to a new version")
+        ASKED = "asked", _("A second person is asked to reveal the arm")
         UNBLINDED = "unblinded", _("Arm revealed")
         EMERGENCY = "emergency", _("Arm revealed in an emergency")
         REFUSED = "refused", _("Revealing the arm was refused")
         LOOKED = "looked", _("Looked at results before the end")
+        GUESSED = "guessed", _("Group guessed")
 
     # Reasons may name the condition.
     scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")

@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.people.scope import Scope, ScopedModel
+from rehab.studies.analysis.outcomes import LOWER_IS_BETTER
 from rehab.studies.models import Study
 from rehab.studies.simulation.power import PairPower, SimulatedDifference, simulate_from, summarize
 from rehab.studies.simulation.trial import Trial, walkable
@@ -84,7 +85,9 @@ class PowerRun(ScopedModel):
     def power(self) -> list[PairPower]:
         """What the simulated studies found, for each pair of arms."""
         return summarize(
-            [SimulatedDifference(*row) for rows in self.found.values() for row in rows]
+            [SimulatedDifference(*row) for rows in self.found.values() for row in rows],
+            self.study.margin,
+            higher_is_better=self.study.primary_outcome not in LOWER_IS_BETTER,
         )
 
 
@@ -119,7 +122,7 @@ def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
         )
     )
     effects = {arm.code: float(settings["effects"].get(arm.code, 0.0)) for arm in arms}
-    if not any(effects.values()):
+    if not any(effects.values()) and study.margin is None:
         raise InvalidSetting(gettext("Give an arm an effect: power is the chance to find it."))
     return Trial(
         plans={arm.code: plan for arm in arms},

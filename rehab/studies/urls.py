@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.studies.pages import participants, planning, power, results
+from rehab.studies.pages import participants, planning, power, record, results
 
 urlpatterns = [
     path("studies/", planning.list_studies, name="studies"),
@@ -29,11 +29,20 @@ urlpatterns = [
         results.download_results,
         name="study-results-file",
     ),
+    path("studies/<int:study_id>/record/", record.edit_facts, name="study-facts"),
+    path(
+        "studies/<int:study_id>/checklists.csv",
+        record.download_checklists,
+        name="study-checklists",
+    ),
+    path("studies/<int:study_id>/harms/", record.show_harms, name="study-harms"),
     path("studies/<int:study_id>/power/", power.show_power, name="study-power"),
     path("power-runs/<int:run_id>/", power.go_on, name="power-run"),
     path("studies/<int:study_id>/enroll/", participants.enroll_patient, name="enroll"),
     path("participants/<int:enrollment_id>/", participants.show_participant, name="participant"),
     path("participants/<int:enrollment_id>/start/", participants.start_visit, name="start-visit"),
     path("participants/<int:enrollment_id>/leave/", participants.leave_study, name="leave-study"),
+    path("participants/<int:enrollment_id>/guess/", participants.note_guess, name="note-guess"),
+    path("participants/<int:enrollment_id>/agree/", participants.agree_again, name="agree-again"),
     path("participants/<int:enrollment_id>/reveal/", participants.reveal, name="reveal"),
 ]

@@ -13,8 +13,10 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
+from rehab.studies.agreements import check_agreed
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.studies.registration.document import find_rule
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
@@ -107,6 +109,7 @@ def start_session(
                 day=now.date(),
             )
         visit.version = current_version(study)
+        check_agreed(enrollment)
         arm = enrollment.allocation.arm_of_period(visit.period)
         visit.session = create_session(
             SessionRequest(
@@ -116,6 +119,7 @@ def start_session(
                 phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,
+                rule=find_rule(study, arm),
                 robot_intensity=arm.robot_intensity,
                 schedule=arm.to_rule().condition.schedule,
                 seed=seed_of(study.pk, visit.number),

@@ -16,8 +16,9 @@ from robot.wire.limits import PERFORMANCE_MAX
 # 1: a step before the last one, whichever leg, has a clock that ran backwards.
 # 2: a step before the last one of its leg (the legs' strides may overtake each other).
 # 3: steps may be close, where the plan has it; before, none was.
-RULES_VERSION = 3
-CLOSE_SINCE = 3
+# 4: so may those of measures whose standard deviation is known, though no step holds it.
+RULES_VERSION = 4
+CLOSE_SINCE, TYPICAL_SINCE = 3, 4
 NO_CLOSE_STEPS = CloseSteps()
 
 
@@ -110,6 +111,8 @@ def score_measurement(
     elif value is not None and goal is not None and measurement.side == trained_side:
         shown, performance, hit = judge(measure, value, gain, goal)
         sd = measurement.extra.get(measure.sd_channel)
+        if sd is None and rules_version >= TYPICAL_SINCE:
+            sd = measure.typical_sd
         if rules_version >= CLOSE_SINCE:
             close = close_steps.includes(shown, None if sd is None else gain * sd, goal)
         if valence is not None:

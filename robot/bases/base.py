@@ -75,7 +75,8 @@ class Answer:
     gesture
         Name of the gesture that begins now.
     is_glad
-        Whether the window was above the threshold; only then may it sound or look glad.
+        Whether the window was above the threshold; only then may it sound or look glad. None for
+        what answers no window: then it says nothing.
     is_quiet
         Whether it makes no sound.
     strength
@@ -83,7 +84,7 @@ class Answer:
     """
 
     gesture: str
-    is_glad: bool
+    is_glad: bool | None
     is_quiet: bool = False
     strength: float = 1.0
 

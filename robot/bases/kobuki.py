@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import threading
 import time
+from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-from robot.bases.base import Abilities, BaseLost, BaseState, Indication, MobileBase, SensorState
+from robot.bases.avatar.face_screen import FaceScreen, read_face
+from robot.bases.base import (
+    Abilities,
+    Answer,
+    BaseLost,
+    BaseState,
+    Indication,
+    MobileBase,
+    SensorState,
+)
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,
@@ -28,6 +38,7 @@ from robot.bases.odometry import Odometry
 from robot.bases.unordered_motion import UNORDERED, UnorderedMotion
 from robot.motion.base_response import Response
 from robot.motion.limits import WHEEL_LIMITS
+from robot.motion.pose import HOME
 from robot.motion.score import Color, Note
 from robot.motion.twist import STILL, Twist
 from robot.port.client import PortClient, ReceivedBytes
@@ -66,6 +77,7 @@ class KobukiBase(MobileBase):
 
     def __init__(self, monotonic: Callable[[], float]) -> None:
         self._monotonic = monotonic
+        self.face: FaceScreen | None = None  # on its mast
         self._client: PortClient | None = None
         self._lock = threading.Lock()  # data are received on another thread
         self._reader = FrameReader(decode_feedback)
@@ -80,8 +92,22 @@ class KobukiBase(MobileBase):
         self._lights, self._sound = LIGHTS[Indication.WAITING], b""
         self._requested_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
+    def configure(self, options: Namespace) -> None:
+        """Apply the port, and the screen's address where it has one. Raises BadOption."""
+        super().configure(options)
+        if options.face_port is not None:
+            self.face = read_face(options, self._monotonic, "face")
+            self.abilities = replace(self.abilities, answers=True)
+
+    def answer(self, answer: Answer) -> None:
+        """Act by the face on its screen, where it has one."""
+        if self.face is not None:
+            self.face.answer(answer)
+
     def open(self) -> None:
         """Open the port, stop the base, and wait a moment for its firmware version."""
+        if self.face is not None:
+            self.face.open()
         self._client = PortClient(self.port, BAUD, STOP_FRAME, self._receive, self._monotonic)
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and not self._client.is_dead:
@@ -94,6 +120,8 @@ class KobukiBase(MobileBase):
     def close(self) -> None:
         """Put its lights off, and close the port."""
         self.show(Indication.WAITING, aloud=False)
+        if self.face is not None:
+            self.face.close()
         if self._client is not None:
             self._client.close()
 
@@ -142,6 +170,8 @@ class KobukiBase(MobileBase):
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         client = self._running_client()
+        if self.face is not None:
+            self.face.tick(HOME)  # the base itself moves, not what its screen shows
         control = twist_to_control(WHEEL_LIMITS.clip(twist))
         if control != STOP:
             self._unordered.order_motion(self._monotonic())
@@ -200,6 +230,8 @@ class KobukiBase(MobileBase):
         aloud
             Whether a short sound announces it too, if there is one for it.
         """
+        if self.face is not None:
+            self.face.show(indication)
         self._set_lights(LIGHTS[indication])
         if aloud and indication in SOUNDS:
             self._sound = encode_commands(SoundSequence(SOUNDS[indication]))

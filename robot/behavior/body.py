@@ -12,6 +12,7 @@ from robot.behavior.expression import Expression
 from robot.behavior.manual_drive import ManualDrive
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
 from robot.behavior.status import StatusReporter
+from robot.behavior.variety import Choice
 from robot.motion.base_response import AT_ONCE
 from robot.motion.gesture import Gesture
 from robot.motion.limits import Limits
@@ -92,7 +93,13 @@ class Body:
         return ""
 
     def start(
-        self, gesture: Gesture, now_s: float, state: BaseState, answer: Answer, pace: float = 1.0
+        self,
+        gesture: Gesture,
+        now_s: float,
+        state: BaseState,
+        answer: Answer,
+        pace: float = 1.0,
+        choice: Choice | None = None,
     ) -> None:
         """Start a gesture that nothing refuses, and answer by it.
 
@@ -108,13 +115,15 @@ class Body:
             How to answer beside motion.
         pace
             Share of each waypoint's own pace, above 0 and up to 1.
+        choice
+            Of what no decision reports.
         """
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
         pose = self.read().pose  # a simulated base may have been put back
         self.player.start(gesture, now_s, pose, after_s, pace)
         self.expression.start(gesture.score.quiet if answer.is_quiet else gesture.score, now_s)
         self.safety.start_gesture(now_s, state)
-        self.status.report_gesture(gesture, "started", "")
+        self.status.report_gesture(gesture, "started", "", choice)
         self.base.answer(answer)
 
     def start_alone(self, gesture: Gesture, now_s: float) -> str:
@@ -139,7 +148,7 @@ class Body:
         if not reason and not safety.is_at_home(state):
             reason = AWAY
         if not reason:
-            answer = Answer(gesture.name, gesture.score.mood != "sad")
+            answer = Answer(gesture.name, {"glad": True, "sad": False}.get(gesture.score.mood))
             self.start(gesture.scaled(safety.share), now_s, state, answer)
         return reason
 

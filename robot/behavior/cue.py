@@ -49,6 +49,8 @@ class Cue:
     only_informs
         Whether the feedback judges nothing, as explicit feedback: then no gesture answers, whatever
         ``above`` and ``below`` name.
+    idles
+        Whether it may move a little between answers, too.
     seed
         What varied answers follow from; None for the session's number.
     gestures
@@ -64,6 +66,7 @@ class Cue:
     rest_s: float = DEFAULT_REST_S
     intensity: float = 1.0
     only_informs: bool = False
+    idles: bool = False
     seed: int | None = None
     gestures: tuple[Any, ...] = ()
 
@@ -85,8 +88,9 @@ class Cue:
         if seed is not None:
             seed = read_whole(cue, "seed", low=0, high=SEED_MAX)
         gestures = cue.get("gestures", [])
-        if not isinstance(only_informs := cue.get("only_informs", False), bool):
-            raise BadFrame('"only_informs" is true or false.')
+        for name in ("only_informs", "idles"):
+            if not isinstance(cue.get(name, False), bool):
+                raise BadFrame(f'"{name}" is true or false.')
         if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
             raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')
         return cls(
@@ -98,7 +102,8 @@ class Cue:
             window_s=read_number(cue, "window_s", WINDOW_MIN_S, WINDOW_MAX_S),
             rest_s=read_number(cue, "rest_s", 0.0, REST_MAX_S),
             intensity=intensity,
-            only_informs=only_informs,
+            only_informs=cue.get("only_informs", False),
+            idles=cue.get("idles", False),
             seed=seed,
             gestures=tuple(gestures),
         )

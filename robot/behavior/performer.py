@@ -16,9 +16,10 @@ from robot.bases import Answer, BaseState, MobileBase
 from robot.behavior.body import Body
 from robot.behavior.cue import QUIET_PACE, Cue
 from robot.behavior.gesture_library import GestureLibrary
+from robot.behavior.idle import IdleLife
 from robot.behavior.safety import AWAY, LAPSED_S, STOPPED
 from robot.behavior.status import Report
-from robot.behavior.variety import Variety
+from robot.behavior.variety import Choice, Variety
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import BUILT_IN, ORIGINALS
@@ -38,6 +39,9 @@ NO_LINK = "no_link"
 NO_SESSION = "no_session"
 NOT_RUNNING = "not_running"
 REPLACED = "replaced"  # a welcome to another session
+
+# What a message of the session's state may order beside answers: pools of ``robot.motion.pools``.
+MOMENTS = ("greeting", "rest", "farewell")
 
 
 class Performer:
@@ -75,7 +79,7 @@ class Performer:
         self.body = Body(base, limits)
         self.gestures = GestureLibrary(gestures, limits)
         self.decider = WindowDecider(Cue())
-        self.variety = Variety(seed=0)
+        self._begin_variety(0)
         self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad_message = ""
@@ -84,6 +88,7 @@ class Performer:
         self._is_running = False
         self._is_alone = False  # plays a gesture without a session
         self._heard_s = 0.0
+        self._step_s = self._stepped_s = 0.0  # the latest step, by the source's clock and by ours
         self._ticked_s = math.inf  # the last tick; there was none
         self._has_hung = False  # so that what is heard may have waited meanwhile
 
@@ -160,6 +165,7 @@ class Performer:
         # Without a session it does not move, and the server sends no heartbeat.
         if self.session is not None and self.is_linked and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
+        self._idle_on(now_s)
         may_be_driven = self.is_linked and not self._is_running
         self._report(now_s, self.body.tick(now_s, may_be_driven=may_be_driven))
 
@@ -182,7 +188,7 @@ class Performer:
             case "step":
                 self._handle_step(message, now_s)
             case "state":
-                self._handle_state(message)
+                self._handle_state(message, now_s)
             case "cue":
                 self._set_cue(Cue.read(message.get("cue")))
             case "arm":
@@ -204,7 +210,7 @@ class Performer:
                 raise BadFrame("A welcome says in which state the session is.")
             if session != self.session:
                 self.decider = WindowDecider(cue)
-                self.variety = Variety(seed=session if cue.seed is None else cue.seed)
+                self._begin_variety(session if cue.seed is None else cue.seed)
                 self.reports.clear()
             self._set_cue(cue)
             self.decider.drop_window()
@@ -218,20 +224,63 @@ class Performer:
             self.body.player.stop(REPLACED)
         self.session, self.is_linked = session, True
 
+    def _begin_variety(self, seed: int) -> None:
+        """Choose by a session's seed: answers, and apart from them what comes beside answers."""
+        self.variety, self._moments, self._idle = Variety(seed), Variety(seed), IdleLife(seed)
+
     def _set_cue(self, cue: Cue) -> None:
         """Use another cue, with the gestures that came with it."""
         for problem in self.gestures.replace_received(cue.gestures):
             self.count_bad_message(problem)
         self.decider.set_cue(cue)
 
-    def _handle_state(self, message: Message) -> None:
+    def _handle_state(self, message: Message, now_s: float) -> None:
         state = message.get("state")
         if not isinstance(state, str):
             raise BadFrame('"state" is a text.')
-        self._is_running = state == "running"
-        if not self._is_running:
+        pool, runs = message.get("gesture"), state == "running"
+        if not runs:
             self.body.player.stop(state[:16])
             self.decider.drop_window()
+        # What starts may greet at once; what rests or ends, with its last permission to move.
+        self._is_running |= runs
+        if pool in MOMENTS:
+            self._perform_moment(pool, now_s)
+        self._is_running = runs
+        if pool is not None and pool not in MOMENTS:  # the state counts all the same
+            raise BadFrame(f'"gesture" is null, or one of: {", ".join(MOMENTS)}.')
+
+    def _perform_moment(self, pool: str, now_s: float) -> None:
+        """Greet, rest or take leave, where the robot may act now; else leave it out."""
+        if not self.may_act or self.body.player.is_busy:
+            return
+        choice = self._moments.take(pool)
+        if choice is not None and self._perform_beside(choice, now_s):
+            self._moments.mark_started(choice)
+
+    def _perform_beside(self, choice: Choice, now_s: float) -> bool:
+        """Start a gesture that answers nothing, and return whether nothing speaks against it."""
+        cue, state, gesture = self.decider.cue, self.body.read(), choice.gesture
+        share = self.body.safety.share
+        if self.body.refusal_reason(gesture, state):
+            return False
+        size = max(cue.intensity, gesture.least) * share
+        answer = Answer(gesture.name, None, cue.is_quiet, round(share, 3))
+        pace = QUIET_PACE if cue.is_quiet else 1.0
+        self.body.start(gesture.scaled(size), now_s, state, answer, pace, choice)
+        self._idle.disturb(now_s)
+        return True
+
+    def _idle_on(self, now_s: float) -> None:
+        """Begin an idle motion, where the order allows it and no answer can be due."""
+        can = self.body.base.abilities.closed_loop and self.body.base.abilities.moves
+        if not (can and self.decider.cue.idles and self.may_act) or self.body.player.is_busy:
+            self._idle.disturb(now_s)
+            return
+        free_s = self.decider.free_s(self._step_s + now_s - self._stepped_s)
+        gesture = self._idle.next(now_s, free_s, is_quiet=self.decider.cue.is_quiet)
+        if gesture is not None:
+            self._perform_beside(Choice(gesture, "idle", self.variety.seed), now_s)
 
     def _handle_watched(self, message: Message, otherwise: bool) -> None:
         watched = message.get("watched", otherwise)
@@ -249,8 +298,10 @@ class Performer:
         performance = read_number(message, "performance", -PERFORMANCE_MAX, PERFORMANCE_MAX)
         if not self._is_running:
             return
+        self._step_s, self._stepped_s = time_s, now_s
         decision = self.decider.add(time_s, performance)
         if decision is not None:
+            self._idle.disturb(now_s)
             self.decision = decision
             self._respond(decision, now_s)
 
@@ -299,7 +350,8 @@ class Performer:
     def _report(self, now_s: float, there: BaseState) -> None:
         """Show the state to people, and report it to the server."""
         state, player = self._state(there), self.body.player
-        self.body.status.show(state, is_quiet=self.decider.cue.is_quiet)
+        is_silent = player.gesture is not None and not player.gesture.score.notes
+        self.body.status.show(state, is_quiet=self.decider.cue.is_quiet or is_silent)
         if self.is_linked:
             counts = {"refused_arms": self.body.safety.refused_arms, **self.body.base.counters}
             self.body.status.report_status(

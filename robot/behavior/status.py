@@ -12,6 +12,7 @@ from robot.behavior.safety import BATTERY_WARN_V, battery_share
 from robot.behavior.variety import Choice
 from robot.behavior.window_decider import Decision
 from robot.motion.gesture import Gesture
+from robot.motion.looks import REST, look_of
 from robot.motion.score import Color
 
 # What the lights of a base say where no score is played; pages show the same of every base.
@@ -60,6 +61,8 @@ class StatusReporter:
             self._aloud.add(Indication.MOVING)
         self._reported_s: float | None = None  # the last status
         self._reported: RobotState | None = None
+        self._performing: Gesture | None = None  # since when its look counts
+        self._began_s = 0.0
         self._indication: Indication | None = None
 
     def reset(self) -> None:
@@ -71,7 +74,9 @@ class StatusReporter:
         self.reports.append(report)
         self.on_report(report)
 
-    def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
+    def report_gesture(
+        self, gesture: Gesture, phase: str, outcome: str, choice: Choice | None = None
+    ) -> None:
         """Report that a gesture has started or ended.
 
         Parameters
@@ -82,8 +87,13 @@ class StatusReporter:
             ``started`` or ``ended``.
         outcome
             How it ended, as a code; empty at its start.
+        choice
+            Which pool it is from, and by which seed, where no decision reports that.
         """
-        report = {"kind": "gesture", "name": gesture.name, "phase": phase, "outcome": outcome}
+        report: Report = {"kind": "gesture", "name": gesture.name}
+        report |= {"phase": phase, "outcome": outcome}
+        if choice is not None:
+            report |= {"pool": choice.pool, "seed": choice.seed}
         is_open = not self._base.abilities.closed_loop
         self.report(report | {"open_loop": True} if is_open else report)
 
@@ -157,6 +167,11 @@ class StatusReporter:
         if not due and state == self._reported:
             return
         self._reported_s, self._reported = now_s, state
+        if gesture is None or self._performing is not gesture:
+            self._performing, self._began_s = gesture, now_s
+        look = REST
+        if gesture is not None:
+            look = look_of(gesture.name, gesture.score.mood, now_s - self._began_s)
         volts, abilities = there.sensors.battery_v, self._base.abilities
         self.report(
             {
@@ -176,6 +191,7 @@ class StatusReporter:
                 "counters": {name: count for name, count in counters.items() if count},
                 "lights": list(lights or LIGHTS[self._indication or Indication.WAITING]),
                 "mood": "calm" if gesture is None else gesture.score.mood,
+                "look": [look.mouth, look.eyes],
             }
         )
 

@@ -89,7 +89,10 @@ class Variety:
         Choice or None
             None where there is no such pool.
         """
-        pool = self._pools[decision.above] if name == VARIED else name
+        return self.take(self._pools[decision.above] if name == VARIED else name)
+
+    def take(self, pool: str) -> Choice | None:
+        """Return the next variant of a pool; None where there is no such pool."""
         if pool not in POOLS:
             return None
         gesture = pick(POOLS[pool], self.seed, self._number, tuple(self._recent))

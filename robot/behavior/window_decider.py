@@ -18,6 +18,7 @@ MIN_STEPS = 2  # of a window; with fewer valid steps there is no decision
 # for the patient begin; at the threshold one of this share (our choice).
 FULL_PERFORMANCE = 1.1
 MIN_STRENGTH = 0.5
+SHORTEST_STEP_S = 0.7  # nobody who trains after a stroke takes steps of one leg faster (ours)
 
 # Why no gesture followed a decision.
 NO_GESTURE = "no_gesture"  # the order names none for it
@@ -186,6 +187,23 @@ class WindowDecider:
         if self._started_s is not None and decision.at_s - self._started_s < self.cue.rest_s:
             return RESTING
         return ""
+
+    def free_s(self, time_s: float) -> float:
+        """Return how long no decision can be due yet [s]; 0 where one may be at any moment.
+
+        Parameters
+        ----------
+        time_s
+            The source's clock now, as far as it is known [s].
+        """
+        if self.cue.rule != CueRule.WINDOWS:
+            return (self.cue.count - self._steps) * SHORTEST_STEP_S
+        if self._first_s is None:
+            return self.cue.window_s
+        until_s = self._first_s + (self._window + 1) * self.cue.window_s
+        if self._steps < MIN_STEPS or time_s > until_s + self.cue.window_s:
+            until_s = math.inf  # what ends it now decides nothing, or too late for an answer
+        return max(until_s - time_s, 0.0)
 
     def mark_started(self, decision: Decision) -> None:
         """Store that a gesture answers this decision."""

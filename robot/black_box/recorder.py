@@ -17,14 +17,15 @@ from typing import Any, NamedTuple, Self
 
 from robot.atomic_file import write_atomically
 from robot.black_box.ring import Ring
-from robot.black_box.session_motion import SessionMotion
-from robot.wire.incident import Record, pack, read_lines, to_lines
+from robot.black_box.session_motion import MotionParts, SessionMotion
+from robot.wire.incident import MOTION, Record, pack, read_lines, to_lines
 
 WAITING = 6_000  # records in memory: of a minute
 WRITE_EVERY_S = 0.5
 BEFORE_S, AFTER_S = 30.0, 5.0  # of an incident
 MAX_FILES = 50  # the newest; some 0.6 MB each
 TO_SEND = 4  # incidents that wait for the server
+PARTS_TO_SEND = 60  # of motion: an hour
 
 CLOSED = "closed"
 DIED = "worker_died"
@@ -66,6 +67,8 @@ class BlackBox:
     ----------
     incidents
         Those to send, oldest first; the sender pops them from the left.
+    motion
+        Parts of the session's motion to send, likewise.
     lost
         How many records were dropped.
     problem
@@ -82,6 +85,8 @@ class BlackBox:
     ) -> None:
         self.folder = folder
         self.incidents: deque[Incident] = deque(maxlen=TO_SEND)
+        self.motion: deque[Incident] = deque(maxlen=PARTS_TO_SEND)
+        self._parts = MotionParts()
         self.lost, self.problem = 0, ""
         self._monotonic, self._now = monotonic, now
         self._ring = Ring(folder)
@@ -149,6 +154,8 @@ class BlackBox:
         except OSError:
             self.lost += len(records)
             raise
+        for session, part in self._parts.add(records):
+            self.motion.append(Incident(MOTION, session, part[-1]["at_s"], pack(part)))
         if self._motion is not None:
             self._motion.add(records)
             if self._is_closing.is_set():

@@ -1,40 +1,22 @@
-"""The motion of each session as a file of its own, in MCAP: what a study can cite, and replay.
-
-A file has the orders and the odometry, 50 times a second while it moved, each decision with its
-window, variant and seed, each gesture and stop, and the cues that it followed, by the time of day.
-It names no patient: the session's number alone. Foxglove and the readers of mcap.dev open it.
-"""
+"""The motion of each session: a file of its own on the robot, and parts of it for the server."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
 
-from robot.wire.incident import TICK, Record
-
-if TYPE_CHECKING:
-    from mcap.writer import Writer
+from robot.wire.incident import MOTION_TOPICS, Record
+from robot.wire.motion_file import MotionFile
 
 MAX_FILES = 500  # sessions, the newest; some 1 MB for ten minutes
-CHUNK_BYTES = 64 * 1024  # so much may be lost where the power is
-
-ORDER, ODOMETRY = "/order", "/odometry"
-# Topics of what it reported and received, by their kind.
-REPORTS = {kind: f"/{kind}" for kind in ("decision", "gesture", "stop")}
-RECEIVED = {kind: f"/{kind}" for kind in ("welcome", "cue", "state")}
-_NUMBERS = {
-    ORDER: TICK[:2],
-    ODOMETRY: TICK[2:],
-}
+# Of the parts for the server: their length, and the time between two ticks [s] (ours). Ten minutes
+# of answers come to some 150 kB. After a session's end a farewell takes up to so long.
+PART_S, TICK_EVERY_S, AFTER_S = 60.0, 0.1, 6.0
 
 
 class SessionMotion:
     """Writes what a black box records into the file of the session that it is of.
-
-    Needs the package mcap.
 
     Parameters
     ----------
@@ -45,14 +27,9 @@ class SessionMotion:
     """
 
     def __init__(self, folder: Path, to_epoch_s: float) -> None:
-        import mcap.writer  # optional: without it this fails here, and not in a session
-
-        self._mcap = mcap.writer
         self._folder, self._to_epoch_s = folder, to_epoch_s
         self._session: int | None = None
-        self._file: BinaryIO | None = None
-        self._writer: Writer | None = None
-        self._channels: dict[str, int] = {}
+        self._file: MotionFile | None = None
 
     def add(self, records: Iterable[Record]) -> None:
         """Write records, oldest first; those without a session are left out. Raises OSError."""
@@ -61,24 +38,14 @@ class SessionMotion:
                 case {"received": {"type": "welcome", "session": session}}:
                     if session != self._session:
                         self._begin(session, record["at_s"])
-                    self._write(RECEIVED["welcome"], record["at_s"], record["received"])
-                case {"received": {"type": str(kind)} as message} if kind in RECEIVED:
-                    self._write(RECEIVED[kind], record["at_s"], message)
-                case {"sent": {"kind": str(kind)} as report} if kind in REPORTS:
-                    self._write(REPORTS[kind], record["at_s"], report)
-                case {"tick": tick}:
-                    columns = dict(zip(TICK, tick, strict=True))
-                    for topic, names in _NUMBERS.items():
-                        numbers = {name: columns[name] for name in names}
-                        self._write(topic, record["at_s"], numbers)
+            if self._file is not None:
+                self._file.add(record, self._to_epoch_s)
 
     def close(self) -> None:
         """End the file. Raises OSError."""
-        writer, file = self._writer, self._file
-        self._writer = self._file = self._session = None
-        if writer is not None and file is not None:
-            with file:
-                writer.finish()  # type: ignore[no-untyped-call]
+        file, self._file, self._session = self._file, None, None
+        if file is not None:
+            file.close()
 
     def _begin(self, session: int | None, at_s: float) -> None:
         self.close()
@@ -87,25 +54,44 @@ class SessionMotion:
         began = datetime.fromtimestamp(self._to_epoch_s + at_s, UTC)
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"session-{began:%Y%m%dT%H%M%S%fZ}-{session}.mcap"
-        self._file = path.open("wb")
-        self._session, self._channels = session, {}
-        self._writer = self._mcap.Writer(self._file, chunk_size=CHUNK_BYTES)
-        self._writer.start(library="garry")
-        self._writer.add_metadata("garry", {"session": str(session)})
+        self._session, self._file = session, MotionFile(path.open("wb"), session)
         for old in sorted(self._folder.glob("session-*.mcap"))[:-MAX_FILES]:
             old.unlink()
 
-    def _write(self, topic: str, at_s: float, message: Any) -> None:
-        if self._writer is None:
-            return
-        if topic not in self._channels:
-            numbers = {name: {"type": "number"} for name in _NUMBERS.get(topic, ())}
-            schema = {"type": "object", "properties": numbers}
-            schema_id = self._writer.register_schema(
-                f"garry{topic.replace('/', '.')}", "jsonschema", json.dumps(schema).encode()
-            )
-            self._channels[topic] = self._writer.register_channel(topic, "json", schema_id)
-        time_ns = round(1e9 * (self._to_epoch_s + at_s))
-        self._writer.add_message(
-            self._channels[topic], time_ns, json.dumps(message).encode(), time_ns
-        )
+
+class MotionParts:
+    """Collects a session's motion for the server: its number, and the records of a minute each."""
+
+    def __init__(self) -> None:
+        self._session: int | None = None
+        self._records: list[Record] = []
+        self._ticked_s = self._ends_s = float("-inf")
+        self._has_moved = False
+
+    def add(self, records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
+        """Take records, oldest first, and yield each part that is whole."""
+        for record in records:
+            at_s = record["at_s"]
+            match record:
+                case {"received": {"type": "welcome", "session": session}}:
+                    if session != self._session:
+                        yield from self.take()
+                        self._session = session
+                case {"received": {"type": "state", "state": state}}:
+                    self._ends_s = float("-inf") if state == "running" else at_s + AFTER_S
+                case {"sent": {"kind": kind} as report} if kind in MOTION_TOPICS:
+                    self._records.append({"at_s": at_s, "sent": report})
+                case {"tick": tick} if at_s - self._ticked_s >= TICK_EVERY_S - 0.005:
+                    self._ticked_s = at_s
+                    self._records.append({"at_s": at_s, "tick": tick})
+                    self._has_moved = self._has_moved or any(tick[:2])
+            is_over = self._ends_s > 0 and at_s >= self._ends_s
+            if self._records and (is_over or at_s - self._records[0]["at_s"] >= PART_S):
+                yield from self.take()
+
+    def take(self) -> Iterator[tuple[int, list[Record]]]:
+        """Yield what there is as a part, if it moved at all, and begin the next one."""
+        records, has_moved = self._records, self._has_moved
+        self._records, self._has_moved, self._ends_s = [], False, float("-inf")
+        if self._session is not None and has_moved:
+            yield self._session, records

@@ -6,7 +6,7 @@ import math
 
 from robot.marking import gettext_noop
 from robot.motion.gesture import Gesture, Waypoint
-from robot.motion.pools import POOLS, VARIANTS
+from robot.motion.pools import IDLE, POOLS, VARIANTS
 from robot.motion.score import FALLING, RISING
 from robot.wire.cue_limits import VARIED
 
@@ -96,6 +96,6 @@ ORIGINALS: dict[str, Gesture] = {
     gesture.name: gesture for gesture in (ORIGINAL_POSITIVE, ORIGINAL_NEGATIVE, ORIGINAL_BINARY)
 }
 
-BUILT_IN = GESTURES | VARIANTS | ORIGINALS  # all that a robot can play, by name
+BUILT_IN = GESTURES | VARIANTS | ORIGINALS | {one.name: one for one in IDLE}  # all, by name
 # All that a cue may name: a gesture is performed each time, of a pool another variant each time.
 KNOWN_NAMES = frozenset({*BUILT_IN, *POOLS, VARIED})

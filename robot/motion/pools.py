@@ -8,6 +8,7 @@ both sides.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ from robot.motion.score import (
     RISING_HIGH,
     RISING_LONG,
     SIGHING,
+    Color,
+    Light,
     Score,
 )
 
@@ -99,6 +102,8 @@ TABLE: dict[str, Pool] = {
             Effort("look", 75, 1.0, 1.0, 0.0, RISING_LONG),
             Effort("climb", 0.15, 1.0, 1.0, 0.0, RISING_HIGH),
             Effort("ebb", 0.15, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("peek", 66, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("linger", 66, 1.0, 1.0, 0.0, RISING_HIGH),
         ),
     ),
     "streak_5": Pool(
@@ -107,6 +112,9 @@ TABLE: dict[str, Pool] = {
             Effort("dash", 0.18, 1.0, 1.0, 0.0, RISING_HIGH),
             Effort("look", 82, 1.0, 1.0, 0.0, RISING_HIGH),
             Effort("peek", 68, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("climb", 0.16, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("ebb", 0.16, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("linger", 68, 1.0, 1.0, 0.0, RISING_HIGH),
         ),
     ),
     "streak_10": Pool(
@@ -115,6 +123,9 @@ TABLE: dict[str, Pool] = {
             Effort("dash", 0.20, 1.0, 1.0, 0.0, RISING_LONG),
             Effort("look", 90, 1.0, 1.0, 0.0, RISING_LONG),
             Effort("peek", 70, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("climb", 0.17, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("ebb", 0.17, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("linger", 72, 1.0, 1.0, 0.0, RISING_LONG),
         ),
     ),
     "comeback": Pool(
@@ -124,6 +135,8 @@ TABLE: dict[str, Pool] = {
             Effort("look", 62, 0.75, 1.0, 0.0, RISING),
             Effort("climb", 0.13, 0.85, 1.0, 0.0, RISING),
             Effort("linger", 58, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("peek", 58, 0.85, 1.0, 0.0, RISING),
+            Effort("ebb", 0.13, 0.85, 1.0, 0.0, RISING_LONG),
         ),
     ),
     "disappointment": Pool(
@@ -147,6 +160,7 @@ TABLE: dict[str, Pool] = {
             Effort("climb", 0.12, 1.0, 0.85, 0.0, ASKING),
             Effort("ebb", 0.12, 1.0, 0.8, 0.0, ASKING),
             Effort("peek", 52, 1.0, 0.8, 0.0, ASKING),
+            Effort("linger", 54, 1.0, 0.85, 0.0, ASKING),
         ),
     ),
     "effort": Pool(
@@ -157,6 +171,7 @@ TABLE: dict[str, Pool] = {
             Effort("look", 58, 0.75, 0.9, 0.0, ASKING),
             Effort("peek", 54, 0.8, 1.0, 0.0, ASKING),
             Effort("ebb", 0.12, 0.85, 0.9, 0.0, ASKING),
+            Effort("linger", 54, 0.85, 0.9, 0.0, ASKING),
         ),
     ),
     "greeting": Pool(
@@ -166,6 +181,8 @@ TABLE: dict[str, Pool] = {
             Effort("peek", 54, 0.9, 0.9, 0.0, NEUTRAL),
             Effort("look", 60, 0.9, 0.9, 0.0, NEUTRAL),
             Effort("dash", 0.12, 0.9, 0.9, 0.4, NEUTRAL),
+            Effort("linger", 56, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("climb", 0.12, 0.9, 0.9, 0.0, NEUTRAL),
         ),
     ),
     "rest": Pool(
@@ -174,6 +191,8 @@ TABLE: dict[str, Pool] = {
             Effort("look", 50, 0.75, 0.75, 0.2, NEUTRAL),
             Effort("dash", 0.11, 0.75, 0.75, 0.2, NEUTRAL),
             Effort("linger", 50, 0.8, 0.8, 0.0, NEUTRAL),
+            Effort("peek", 50, 0.8, 0.8, 0.0, NEUTRAL),
+            Effort("ebb", 0.11, 0.8, 0.75, 0.0, NEUTRAL),
         ),
     ),
     "farewell": Pool(
@@ -183,6 +202,8 @@ TABLE: dict[str, Pool] = {
             Effort("ebb", 0.13, 0.9, 0.9, 0.0, NEUTRAL),
             Effort("dash", 0.12, 1.0, 0.75, 0.3, NEUTRAL),
             Effort("look", 64, 0.9, 0.8, 0.0, NEUTRAL),
+            Effort("climb", 0.12, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("peek", 54, 0.9, 0.9, 0.0, NEUTRAL),
         ),
     ),
 }
@@ -194,7 +215,7 @@ LEAST_M, LEAST_RAD = 0.105, math.radians(46.5)  # a player stops a little before
 ROOM_S, HOME_ROOM_S = 0.5, 1.2
 
 
-def _compose(pool: str, number: int, row: Effort, side: int) -> Gesture:
+def _compose(name: str, label: str, row: Effort, side: int) -> Gesture:
     """Return the variant of a row that turns to the left (1) or to the right (-1)."""
     path = PATHS[row.path]
     size_m, turn_rad = (0.0, math.radians(row.size)) if row.turns else (row.size, 0.0)
@@ -220,15 +241,27 @@ def _compose(pool: str, number: int, row: Effort, side: int) -> Gesture:
         )
     )
     least = LEAST_RAD / turn_rad if row.turns else LEAST_M / size_m
-    label = f"{TABLE[pool].label} {number}"
-    return Gesture(f"{pool}_{number}", label, waypoints, row.score, least=min(least, 1.0))
+    return Gesture(name, label, waypoints, row.score, least=min(least, 1.0))
 
 
-def _variants(pool: str) -> tuple[Gesture, ...]:
-    rows = TABLE[pool].rows
+def _spread(pool: str, label: str, rows: Sequence[Effort]) -> Iterator[Gesture]:
+    """Yield the variants of a pool: one of each row, or two where it turns on the spot."""
     sides = [(row, side) for row in rows for side in ((1, -1) if row.turns else (1,))]
-    return tuple(_compose(pool, number, *one) for number, one in enumerate(sides, start=1))
+    for number, one in enumerate(sides, start=1):
+        yield _compose(f"{pool}_{number}", f"{label} {number}", *one)
 
 
-POOLS: dict[str, tuple[Gesture, ...]] = {pool: _variants(pool) for pool in TABLE}
+# Idle life between answers: smaller and slower than any answer, lights alone. No cue names it.
+IDLE_SCORE = Score((Light(0.0, Color.ORANGE, Color.OFF),))
+IDLE_ROWS = (
+    Effort("dash", 0.04, 0.5, 0.5, 0.0, IDLE_SCORE),  # a breath
+    Effort("look", 16, 0.5, 0.5, 0.0, IDLE_SCORE),  # a small gaze
+    Effort("dash", 0.05, 0.4, 0.4, 0.3, IDLE_SCORE),
+    Effort("look", 12, 0.5, 0.4, 0.5, IDLE_SCORE),
+    Effort("look", 20, 0.5, 0.5, 0.0, IDLE_SCORE),
+)
+IDLE = tuple(_spread("idle", gettext_noop("Idle"), IDLE_ROWS))  # in full size: never scaled
+POOLS: dict[str, tuple[Gesture, ...]] = {
+    pool: tuple(_spread(pool, label, rows)) for pool, (label, rows) in TABLE.items()
+}
 VARIANTS: dict[str, Gesture] = {one.name: one for pool in POOLS.values() for one in pool}

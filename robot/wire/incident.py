@@ -32,6 +32,11 @@ Record = Mapping[str, Any]
 # The columns of a tick: the order [m/s, rad/s], the pose from home [m, m, rad], the velocity.
 TICK = ("order_m_s", "order_rad_s", "x_m", "y_m", "heading_rad", "speed_m_s", "turn_rad_s")
 
+# The reason of a recording that nothing stopped: a part of its session's motion, of these reports
+# and of fewer ticks.
+MOTION = "motion"
+MOTION_TOPICS = ("decision", "gesture", "stop")
+
 MAX_TEXT_CHARS = 60_000  # with the rest of its message below a frame's limit
 MAX_FILE_BYTES = 4_000_000  # what such a text may unpack to
 _NOT_PACKED = '"recording" is packed as robot/wire/incident.py does it.'

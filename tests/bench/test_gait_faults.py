@@ -20,9 +20,11 @@ def test_table():
     for fault in FAULTS:
         tallies = [try_fault(name, fault) for name in RECORDINGS]
         shown[fault] = sum(t.wrong for t in tallies)
+        doubts = sorted({doubt for t in tallies for doubt in t.doubts})
         cells = "".join(f"{t.wrong:>5}/{t.lost:>3}/{t.strides:>3} {t.worst:>5.0%}" for t in tallies)
         mark = find_hidden(fault) if shown[fault] else None
-        print(f"{fault:28}{cells}" + (f"  hidden {mark}" if mark else ""))
+        waits = f"  waits: {', '.join(doubts)}" if doubts else ""
+        print(f"{fault:28}{cells}" + waits + (f"  hidden {mark}" if mark else ""))
     print("\nContacts of a foot that drags by 40 to 60 N, both legs: within 20 ms, worst")
     for name in RECORDINGS:
         drags = [try_fault(name, fault, side) for fault in CERTAIN_DRAGS for side in SIDES]

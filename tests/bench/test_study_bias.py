@@ -18,8 +18,10 @@ import numpy as np
 from scipy import stats
 
 from rehab.studies.allocation.groups import Group
-from rehab.studies.analysis.comparison import Observation, compare
-from rehab.studies.analysis.participants import Participant, ParticipantVisit, by_arm, observations
+from rehab.studies.analysis.comparison import compare
+from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.findings import observations
+from rehab.studies.analysis.participants import Participant, ParticipantVisit, by_arm
 from rehab.studies.simulation.example import PHASES
 from rehab.studies.simulation.trial import Trial, simulate
 from rehab.training.goals import GoalRule

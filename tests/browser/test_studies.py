@@ -188,6 +188,7 @@ def test_a_study_is_planned_walked_blind_and_an_arm_is_revealed(server, browser,
         pt.click("text=Reveal the arm")
         pt.fill("#why-reveal", "dizzy after the third block")
         pt.check("[name=emergency]")
+        pt.check("[name=alone]")
         pt.click("button:has-text('Reveal')")
         expect(pt.locator(".revealed")).to_contain_text("side")
     with page_of(browser, server, people["lena"]) as lead:

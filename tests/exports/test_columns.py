@@ -60,6 +60,7 @@ WALKED: Any = Row(
     pk=41, patient=PATIENT, to_plan=lambda: PLAN, began_at=datetime(2030, 8, 1, tzinfo=UTC),
     valence="binary", measure=Row(slug="knee", unit="deg"), active_s=593.0, legacy_id=5,
     protocol=Row(name="Long"),
+    late_strides=21,
     walking=Row(device="<device>", belt_speed_m_s=0.7, weight_support_percent=23.0),
     metrics=Row(all=lambda: [Row(slug=slug, value=value) for slug, value in FIGURES.items()]),
     belt_speed_m_s=0.7, weight_support_percent=23.0, last_number=100,
@@ -92,7 +93,8 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
         | FIGURES
         | {
             "feedback_type": "binary", "measure": "knee", "unit": "deg", "wanted_hit_rate": 0.61,
-            "planned": 602, "walked": 593.0, "protocol": "Long", "activation_threshold": 0.83,
+            "planned": 602, "walked": 593.0, "late_strides": 21,
+            "protocol": "Long", "activation_threshold": 0.83,
             "robot_rule": "streaks", "robot_window": 6.4, "robot_count": 7, "robot_rest": 8.5,
             "schedule": "faded", "schedule_steps": 9, "schedule_band": 0.11,
             "words_vary": "<words_vary>",

@@ -191,6 +191,16 @@ def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
         assert to_number(session[metric.slug]) == metric.value
 
 
+def test_the_row_of_a_session_counts_the_strides_that_came_late_apart(world):
+    session = walk(world.patient, "positive", [2.5, 1.5, 2.5, 1.5])
+    steps = Step.everywhere.filter(session=session)
+    steps.filter(number__lte=2).update(valid=False, reasons=["odd", "late"])
+    steps.filter(number=3).update(valid=False, reasons=["gap"])
+    counts = {row["session"]: row["late_strides"] for row in rows_of(fetch(world)["sessions.csv"])}
+    assert counts[str(session.pk)] == "2"
+    assert counts[str(world.session.pk)] == "0"
+
+
 def test_each_step_says_under_which_feedback_type_it_was_taken(world):
     phases = (make_phase("training", strides=2), make_phase("catch"), make_phase("training"))
     session = walk(

@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,12 @@ import pytest
 from rehab.exports.research.package import Package
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.questionnaires import answer, ask, next_response
+from robot.black_box.recorder import Incident
+from robot.wire.incident import unpack
+from tests.support.recorded_stage import RecordedStage, read
+from tests.support.robot_stage import CUE, WELCOME
 from tests.support.walks import visit, walk
 from tests.support.world import NOW, World
 
@@ -27,6 +33,13 @@ def files(world: World, tmp_path: Path) -> Path:
     Patient.everywhere.filter(pk=world.patient.pk).update(birth_year=1955, severity="mild")
     session = visit(world.patient, "positive", seed=3, days_ago=1, count=160)
     walk(world.patient, "negative", [2.5, None, 1.5])
+    for part in move(tmp_path / "box"):
+        RobotIncident.everywhere.create(
+            session=session,
+            at=session.started_at + timedelta(seconds=part.at_s - 1000),
+            reason=part.reason,
+            recording=part.recording,
+        )
     user = world.people[Role.RESEARCHER]
     ask(session, ["tlx"], NOW)
     response = next_response(world.people[Role.PT], session)
@@ -40,6 +53,40 @@ def files(world: World, tmp_path: Path) -> Path:
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_bytes(b"".join(p.encode() if isinstance(p, str) else p for p in pieces))
     return out
+
+
+def move(folder: Path) -> list[Incident]:
+    """Return what a robot sends of its motion, of a minute and a half."""
+    stage = RecordedStage(folder)
+    stage.hear(**WELCOME | {"cue": CUE | {"above": "varied", "below": "varied"}})
+    stage.walk(*[1.0, 1.2, 0.4, 0.5] * 22)
+    stage.hear(type="state", state="finished")
+    stage.wait(7)
+    stage.close()
+    return list(stage.box.motion)
+
+
+def test_the_robot_s_motion_is_exported_as_it_was_sent(files, tmp_path):
+    pytest.importorskip("mcap.reader", reason="pip install garry[motion]")
+    sent = [one for part in move(tmp_path / "again") for one in unpack(part.recording)]
+    ticks = [one["tick"] for one in sent if "tick" in one]
+    (file,) = (files / "robot").iterdir()
+    topics = read(file)
+    assert [tuple(message.values()) for _, message in topics["/odometry"]] == [
+        tuple(tick[2:]) for tick in ticks
+    ]
+    assert [message["gesture"] for _, message in topics["/decision"]] == [
+        one["sent"]["gesture"] for one in sent if one.get("sent", {}).get("kind") == "decision"
+    ]
+    times_s = [at_ns / 1e9 for at_ns, _ in topics["/odometry"]]
+    assert times_s == sorted(times_s)
+    (table,) = (files / "bids").rglob("*_tracksys-robot_motion.tsv")
+    rows = [[float(cell) for cell in line.split("\t")] for line in table.read_text().splitlines()]
+    assert [row[1:] for row in rows] == ticks
+    channels = table.with_name(table.name.replace("motion.tsv", "channels.tsv")).read_text()
+    assert len(channels.splitlines()) == 1 + len(rows[0])
+    sidecar = json.loads(table.with_suffix(".json").read_text())
+    assert sidecar["SamplingFrequency"] == pytest.approx(10, rel=0.2)
 
 
 @pytest.mark.skipif(VALIDATOR is None, reason="bids-validator-deno is not installed")

@@ -133,7 +133,7 @@ def test_before_the_end_nothing_tells_a_group(world, tmp_path):
     study = studied(world)
     files = exported(world.people[Role.RESEARCHER], tmp_path / "parts", study)
     mine = {name.rpartition("/")[2]: text for name, text in files.items() if "studies/" in name}
-    assert set(mine) == {"protocol.json", "participants.csv", "definitions.csv"}
+    assert set(mine) == {"protocol.json", "participants.csv", "definitions.csv", "checklists.csv"}
     assert {row["group"] for row in rows_of(mine["participants.csv"])} == {""}
     assert "allocation_secret" not in mine["protocol.json"]
     assert SEED not in "".join(files.values())

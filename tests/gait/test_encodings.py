@@ -88,3 +88,15 @@ def test_what_is_no_text_is_said_in_a_sentence(tmp_path, name, data):
     words = str(refused.value)
     assert words.endswith(".")
     assert not any(jargon in words for jargon in ("codec", "byte", "null", "NUL", "0x")), words
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_decimal_commas(tmp_path, delimiter):
+    path = tmp_path / "walk.csv"
+    lines = ("Zeit [ms],Kraft", "0,5;-1,25e2", "1,5;7")
+    path.write_text("\n".join(lines).replace(",Kraft", ";Kraft").replace(";", delimiter))
+    table = read_any_table(path)
+    assert {name: list(values) for name, values in table.items()} == {
+        "Zeit [ms]": [0.5, 1.5],
+        "Kraft": [-125.0, 7.0],
+    }

@@ -5,19 +5,23 @@ crosses 20 N, impulses of the unfiltered forward force, its peak below 20 Hz, le
 positions. Of 71 strides some had late samples, which numpy leaves where their stamps are.
 """
 
+import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, measure_strides
+from rehab.gait import LegSamples, TwoLegDetector, measure_strides
+from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS
+from rehab.gait.recordings.readers import read_any_table
 from rehab.sources.intake.measurements import to_measurement
 from rehab.training.measures import PLATE_MEASURES
 from rehab.training.scoring import judge
 from rehab.training.steps import Side, select_value
 from robot.wire.limits import MAX_EXTRA
-from tests.gait.corpus import CorpusWalk, find_stances
+from tests.gait.corpus import CorpusWalk, find_clean, find_stances, open_corpus, read_lab_file
 from tests.gait.walks import read_moore, read_moore_columns
 
 SIDES = ("left", "right")
@@ -36,6 +40,10 @@ def open_walk():
             walk_leg[2],
             columns[f"{side.title()}GRF_x"],
             columns[f"{side.title()}Foot_x"],
+            columns[f"{side.title()}Foot_y"],
+            columns["COM_x"],  # there are no hips in it; both are the body's center
+            columns["COM_y"],
+            columns[f"{side.title()}KneeFlexionAngle"],
         )
         for side, walk_leg in (("left", walk.left), ("right", walk.right))
     }
@@ -44,11 +52,44 @@ def open_walk():
 
 
 @cache
-def measure_by_numpy():
+def open_gaitalytics():
+    """Return the treadmill walk of another person and system, and its measured strides."""
+    pytest.importorskip("ezc3d")
+    walk = add_own(open_corpus("gaitalytics treadmill"), "gaitalytics treadmill")
+    return walk, walk.measure()
+
+
+def add_own(walk, name):
+    """Return a walk with what plates and markers of its file come to."""
+    table = read_any_table(read_lab_file(PLUG_IN_GAIT[name]))
+    columns = SIGNAL_LAYOUTS["garry"].legs
+    legs = {
+        side: leg._replace(**{
+            field: table[f"own.{columns[side][channel].name}"]
+            for channel, field in zip(CHANNELS[3:], LegSamples._fields[3:], strict=True)
+        })
+        for side, leg in walk.legs.items()
+    }  # fmt: skip
+    return replace(walk, legs=legs)
+
+
+WALKS = {"moore2013": open_walk, "gaitalytics": open_gaitalytics}
+PLUG_IN_GAIT = {
+    "gaitalytics treadmill": "gaitalytics_treadmill_events.c3d",
+    "BTK flatfoot": "btk_pig_flatfoot_full.c3d",
+    "BTK motion3": "btk_pig_motion3_ff.c3d",
+}
+
+
+@cache
+def measure_by_numpy(name):
     """Return for each stance, by side and begin, its figures by name."""
-    walk, _ = open_walk()
+    walk, _ = WALKS[name]()
     stances = {side: find_stances(walk, side) for side in SIDES}
-    b, a = butter(2, 20 / 50)
+    b, a = butter(2, 20 / (walk.rate_hz / 2))
+    belt_m_s = read_moore_columns()["LeftBeltSpeed"].mean()
+    slow = butter(2, 6 / (walk.rate_hz / 2))
+    velocity_m_s = np.gradient(filtfilt(*slow, walk.legs["left"].hip_forward_m), walk.t_s)
     found = {}
     for side in SIDES:
         own, others = stances[side], stances[OTHER[side]]
@@ -59,7 +100,14 @@ def measure_by_numpy():
                 continue
             other = before[-1]
             first, stop = np.searchsorted(walk.t_s, (begin_s, end_s))
-            forward = np.asarray(walk.legs[side].forward_n)[first:stop] / walk.mass_kg
+            leg = walk.legs[side]
+            forward = np.asarray(leg.forward_n)[first:stop] / walk.mass_kg
+            swing = slice(*np.searchsorted(walk.t_s, (own[place - 1][1], begin_s)))
+            late = slice((first + stop) // 2, stop)
+            ahead_m, up_m = leg.hip_forward_m - leg.position_m, leg.hip_up_m - leg.foot_up_m
+            limb = np.arctan2(ahead_m[late], up_m[late])
+            pendulum_hz = np.sqrt(9.81 / leg.hip_up_m[first])
+            center = leg.hip_forward_m + (velocity_m_s + belt_m_s) / pendulum_hz
             t_s = walk.t_s[first:stop]
             feet = [np.asarray(walk.legs[leg].position_m)[first] for leg in (side, OTHER[side])]
             found[side, begin_s] = {
@@ -70,6 +118,9 @@ def measure_by_numpy():
                 "step_length_m": feet[0] - feet[1],
                 "propulsion_impulse_n_s_kg": np.trapezoid(np.maximum(forward, 0), t_s),
                 "braking_impulse_n_s_kg": np.trapezoid(np.maximum(-forward, 0), t_s),
+                "trailing_limb_deg": np.degrees(limb.max()),
+                "knee_flexion_deg": np.degrees(leg.knee_angle_rad[swing].max()),
+                "margin_m": center[first] - leg.position_m[first],
                 "propulsion_n_kg": filtfilt(b, a, forward)[len(forward) // 2 :].max(),
             }
     for (side, begin_s), figures in found.items():
@@ -84,6 +135,10 @@ def measure_by_numpy():
             ("step_length_ratio_percent", "step_length_m"),
         ):
             figures[name] = 100 * figures[what] / earlier_figures[what]
+        two = [figures, earlier_figures]
+        cadence = 60 / np.mean([one["step_s"] for one in two])
+        length_mm = 1000 * np.mean([one["step_length_m"] for one in two])
+        figures["walking_ratio_mm_min"] = length_mm / cadence
         impulses = [one["propulsion_impulse_n_s_kg"] for one in (figures, earlier_figures)]
         figures["propulsion_percent"] = 100 * impulses[0] / sum(impulses)
     return found
@@ -105,12 +160,50 @@ def measure_by_numpy():
         ("swing_ratio_percent", 2.0, 5.0),
         ("step_time_ratio_percent", 1.2, 3.0),
         ("step_length_ratio_percent", 0.5, 2.0),
+        ("trailing_limb_deg", 0.2, 0.5),
+        ("knee_flexion_deg", 0.2, 0.4),
+        ("walking_ratio_mm_min", 0.05, 0.1),
+        ("margin_m", 0.005, 0.01),
     ],
 )
 def test_against_numpy_alone(name, median, most):
-    _, strides = open_walk()
+    found = compare("moore2013", name)
+    assert len(found) > 60
+    assert np.median(found) < median
+    assert np.percentile(found, 90) < most
+
+
+@pytest.mark.parametrize(
+    ("name", "median"),
+    [
+        ("step_s", 0.004),
+        ("stance_s", 0.006),
+        ("swing_s", 0.006),
+        ("double_support_s", 0.008),
+        ("step_length_m", 0.003),
+        ("propulsion_n_kg", 0.03),
+        ("propulsion_impulse_n_s_kg", 0.004),
+        ("braking_impulse_n_s_kg", 0.004),
+        ("propulsion_percent", 1.0),
+        ("stance_ratio_percent", 0.7),
+        ("swing_ratio_percent", 1.2),
+        ("step_time_ratio_percent", 0.8),
+        ("step_length_ratio_percent", 0.8),
+        ("walking_ratio_mm_min", 0.05),
+    ],
+)
+def test_of_another_person_and_system_against_numpy_alone(name, median):
+    """gaitalytics, whose other foot often steps on both plates: the valid strides."""
+    found = compare("gaitalytics", name)
+    assert len(found) >= 4
+    assert np.median(found) < median
+
+
+def compare(walk, name):
+    """Return the distances of a figure to numpy's, of the valid strides of a walk."""
+    _, strides = WALKS[walk]()
     distances, sizes = [], []
-    for (side, begin_s), expected in measure_by_numpy().items():
+    for (side, begin_s), expected in measure_by_numpy(walk).items():
         near = [
             s
             for s in strides
@@ -120,12 +213,77 @@ def test_against_numpy_alone(name, median, most):
             distances.append(abs(getattr(near[0], name) - expected[name]))
             sizes.append(expected[name])
     print(
-        f"\n{name}: {len(distances)} strides, {np.median(sizes):.3f}; off by "
+        f"\n{walk}, {name}: {len(distances)} strides, {np.median(sizes):.3f}; off by "
         f"{np.median(distances):.4f} (median), {np.percentile(distances, 90):.4f} (of 90 %)"
     )
-    assert len(distances) > 60
-    assert np.median(distances) < median
-    assert np.percentile(distances, 90) < most
+    return distances
+
+
+@pytest.mark.parametrize("size", [7, 100])
+def test_chunks_do_not_matter(size):
+    walk, strides = open_walk()
+    detector = TwoLegDetector(100, walk.mass_kg, look_ahead_s=0.05)
+    found = []
+    for first in range(0, len(walk.t_s), size):
+        part = slice(first, first + size)
+        legs = [LegSamples(*(row[part] for row in walk.legs[side])) for side in SIDES]
+        found += detector.feed(walk.t_s[part], *legs)
+    assert found + detector.finish() == strides
+
+
+def measure_posture(walk, table, side, begin_s, end_s):
+    """Return a stride's posture by Plug-in Gait's joints and knee angle, with numpy alone."""
+
+    def read(name):
+        return np.array([table[f"{name}.{axis}"] for axis in "XYZ"]) / 1000
+
+    def differentiate(values):
+        smooth = filtfilt(*butter(2, 6 / (walk.rate_hz / 2)), np.nan_to_num(values))
+        return np.gradient(smooth, walk.t_s)
+
+    own = side[0].upper()
+    feet = [read(f"{letter}TOE") - read(f"{letter}HEE") for letter in "LR"]
+    ahead = np.append(np.nanmean(sum(feet)[:2], axis=1), 0)
+    ahead /= np.linalg.norm(ahead)
+    first, stop = np.searchsorted(walk.t_s, (begin_s, end_s))
+    hip, ankle, heel = (read(own + name) for name in ("FEP", "TIO", "HEE"))
+    line = (hip - ankle)[:, (first + stop) // 2 : stop]
+    middle = (read("LFEP") + read("RFEP")) / 2
+    flat = slice(*(int(first + share * (stop - first)) for share in (0.2, 0.45)))
+    belt_m_s = -np.median(differentiate(ahead @ heel)[flat])
+    speed_m_s = differentiate(ahead @ middle)[first] + belt_m_s
+    center_m = (ahead @ middle)[first] + speed_m_s * np.sqrt(middle[2, first] / 9.81)
+    knee = table[next(n for n in table if re.fullmatch(rf"{own}KneeAnglesV?\.X", n))]
+    return {
+        "trailing_limb_deg": np.degrees(np.arctan2(ahead @ line, line[2]).max()),
+        "margin_m": center_m - (ahead @ ankle)[first],
+        "knee_flexion_deg": np.nanmax(knee[max(0, first - int(0.45 * walk.rate_hz)) : first]),
+    }
+
+
+@pytest.mark.parametrize("name", PLUG_IN_GAIT)
+def test_posture_of_other_people_against_plug_in_gait(name):
+    pytest.importorskip("ezc3d")
+    walk, table = open_corpus(name), read_any_table(read_lab_file(PLUG_IN_GAIT[name]))
+    strides = add_own(walk, name).measure()
+    fields = ("trailing_limb_deg", "margin_m", "knee_flexion_deg")
+    distances: dict[str, list[float]] = {field: [] for field in fields}
+    for clean in find_clean(walk):
+        expected = measure_posture(walk, table, clean.side, clean.begin_s, clean.end_s)
+        (stride,) = [
+            s
+            for s in strides
+            if s.side == clean.side and abs(s.terminal_contact_s - clean.end_s) < 0.05
+        ]
+        for field, value in expected.items():
+            if getattr(stride, field) is not None:
+                distances[field].append(abs(getattr(stride, field) - value))
+    for field, most in (("trailing_limb_deg", 0.5), ("margin_m", 0.02), ("knee_flexion_deg", 2.5)):
+        found = distances[field]
+        print(f"\n{name}, {field}: {len(found)} strides, off by {np.max(found, initial=0):.3f}")
+        assert all(one < most for one in found)
+    assert distances["trailing_limb_deg"]
+    assert distances["margin_m"]
 
 
 def test_all_of_them_travel_with_a_step():

@@ -108,6 +108,12 @@ def test_four_hundred_columns_take_three_seconds():
         ("ground_force_calcn_r_vy", "force", "right"),
         ("Force.Fz1", "force", ""),
         ("left_angle_rad", "angle", "left"),  # our own
+        ("Sprunggelenk links Moment X", "moment", "left"),
+        ("Vertikalkraft rechts [N]", "force", "right"),
+        ("Moment de la cheville gauche", "moment", "left"),
+        ("Force verticale droite", "force", "right"),
+        ("Ángulo tobillo derecho", "angle", "right"),
+        ("Flexo-extensión tobillo izquierdo::Y", "angle", "left"),  # iSen
     ],
 )
 def test_labels(column, channel, side):
@@ -118,10 +124,32 @@ def test_labels(column, channel, side):
 @pytest.mark.parametrize(
     "column",
     ["LAnkleForce.X", "RKneeForce.Z", "RElbowMoment.Y", "LAbsAnkleAngle.X", "LANK.X",
-     "LAnklePower.X", "subtalar_angle_r", "Moment.Mx1", "LNormalisedGRF.Z", "ground_force_px"],
+     "LAnklePower.X", "subtalar_angle_r", "Moment.Mx1", "LNormalisedGRF.Z", "ground_force_px",
+     "Flexo-extensión cadera izquierda::Y", "Flexo-extensión tobillo derecho (Normal):YInf",
+     "Kniewinkel links"],
 )  # fmt: skip
 def test_labels_of_other_things(column):
     assert read_label(column) is None
+
+
+def test_what_is_no_force_is_not_proposed_as_one(walk):
+    """A marker's height, and what carries another mass in any unit, whatever their shape."""
+    names = {"L_Fz": "Right_Heel.Z", "R_Fz": "Left_Heel.Z"}
+    columns = {names.get(name, name): v for name, v in label_columns(walk).items()}
+    guesses = propose(Table(columns, mass_kg=75.0)).guesses
+    assert guesses["left", "force"].column in names.values()
+    with pytest.raises(GaitInputError, match="but no vertical force"):
+        propose(Table(columns, dict.fromkeys(names.values(), "mm"), mass_kg=75.0))
+    tiny = {name: v * (3e-5 if name in names.values() else 1) for name, v in columns.items()}
+    with pytest.raises(GaitInputError, match="would carry 2 kg, not 75"):
+        propose(Table(tiny, mass_kg=75.0))
+
+
+def test_markers_of_a_c3d_have_the_unit_of_lengths():
+    pytest.importorskip("ezc3d")
+    (path,) = map(type(signals("lab_files")), lab_files("btk_pig_motion3_ff.c3d"))
+    units = read_any_table(path).units
+    assert (units["LANK.X"], units["LAnkleMoment.X"]) == ("mm", "Nmm")
 
 
 def test_units_and_signs_of_labels():

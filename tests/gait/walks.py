@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, TwoLegDetector, measure_strides
+from rehab.gait import LegSamples, TwoLegDetector, check_signals, measure_strides
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.training.steps import Measurement, Side
 from tests.support.data import signals
@@ -36,6 +36,11 @@ class Walk:
     def _measure(self, legs, **settings):
         given = {"rate_hz": self.rate_hz, "mass_kg": self.mass_kg} | settings
         return measure_strides(self.t_s, legs, **given)
+
+    def check(self, strides=None):
+        """Return the self-check of the whole walk."""
+        given = {"rate_hz": self.rate_hz, "mass_kg": self.mass_kg, "strides": strides}
+        return check_signals(self.t_s, [*self.left], [*self.right], **given)
 
     def chunks(self, size):
         """Yield times and both legs in chunks, as ``TwoLegDetector.feed`` takes them."""

@@ -116,6 +116,8 @@ def test_an_upload_is_stored_with_whether_it_is_overground(
     assert page.context["stored"] == "floor.csv"
     assert ("--overground" in page.content.decode()) == is_confirmed
     stored = folder / "recordings" / "floor.csv"
+    names = stored.read_text().splitlines()[0].split(",")
+    assert {"left_forward_n", "left_hip_up_m", "right_knee_angle_rad"} < set(names)
     strides, _ = measure_file(stored, None, 74.0, None, 0.05, None, is_overground=False)
     assert sum(not stride.reasons for stride in strides) == replayed
 

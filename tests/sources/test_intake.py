@@ -321,15 +321,25 @@ def knee_of(made, side):
 
 
 @pytest.mark.parametrize(
-    ("mass_kg", "has_knee", "doubt"),
-    [(MASS, False, None), (1.2 * MASS, False, "doubt_weight"), (MASS, True, "doubt_angle")],
+    ("mass_kg", "fault", "doubt"),
+    [
+        (MASS, "", None),
+        (1.2 * MASS, "", "doubt_weight"),
+        (MASS, "knee", "doubt_angle"),
+        (MASS, "cane", "doubt_load"),
+    ],
 )
-def test_strides_wait_for_a_person_where_no_stride_tells_what_is_wrong(mass_kg, has_knee, doubt):
+def test_strides_wait_for_a_person_where_no_stride_tells_what_is_wrong(mass_kg, fault, doubt):
     """After the check of the first half minute they do not count, until somebody has looked."""
     made = make_signals(list(walk(seed=4, strides=70)), MASS, Sensors(rate_hz=200), seed=4)
     both = (made.left, made.right)
     legs = [np.array([leg.force_n, leg.moment_nm, leg.angle_rad]) for leg in both]
-    if has_knee:
+    if fault == "cane":  # it carries an eighth of the weight while the right foot swings
+        left, right = legs
+        cane_n = MASS * 9.81 / 8 * (right[0] < 20)
+        right[0] += cane_n
+        left[:2] *= 1 - cane_n / np.maximum(left[0], 2 * cane_n + 1)
+    if fault == "knee":
         for side, leg in zip(("left", "right"), legs, strict=True):
             leg[2] = knee_of(made, side)
     rows = rows_of(np.column_stack([made.t_s, *np.concatenate(legs)]))

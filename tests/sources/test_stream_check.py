@@ -1,5 +1,6 @@
 """A live stream that is looked at before anybody walks with it."""
 
+import asyncio
 import contextlib
 import json
 import socket
@@ -107,3 +108,12 @@ def test_a_lab_is_checked_without_a_server(table, monkeypatch, capsys, is_walkin
         assert "left.force=FP1*-1" in said.out
     else:
         assert (status, said.out) == (EXIT_UNUSABLE, "")
+
+
+def test_a_sender_that_stops_is_checked_after_half_a_minute_too(table):
+    now_s = 0.0
+    check = StreamCheck(IntakeSettings(), lambda _text: None, lambda: now_s)
+    check.add_rows([{"time": 0.0, "Fz": 1.0}])
+    now_s = 31.0
+    asyncio.run(asyncio.wait_for(check.wait_until_done(), 5))
+    assert not check.is_done.is_set()

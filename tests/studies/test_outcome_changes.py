@@ -14,7 +14,7 @@ from django.urls import reverse
 from rehab.people.roles import Role
 from rehab.studies.models import Study
 from rehab.studies.registration.lifecycle import close, revise
-from rehab.studies.results.results import note_look
+from rehab.studies.results.results import note_look, read_results
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.world import NOW, World, client_of
 
@@ -28,11 +28,11 @@ def switched_study(world: World) -> Study:
     study = running_study(world, primary_outcome=FIRST, secondary_outcomes=["hit_rate"])
     for number in range(3):
         enrolled(study, new_patient(world, number))
-    note_look(study, world.people[Role.RESEARCHER], NOW)
+    note_look(read_results(study, NOW), world.people[Role.RESEARCHER], NOW)
     study.primary_outcome, study.secondary_outcomes = LATER, ["late_change"]
     revise(study, WHY, world.people[Role.LEAD], NOW + timedelta(hours=1))
     enrolled(study, new_patient(world, 9), now=NOW + timedelta(hours=2))
-    note_look(study, world.people[Role.RESEARCHER], NOW + timedelta(days=1))
+    note_look(read_results(study, NOW), world.people[Role.RESEARCHER], NOW + timedelta(days=1))
     close(study, None, NOW + timedelta(days=2))
     return study
 

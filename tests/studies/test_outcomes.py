@@ -10,11 +10,11 @@ import pytest
 from scipy import stats
 
 from rehab.studies.analysis.curves import CurvePlace, average
+from rehab.studies.analysis.findings import find
 from rehab.studies.analysis.outcomes import OF_STRIDES, OUTCOMES
 from rehab.studies.analysis.participants import (
     ParticipantVisit,
     curves_by_arm,
-    find,
     flow,
     make_participant,
 )

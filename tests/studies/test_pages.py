@@ -259,7 +259,7 @@ def test_an_arm_is_revealed_with_a_reason_and_the_lead_can_read_who_asked(world)
     enrollment = enrolled(study, new_patient(world))
     pt, url = client_of(world), reverse("reveal", args=[enrollment.pk])
     assert pt.post(url, {"reason": ""}).status_code == 403
-    shown = text_of(pt.post(url, {"reason": "dizzy", "emergency": "yes"}))
+    shown = text_of(pt.post(url, {"reason": "dizzy", "emergency": "yes", "alone": "yes"}))
     arm = study.arms.get(code=enrollment.allocation.group)
     assert arm.name in shown
     entry = AuditEntry.everywhere.get(act=Act.UNBLIND)

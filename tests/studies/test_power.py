@@ -169,3 +169,11 @@ def test_a_child_whose_study_cannot_be_simulated_notes_it_and_is_not_started_aga
     call_command("studypower", run=run.pk, child=True, stdout=StringIO(), stderr=StringIO())
     run.refresh_from_db()
     assert "phase without an end" in run.trouble
+
+
+@pytest.mark.parametrize(("better", "expected"), [(True, 2 / 3), (False, 1 / 3)])
+def test_with_a_margin_power_is_to_find_that_nothing_is_worse_by_it(better, expected):
+    ends = [(-1.0, 3.0), (0.5, 4.0), (-3.0, 1.0)]
+    found = [SimulatedDifference("B", "A", (low + high) / 2, low, high) for low, high in ends]
+    [pair] = summarize(found, 2.0, higher_is_better=better)
+    assert pair.power == pytest.approx(expected)

@@ -11,6 +11,8 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire
+from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.default_protocols import install_defaults
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import StudyMark, StudyState
@@ -20,7 +22,8 @@ from rehab.studies.registration.lifecycle import close, current_version, registe
 from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.unblinding import take_mark
 from rehab.studies.visits import Place, seed_of, start_session
-from rehab.training.measures import InvalidSetting
+from rehab.training.goals import GoalRule
+from rehab.training.measures import MEASURES, InvalidSetting
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World
 
@@ -185,6 +188,38 @@ def test_nothing_that_decides_what_is_walked_changes_unseen(world, edit):
     edit(study, training)
     with pytest.raises(InvalidSetting, match="has been changed since"):
         current_version(study)
+
+
+@pytest.mark.parametrize("slug", ["a2", "step_length"])
+def test_a_measure_corrected_in_code_changes_neither_what_is_registered_nor_what_was_walked(
+    world, slug, monkeypatch
+):
+    study = draft_study(world)
+    study.arms.all().update(measure=MeasureDefinition.everywhere.get(clinic=None, slug=slug))
+    lead = world.people[Role.LEAD]
+    register(study, lead, NOW)
+    start(study, lead, NOW)
+    walked = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
+    corrected = replace(MEASURES[slug], value_max=7.0, goal_max=6.0)
+    monkeypatch.setitem(MEASURES, slug, corrected)
+    install_defaults()
+    row = MeasureDefinition.everywhere.get(clinic=None, slug=slug)
+
+    assert row.to_rule() == corrected
+    later = start_session(enrolled(study, new_patient(world, 2)), Place(), None, NOW)
+    assert later.to_plan().measure == walked.to_plan().measure != corrected
+    assert TrainingSession.everywhere.get(pk=walked.pk).to_plan() == walked.to_plan()
+    assert current_version(study).number == 1
+    care = create_session(
+        SessionRequest(
+            patient=new_patient(world, 3, consents=False),
+            valence="positive",
+            measure=row,
+            protocol=study.arms.first().protocol,
+            goal=GoalRule(value=0.5),
+        )
+    )
+    assert care.to_plan().measure == corrected
 
 
 def test_a_study_without_what_came_later_has_the_document_that_it_always_had(world):

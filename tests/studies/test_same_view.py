@@ -1,8 +1,13 @@
-"""Who must not know an arm sees the same whichever it is: every address, opened twice."""
+"""Who must not know an arm sees the same whichever it is: every address, opened twice.
+
+Every role, and everything that an assessor can become, opens every address; then the arms are
+exchanged, and everybody looks again: at pages, API, exports, file names, boards, reports, replays,
+insight, family pages, tablets. tests/studies/test_served_view.py asks a real server's sockets too.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import urlencode
 
@@ -13,11 +18,14 @@ from django.urls import reverse
 from rehab.boards.choices import Participants
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.studies.models import Study
+from rehab.studies.results.drawing import FIGURES, TABLES
+from rehab.studies.unblinding import Task, give_mark
 from rehab.training.valences import VALENCES
 from tests.support.archives import words_of
 from tests.support.tenancy import all_routes
-from tests.support.trials import LEFT_OUT, VARYING, Trial, answers, become
-from tests.support.world import World, signed_in
+from tests.support.trials import ARMS, LEFT_OUT, Trial, answers, become
+from tests.support.world import NOW, World, build_world, signed_in
 
 pytestmark = pytest.mark.django_db
 # They have a new secret, code or animal each time, or tell of this very look.
@@ -25,6 +33,8 @@ OTHERWISE_EACH_TIME = (
     *("admin:logout", "admin:rehab_patient_add", "api:openapi-view", "add-app"),
     *("own-sign-ins", "tablet"),
 )
+INTERIM = "researcher who may look"
+Found = dict[str, set[str]]
 
 
 def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
@@ -62,46 +72,75 @@ def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
         yield f"{reverse('api:list_sessions')}?patient={patient.pk}"
     yield f"{reverse('insight')}?by=patient"
     yield reverse("insight-file")
+    for study in Study.everywhere.filter(clinic=world.clinic):
+        yield from files_of(study)
 
 
-def see_everything(world: World, who: User, patients: list[Patient]) -> dict[str, str]:
-    """Return what every address answers somebody, without what differs each time."""
-    browser = signed_in(who, raise_request_exception=False)
-    left_out = {reverse(name) for name in OTHERWISE_EACH_TIME}
-    seen = {}
-    for url in addresses(world, patients):
-        if url not in left_out:
-            answer = browser.get(url)
-            words = words_of(answer)
-            assert answer.status_code < 500 or "readyz" in url, url
-            assert "seen_as" not in url or "No board yet" not in words, url
-            seen[url] = f"{answer.status_code} {VARYING.sub('', words)}"
-    return seen
+def files_of(study: Study) -> Iterator[str]:
+    """Return the addresses of what a study found."""
+    files = [*(f"{name}.svg" for name in FIGURES), *(f"{name}.csv" for name in TABLES)]
+    for file in files:
+        yield f"{reverse('study-results-file', args=[study.pk])}?file={file}"
 
 
-def find_leaks(trial: Trial, who: User, tablet: Client) -> set[str]:
-    """Return what somebody has become that is answered otherwise once the arms are exchanged."""
-    actors = become(trial, who, tablet)
-    before = answers(trial, actors)
+def everybody(trial: Trial) -> dict[str, Client]:
+    """Return all who must not know an arm: what an assessor can become, and other roles."""
+    actors = become(trial, trial.assessor, trial.earlier)
+    clinic, people = trial.world.clinic, trial.world.people
+    looking = User.everywhere.create_user("looking", role=Role.RESEARCHER, clinic=clinic)
+    give_mark(trial.study, looking, Task.INTERIM, None, NOW)
+    others = {
+        "researcher": people[Role.RESEARCHER],
+        INTERIM: looking,
+        "host": User.everywhere.create_user("host", role=Role.HOST),
+        "who treats elsewhere": build_world("birch").people[Role.PT],
+    }
+    for name, user in others.items():
+        actors[name] = signed_in(user, raise_request_exception=False)
+    for name in ("researcher", INTERIM):
+        export(actors[name], trial.study)
+    # What is recorded once: a look of each day, and that a tablet has ended.
+    actors[INTERIM].get(reverse("study-results", args=[trial.study.pk]))
+    actors["its token"].get(reverse("tablet-state"))
+    return actors | {"stranger": Client(raise_request_exception=False)}
+
+
+def export(client: Client, study: Study) -> None:
+    """Have the export for analysis made, of all sessions that its account may have."""
+    client.post(reverse("prepare-research"), {"study": study.pk, "shift_dates": "on"})
+    reached = client.post(reverse("advance-research")).json()
+    assert reached["done"] == reached["total"]
+
+
+def find_differences(trial: Trial, actors: dict[str, Client], urls: Sequence[str] = ()) -> Found:
+    """Return who is answered otherwise once the arms are exchanged, and where."""
+    before = answers(trial, actors, urls)
     trial.exchange()
-    after = answers(trial, actors)
-    return {key[0] for key, answer in before.items() if after[key] != answer}
-
-
-def find_differences(trial: Trial, who: User) -> list[str]:
-    """Return the addresses that answer somebody otherwise once the arms are exchanged."""
-    before = see_everything(trial.world, who, trial.patients)
-    trial.exchange()
-    after = see_everything(trial.world, who, trial.patients)
+    after = answers(trial, actors, urls)
     assert before.keys() == after.keys()
-    return [url for url, answer in before.items() if after[url] != answer]
+    found: Found = {}
+    for (name, _, url), answer in before.items():
+        if after[name, _, url] != answer:
+            found.setdefault(name, set()).add(url)
+    return found
+
+
+def whole_site(trial: Trial) -> list[str]:
+    """Return every address but those that answer otherwise each time."""
+    left_out = {reverse(name) for name in OTHERWISE_EACH_TIME}
+    return [url for url in addresses(trial.world, trial.patients) if url not in left_out]
+
+
+STATES = {"open": {"ended": False}, "ended": {}, "withdrawn": {"withdrawn": True}}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("withdrawn", [False, True])
-def test_an_assessor_sees_the_same_whichever_arm_is_walked(withdrawn):
-    trial = Trial(withdrawn=withdrawn)
-    assert find_differences(trial, trial.assessor) == []
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("state", STATES)
+def test_who_must_not_know_an_arm_sees_the_same_whichever_is_walked(state):
+    trial = Trial(**STATES[state])
+    actors = everybody(trial)
+    assert find_differences(trial, actors, whole_site(trial)) == {}
 
 
 @pytest.mark.wide
@@ -109,13 +148,17 @@ def test_an_assessor_sees_the_same_whichever_arm_is_walked(withdrawn):
 def test_an_assessors_previews_of_boards_are_the_same(monkeypatch, withdrawn):
     monkeypatch.setitem(globals(), "all_routes", lambda worlds: [])
     trial = Trial(withdrawn=withdrawn)
-    assert find_differences(trial, trial.assessor) == []
+    account = signed_in(trial.assessor, raise_request_exception=False)
+    previews = whole_site(trial)
+    assert find_differences(trial, {"account": account}, previews) == {}
+    for url in previews:
+        assert "seen_as" not in url or "No board yet" not in words_of(account.get(url)), url
 
 
 @pytest.mark.parametrize("ended", [False, True])
 def test_whatever_an_assessor_becomes_sees_the_same(ended):
     trial = Trial(ended=ended)
-    assert find_leaks(trial, trial.assessor, trial.earlier) == set()
+    assert find_differences(trial, become(trial, trial.assessor, trial.earlier)) == {}
 
 
 @pytest.mark.parametrize("rule", LEFT_OUT)
@@ -123,14 +166,30 @@ def test_a_rule_that_is_left_out_is_found(monkeypatch, rule):
     trial = Trial()
     module, name, left_out, found = LEFT_OUT[rule]
     monkeypatch.setattr(module, name, left_out)
-    assert find_leaks(trial, trial.assessor, trial.earlier) == found
+    actors = become(trial, trial.assessor, trial.earlier)
+    assert find_differences(trial, actors).keys() == found
+
+
+def test_an_interim_look_tells_nobodys_group():
+    """Of three and three it shows figures, and the same ones once everybody is in the other."""
+    trial = Trial(pairs=3)
+    client = everybody(trial)[INTERIM]
+    results = reverse("study-results", args=[trial.study.pk])
+    urls = [results, *files_of(trial.study), reverse("study", args=[trial.study.pk])]
+    urls += [reverse("download-research"), reverse("export-sessions"), reverse("export")]
+    assert find_differences(trial, {INTERIM: client}, urls) == {}
+    for url in (results, f"{results}download/?file=differences.csv"):
+        words = words_of(client.get(url))
+        assert "Group 1" in words
+        assert not any(secret in words for secret in (*ARMS, "VAL-0")), url
 
 
 @pytest.mark.long
 def test_who_treats_sees_which_arm_is_walked():
     """So the search finds what there is."""
-    trial = Trial(withdrawn=False)
-    found = find_differences(trial, trial.world.people[Role.PT])
+    trial = Trial()
+    who = signed_in(trial.world.people[Role.PT], raise_request_exception=False)
+    found = find_differences(trial, {"who treats": who}, whole_site(trial))["who treats"]
     session = trial.sessions[0].pk
     for url in (reverse("session", args=[session]), reverse("api:show_session", args=[session])):
         assert url in found

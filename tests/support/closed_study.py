@@ -15,10 +15,10 @@ from rehab.studies.participants import (
     StudyVisit,
 )
 from rehab.studies.power_runs import PowerRun
+from rehab.studies.record.adverse_events import AdverseEvent
 from tests.support.clock import START
 from tests.support.marks import mark
 
-# What a version of a study tells (`describe`, studies/registration/document.py), in short.
 PLAN: dict[str, Any] = {
     **dict.fromkeys(("code", "title", "clinic", "question"), ""),
     "participants": 2,
@@ -82,6 +82,9 @@ def close_study(name: str, patient: Patient, session: TrainingSession, by: User)
     )
     StudyEvent.everywhere.create(
         study=study, enrollment=enrollment, kind="enrolled", reason=mark(name, StudyEvent)
+    )
+    AdverseEvent.everywhere.create(
+        enrollment=enrollment, what=mark(name, AdverseEvent), grade=1, relation="none"
     )
     PowerRun.everywhere.create(
         study=study,

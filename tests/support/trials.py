@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
@@ -25,9 +26,13 @@ from rehab.people.roles import Role
 from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.browser_sessions import digest_of
 from rehab.people.sign_in.tokens import ApiToken
+from rehab.questionnaires.instrument import Instrument, Item
+from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.stations import device_trust
 from rehab.stations.models import Station
 from rehab.stations.tablets import COOKIE, find_tablet
@@ -39,7 +44,9 @@ from rehab.studies.unblinding import Task, give_mark
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side
+from robot.wire.incident import pack
 from tests.support.archives import words_of
+from tests.support.incidents import BUMPED
 from tests.support.studies import SEED, enrolled, new_patient, running_study
 from tests.support.tablets import pair_tablet
 from tests.support.tenancy import all_routes
@@ -51,6 +58,11 @@ addresses = itertools.count()  # of families
 STALE = "stale screen of who treats"
 AS_ACCOUNT = {"account", "program", "program of a researcher"}
 TABLETS = {"tablet", "earlier tablet", "its token"}
+# A nonce, a number of each answer, and the length of the words, which have both.
+OF_EACH_ANSWER = {"Content-Security-Policy", "X-Request-ID", "Content-Length"}
+OF_SESSIONS: tuple[type[Any], ...] = (
+    *(Step, SessionEvent, RobotIncident, SessionCorrection, QuestionnaireResponse),
+)
 YESTERDAY = SimpleNamespace(now=lambda: datetime.now(UTC) - timedelta(days=1))
 # Rules of blinding: where each stands, what leaves it out, and who then sees the arm.
 LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
@@ -64,10 +76,11 @@ LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
     "a sign-in ends": (browser_sessions, "timezone", YESTERDAY, {STALE}),
     "a family sees nothing": (family, "refusal_reason", lambda _: "", {FAMILY}),
 }
-# What differs each time, whatever a patient walks.
+# What differs each time, whatever a patient walks: tokens, nonces, times, room on the disk, and
+# the last digits of sums, which are added up in another order.
 VARYING = re.compile(
     r'csrfmiddlewaretoken" value="\w+"|nonce="[^"]+"|"data-csrf": "\w+"|\d{1,2}:\d\d(:\d\d)?|'
-    r'"?\d{4}-\d\d-\d\d[T ][^"<]*'
+    r'"?\d{4}-\d\d-\d\d[T ][^"<]*|[\d.]+ GB|(?<=\.\d{9})\d+'
 )
 
 
@@ -78,9 +91,11 @@ def walk_visit(
     session = start_session(enrollment, Place(station=station), None, NOW)
     aggregate = SessionAggregate(session)
     store(aggregate, aggregate.change(Change(ChangeKind.START), None, NOW))
+    more = ARMS.index(session.valence) / 10 + enrollment.pk % 5 / 50  # than who walks the other arm
     for phase in range(3):
         for number in range(60 * phase + 1, 60 * phase + 61):
-            stride = Measurement(number, number * 1.1, Side.LEFT, 1.0 + number % 5 / 10)
+            value = 1.0 + number % 5 / 10 + (more if phase else 0)
+            stride = Measurement(number, number * 1.1, Side.LEFT, value)
             store(aggregate, [aggregate.record_step(stride, NOW)])
         if phase < 2:
             store(aggregate, aggregate.change(Change(ChangeKind.PHASE, phase + 1), None, NOW))
@@ -90,10 +105,30 @@ def walk_visit(
     return session
 
 
-class Trial:
-    """A running study with a participant of each arm, who have walked the same steps."""
+def add_records(session: TrainingSession) -> list[Any]:
+    """Return what else is stored of a session, other things for each arm; some tell the arm."""
+    arm = ARMS.index(session.valence)
+    lead = User.everywhere.get(clinic=session.clinic_id, role=Role.LEAD)
+    said = Item("Did it cheer you up?", "no", "yes", 5)
+    asked = Instrument("own-1", "Mood", "", "en", (said,)).to_json()
+    row = {"session": session, "at": NOW}
+    return [
+        RobotIncident.everywhere.create(
+            **row, reason=("bump", "cliff")[arm], recording=pack(BUMPED)
+        ),
+        SessionCorrection.everywhere.create(
+            **row, field="note", new=f"walked {session.valence}", reason=session.valence, by=lead
+        ),
+        QuestionnaireResponse.everywhere.create(
+            session=session, slug="own-1", instrument=asked, answers=[(5, 1)[arm]], finished_at=NOW
+        ),
+    ]
 
-    def __init__(self, *, withdrawn: bool = False, ended: bool = True) -> None:
+
+class Trial:
+    """A running study with participants of each arm, who have walked as many steps."""
+
+    def __init__(self, *, withdrawn: bool = False, ended: bool = True, pairs: int = 1) -> None:
         self.world = world = build_world("amber")
         fill_board(world)
         self.study = running_study(world, *ARMS, sealed=seal(Secret(SEED, (2,))))
@@ -101,9 +136,9 @@ class Trial:
         self.stations = [world.add_station(name) for name in ("Bay 1", "Bay 2")]
         self.earlier = pair_tablet(signed_in(self.assessor), self.stations[0])
         give_mark(self.study, self.assessor, Task.ASSESSOR, None, NOW)
-        self.patients = [new_patient(world, number) for number in (1, 2)]
+        self.patients = [new_patient(world, number) for number in range(1, 2 * pairs + 1)]
         self.sessions, self.family = [], []
-        for patient, station in zip(self.patients, self.stations, strict=True):
+        for patient, station in zip(self.patients, self.stations * pairs, strict=True):
             patient.boards = "clinic"
             patient.save()
             record_consent(patient, Purpose.BOARDS, None, NOW, "clinic")
@@ -113,7 +148,8 @@ class Trial:
             self.sessions.append(walk_visit(enrollment, station, ended=ended))
             if withdrawn:
                 withdraw(enrollment, None, NOW)
-            world.more += [patient, enrollment, self.sessions[-1]]
+            records = add_records(self.sessions[-1])
+            world.more += [patient, enrollment, self.sessions[-1], *records]
         assert {session.valence for session in self.sessions} == set(ARMS)
         world.more.append(self.study)
         for model in (Allocation, StudyVisit, StudyEvent, Step, SessionEvent, SessionMetric):
@@ -127,15 +163,17 @@ class Trial:
 
     def exchange(self) -> None:
         """Let each participant have walked what the other one has."""
-        one, other = self.sessions
-        exchange([one], [other], {"patient_id", "created_at", "station_id"})
-        for model in (Step, SessionEvent, SessionMetric):
-            rows = model.everywhere.order_by("pk")
-            exchange(
-                list(rows.filter(session=one)), list(rows.filter(session=other)), {"session_id"}
-            )
-        allocations = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
-        exchange(list(allocations[:1]), list(allocations[1:]), {"enrollment_id"})
+        for one, other in zip(self.sessions[::2], self.sessions[1::2], strict=True):
+            exchange([one], [other], {"patient_id", "created_at", "station_id"})
+            for model in OF_SESSIONS:
+                rows = model.everywhere.order_by("pk")
+                exchange(
+                    list(rows.filter(session=one)), list(rows.filter(session=other)), {"session_id"}
+                )
+            exchange_metrics(one, other)
+        rows = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
+        allocations = list(rows)
+        exchange(allocations[::2], allocations[1::2], {"enrollment_id"})
         clear_cache()
 
     def addresses(self) -> list[str]:
@@ -183,15 +221,17 @@ def become(trial: Trial, who: User, tablet: Client) -> dict[str, Client]:
     }
 
 
-def answers(trial: Trial, actors: dict[str, Client]) -> dict[tuple[str, str, str], str]:
-    """Return what the participants' addresses answer each actor, to GET and POST."""
+def answers(
+    trial: Trial, actors: dict[str, Client], urls: Sequence[str] = ()
+) -> dict[tuple[str, str, str], str]:
+    """Return what every address answers each actor: to GET, and to POST the participants' own."""
     seen = {}
     for name, client in actors.items():
         for url in [*trial.addresses(), *(trial.family if name == FAMILY else [])]:
             for method in ("get", "post"):
-                answer = getattr(client, method)(url)
-                words = f"{answer.status_code} {answer.get('Location', '')} {words_of(answer)}"
-                seen[name, method, url] = VARYING.sub("", words)
+                seen[name, method, url] = read(client, method, url)
+        for url in urls:
+            seen[name, "get", url] = read(client, "get", url)
     for name, client in actors.items():  # the sockets, which ask the same of their token
         bearer = client.defaults.get("HTTP_AUTHORIZATION", "").removeprefix("Bearer ")
         token = client.cookies[COOKIE].value if COOKIE in client.cookies else bearer
@@ -199,6 +239,24 @@ def answers(trial: Trial, actors: dict[str, Client]) -> dict[tuple[str, str, str
         rows = TrainingSession.objects.visible_to(device).order_by("pk")
         seen[name, "socket", ""] = str(list(rows.values_list("pk", "valence")))
     return seen
+
+
+def read(client: Client, method: str, url: str) -> str:
+    """Return an answer with its headers, file names among them, without what always differs."""
+    answer = getattr(client, method)(url)
+    assert answer.status_code < 500 or "readyz" in url, url
+    said = {name: value for name, value in answer.headers.items() if name not in OF_EACH_ANSWER}
+    return VARYING.sub("", f"{answer.status_code} {said} {words_of(answer)}")
+
+
+def exchange_metrics(one: TrainingSession, other: TrainingSession) -> None:
+    """Exchange the figures of two sessions, which may have different ones."""
+    found = SessionMetric.everywhere.filter(session__in=(one, other))
+    rows = list(found)
+    found.delete()
+    for row in rows:
+        row.session = other if row.session_id == one.pk else one
+    SessionMetric.everywhere.bulk_create(rows)
 
 
 def exchange(some: list[Any], others: list[Any], kept: set[str]) -> None:

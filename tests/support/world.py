@@ -54,6 +54,7 @@ from rehab.studies.participants import (
     StudyVisit,
 )
 from rehab.studies.power_runs import PowerRun
+from rehab.studies.record.adverse_events import AdverseEvent
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
@@ -337,6 +338,7 @@ def build_world(name: str) -> World:
         Allocation.everywhere.get(enrollment__study=study),
         Screening.everywhere.get(study=study),
         StudyVisit.everywhere.get(enrollment__study=study),
+        AdverseEvent.everywhere.get(enrollment__study=study),
         PowerRun.everywhere.get(study=study),
         StudyEvent.everywhere.get(study=study),
         AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),

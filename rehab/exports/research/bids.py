@@ -48,14 +48,15 @@ class MotionSink:
         place = folder / self.subject / f"ses-{session}" / "motion"
         place.mkdir(parents=True)
         stem = f"{self.subject}_ses-{session}_task-{TASK}"
-        self._stem, self.events = place / f"{stem}_tracksys-{SYSTEM}", place / f"{stem}_events.tsv"
-        self._file = self._path("motion.tsv").open("w", encoding="utf-8", newline="")
+        self._stem, self.events = place / stem, place / f"{stem}_events.tsv"
+        self._file = self.path("motion.tsv").open("w", encoding="utf-8", newline="")
         self.first_at: datetime | None = None
         self._first_s = self._last_s = 0.0
         self.count = 0
 
-    def _path(self, suffix: str) -> Path:
-        return self._stem.with_name(f"{self._stem.name}_{suffix}")
+    def path(self, suffix: str, system: str = SYSTEM) -> Path:
+        """Return where a file of a tracking system goes."""
+        return self._stem.with_name(f"{self._stem.name}_tracksys-{system}_{suffix}")
 
     def write(self, rows: Rows) -> None:
         """Write some strides."""
@@ -71,7 +72,7 @@ class MotionSink:
         """Close the run and describe it; without strides, remove it."""
         self._file.close()
         if not self.count:
-            self._path("motion.tsv").unlink()
+            self.path("motion.tsv").unlink()
             self._stem.parent.rmdir()
             return
         lasted_s = self._last_s - self._first_s
@@ -87,7 +88,7 @@ class MotionSink:
             "RecordingType": "discontinuous",
             "MissingValues": MISSING,
         }
-        self._path("motion.json").write_text(json.dumps(sidecar, indent=2) + "\n", "utf-8")
+        self.path("motion.json").write_text(json.dumps(sidecar, indent=2) + "\n", "utf-8")
         own_unit = format_cell(" ".join(self._unit.split()))  # a clinic's own words
         lines = ["name\tcomponent\ttype\ttracked_point\tunits"]
         lines.append(f"latency\t{MISSING}\tLATENCY\t{MISSING}\ts")
@@ -95,7 +96,7 @@ class MotionSink:
         for column in STORED:
             unit = own_unit if column.unit == MEASURE_UNIT else ""
             lines.append(f"{column.name}\t{MISSING}\tMISC\t{MISSING}\t{unit or MISSING}")
-        self._path("channels.tsv").write_text("\n".join(lines) + "\n", "utf-8")
+        self.path("channels.tsv").write_text("\n".join(lines) + "\n", "utf-8")
 
 
 class EventSink:

@@ -21,7 +21,8 @@ from django.db.models import QuerySet
 from rehab.exports.archive import write_csv
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
-from rehab.exports.research.session_files import ABOUT, write_part
+from rehab.exports.research.metadata import write_anonymity, write_crate
+from rehab.exports.research.session_files import ABOUT, KINDS, write_part
 from rehab.exports.research.sinks import has_parquet
 from rehab.exports.research.study_files import groups_of, studies_of, study_files
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
@@ -175,7 +176,21 @@ class Package:
                 if known["participant_id"]:
                     about_study = groups.get(known["pseudonym"], {})
                     people.setdefault(known["participant_id"], known | about_study)
+        names = []
+        for name, content in self._all_files(parts, studies, people):
+            names.append(name)
+            yield name, content
+        what = f"Study {self.study}" if self.study else "All sessions"
+        published = f"{self.made_at:%Y}" if self.shift_dates else f"{self.made_at:%Y-%m-%d}"
+        crate = write_crate(names, what, published, garry_version())
+        yield "ro-crate-metadata.json", [crate]
+
+    def _all_files(
+        self, parts: list[Path], studies: list[Study], people: dict[str, dict[str, Any]]
+    ) -> Iterator[tuple[str, Iterable[str | bytes]]]:
+        """Yield the files of the archive but for what describes them all."""
         yield "README.txt", [self._readme(len(parts))]
+        yield "k_anonymity.csv", [write_anonymity(list(people.values()))]
         yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
         for table in TABLES:
             yield table.file, _concatenate(table.header, [part / table.file for part in parts])
@@ -184,7 +199,7 @@ class Package:
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
             yield f"bids/{name}", [text]
         for part in parts:
-            for kind in ("parquet", "bids", "recordings", "fhir"):
+            for kind in KINDS:
                 for file in sorted((part / kind).rglob("*.*")):
                     if file.is_file():
                         yield file.relative_to(part).as_posix(), _read(file)
@@ -207,11 +222,14 @@ class Package:
             f"Made from {self.made_at:%Y-%m-%d %H:%M} UTC; {given} of {len(self.keys)} sessions. "
             "Missing ones may not be seen any more.\n\n"
             f"{dates}\n{parquet}\n"
-            "recordings/: sessions to play again in GARRY. bids/: BIDS motion. fhir/: FHIR R4B.\n"
+            "recordings/: sessions to play again in GARRY. bids/: BIDS motion, of strides "
+            "and of the robot. robot/: how it moved, as MCAP. fhir/: FHIR R4B.\n"
             "study_visits.csv has the allocation of closed studies; of others it is sealed.\n"
             "studies/: a folder for each study: the protocol with all versions, everybody who was "
             "ever allocated, what each outcome means; of closed ones the results' tables, the "
-            "seed, and verify_allocation.py, which allocates again.\n"
+            "seed, verify_allocation.py, which allocates again, reanalyze.py and .R, which "
+            "redo the results. checklists.csv: SPIRIT, CONSORT, TIDieR, WHO.\n"
+            "k_anonymity.csv: how many people are alike. ro-crate-metadata.json: RO-Crate 1.1.\n"
             "Sessions of people who left a study and wanted their data removed are not here.\n\n"
             f"{README_TEXT % {'version': RULES_VERSION}}"
         )

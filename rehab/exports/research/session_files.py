@@ -12,6 +12,7 @@ from rehab.exports.research.bids import EventSink, MotionSink
 from rehab.exports.research.dates import SINCE_1970_S, shift_of, shift_rows
 from rehab.exports.research.fhir import write_bundle
 from rehab.exports.research.recordings import RecordingSink
+from rehab.exports.research.robot_motion import RobotMotionSink
 from rehab.exports.research.sinks import CsvSink, ParquetSink, Sink, has_parquet, pump
 from rehab.exports.selection import Selection
 from rehab.exports.session_table import PARTICIPANT, SESSIONS
@@ -23,6 +24,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import StudyVisit
 
 STRIDE_TABLES = (STEPS, FEEDBACK)  # also as Parquet
+KINDS = ("parquet", "bids", "recordings", "fhir", "robot")  # folders of the export
 ABOUT = "about.json"  # what the whole export needs to know of a part
 
 
@@ -41,7 +43,7 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
     shift = shift_of(pseudonym) if shift_dates else None
     sessions = TrainingSession.objects.visible_to(user).filter(pk=session.pk)
     selection = Selection(user, sessions, named=False)
-    for name in ("parquet", "bids", "recordings", "fhir"):
+    for name in KINDS:
         (aside / name).mkdir()
     motion = MotionSink(aside / "bids", pseudonym, _label(session), session.measure.unit)
     recording = RecordingSink(
@@ -65,6 +67,13 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
         if shift is not None and table is INCIDENTS:
             rows = (row._replace(recording="") for row in rows)  # it may show the time of day
         pump(rows, sinks)
+    robot = RobotMotionSink(
+        motion,
+        _of(aside / "robot", session, "mcap"),
+        session.pk,
+        hides_clocks=shift is not None,
+    )
+    pump(shift_rows(INCIDENTS.read(selection), shift), [robot])
     write_bundle(_of(aside / "fhir", session, "json"), user, session, shift)
     about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
     row = next(SESSIONS.read(selection))

@@ -8,17 +8,24 @@ the study is closed.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+from django.utils.translation import override
+
 from rehab.exports.archive import write_csv
 from rehab.exports.research.dates import shift_of
 from rehab.people.models import User
+from rehab.studies import analysis
+from rehab.studies.agreements import agreement_rows
 from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment
+from rehab.studies.record.adverse_events import listing_rows
+from rehab.studies.record.checklists import checklist_rows
 from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.results.drawing import TABLES, write_table
 from rehab.studies.results.results import read_results
@@ -27,7 +34,12 @@ PARTICIPANTS = (
     *("number", "participant", "pseudonym", "levels", "group", "version"),
     *("enrolled_at", "withdrawn_at", "data_kept"),
 )
-VERIFIER = Path(__file__).with_name("verify_allocation.py")
+HERE = Path(__file__).parent
+VERIFIER = HERE / "verify_allocation.py"
+# What `reanalyze.py` computes with: GARRY's own model, as it is.
+MODEL = ("comparison", "designs", "missing", "mixed_model", "sequential")
+PACKAGE = "garry_analysis"
+DATED = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
 def studies_of(user: User, code: str) -> list[Study]:
@@ -54,14 +66,33 @@ def study_files(
     yield f"{folder}/participants.csv", write_csv(PARTICIPANTS, rows)
     definitions = define_outcomes()
     yield f"{folder}/definitions.csv", [write_table(definitions)]
-    if study.state == StudyState.CLOSED:
+    results = read_results(study, now) if study.state == StudyState.CLOSED else None
+    if results is not None:
         yield f"{folder}/verify_allocation.py", [VERIFIER.read_text("utf-8")]
-        results = read_results(study, now)
+        for name, text in analysis_files():
+            yield f"{folder}/{name}", [text]
+        yield f"{folder}/adverse_events.csv", [write_table(listing_rows(study, by_arm=True))]
+        yield f"{folder}/agreements.csv", [write_table(agreement_rows(study))]
         for name, table in TABLES.items():
             cells = table(results)
             if shift_dates:
                 cells = ({key: row[key] for key in row if key != "at"} for row in cells)
             yield f"{folder}/{name}.csv", [write_table(cells)]
+    with override("en"):
+        lists = list(checklist_rows(study, results))
+    if shift_dates:  # dates of the study tell those of people
+        lists = [row | {"answer": DATED.sub("(date)", row["answer"])} for row in lists]
+    yield f"{folder}/checklists.csv", [write_table(lists)]
+
+
+def analysis_files() -> Iterator[tuple[str, str]]:
+    """Yield the scripts that compute a study's results again: name and text."""
+    yield "reanalyze.R", (HERE / "reanalyze.R").read_text("utf-8")
+    own = Path(analysis.__file__).parent
+    modules = [HERE / "reanalyze.py", *(own / f"{name}.py" for name in MODEL)]
+    for module in modules:
+        text = module.read_text("utf-8").replace(analysis.__name__, PACKAGE)
+        yield (module.name if module.parent == HERE else f"{PACKAGE}/{module.name}"), text
 
 
 def participant_rows(user: User, study: Study, *, shift_dates: bool) -> Iterator[tuple[Any, ...]]:

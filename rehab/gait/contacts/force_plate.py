@@ -27,7 +27,7 @@ BOUNCE_S = 0.15  # debounce: no foot swings faster; a sooner contact continues t
 # A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is
 # certain above that; its ends are timed at the release threshold where the force gets there and no
 # drag is found, else by slope and dip (`drag`).
-CERTAIN = 0.15  # of body weight
+CERTAIN = 0.2  # of body weight; at 0.15 a drag of 90 N goes on in a person of 60 kg
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
 SHORTEST_S = 0.15  # no contact that ends sooner can be a valid stance, by any clock
@@ -39,7 +39,7 @@ AROUND_S = 0.015  # around both ends of a swing, where a plate bears least if th
 class ContactFinder:
     """Finds contacts by hysteresis and tracks the plate's zero in swing.
 
-    A contact is certain at 0.15 of the body weight, ``contact_n`` at least; its beginning and
+    A contact is certain at 0.2 of the body weight, ``contact_n`` at least; its beginning and
     end are timed where the force crosses ``release_n``, by linear interpolation between samples.
     Those of a foot that is dragged are found by ``drag.find_edge``.
 

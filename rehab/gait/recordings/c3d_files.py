@@ -55,6 +55,7 @@ def read_table(path: Path) -> Table:
     ):
         table[label] = resample_channel(values, rates[1], time)
         table.units[label] = units[place] if place < len(units) else ""
+    length = "".join(str(unit) for unit in read_values(file, "POINT", "UNITS")[:1])
     of_kind = {
         label: str(unit[0])
         for kind in ("ANGLE", "FORCE", "MOMENT")
@@ -65,7 +66,7 @@ def read_table(path: Path) -> Table:
         for axis, name in enumerate("XYZ"):
             column = f"{label}.{name}"
             table[column] = resample_channel(points[axis, place], rates[0], time)
-            table.units |= {column: of_kind[label]} if label in of_kind else {}
+            table.units[column] = of_kind.get(label, length)
     add_plates(file, table)
     return table
 

@@ -6,13 +6,14 @@ one that its plates face.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from rehab.gait.recordings.ankle import compute_ankle
+from rehab.gait.recordings.ankle import add_computed
 from rehab.gait.recordings.c3d_parameters import read_labels, read_values
-from rehab.gait.recordings.columns import SIDES
+from rehab.gait.recordings.columns import CHANNELS, MEDIAL, SIDES, SIGNAL_LAYOUTS
 from rehab.gait.recordings.plates import assign_plates
 from rehab.gait.recordings.table import Table
 from rehab.gait.signals.filters import Floats
@@ -27,16 +28,33 @@ MALLEOLI = ("ANK", "LM", "ANKL", "LMAL", "LANK", "ANKLE", "LMALL", "MALL", "_ANK
             "_ANKLE", "_FAL", "FAL")  # fmt: skip
 HEELS = ("HEE", "_HEE", "HEEL", "_HEEL", "_FCC", "FCC", "_CAL", "CAL")
 KNEES = ("KNE", "KNEE", "LEK", "LE", "LFE", "FLE", "LKNE", "LEPI", "_KNE", "_KNEE", "_LEK", "_FLE")
-TOES = ("TOE", "MT2", "FM2", "2MT", "MTP2", "TOE2", "_TOE", "_MT2", "_FM2", "MT5", "FM5", "5MT",
-        "_MT5", "_FM5")  # fmt: skip
+FIFTHS = ("MT5", "FM5", "5MT", "_MT5", "_FM5")
+TOES = ("MT2", "FM2", "2MT", "MTP2", "TOE2", "_MT2", "_FM2", "TOE", "_TOE", *FIFTHS)
+MEDIALS = ("MM", "MMAL", "MED", "MMED", "_MM", "_MMAL", "_TAM", "TAM", "ANKM", "_ANKM")
+INNER_KNEES = ("MEK", "ME", "MFE", "_MEK", "_ME", "_FME", "FME", "KNM", "KNEM", "_KNEM", "MEPI")
+TROCHANTERS = ("GTR", "GTRO", "TRO", "TROC", "FTC", "_GTR", "_FTC")
+# Centers of joints as the file's own program computed them: Plug-in Gait's bones, and by name.
+CENTERS = {
+    "ankle": ("TIO", "AJC", "_AJC", "_ANKLE_JC"),
+    "knee": ("FEO", "KJC", "_KJC", "_KNEE_JC"),
+    "hip": ("FEP", "HJC", "_HJC", "_HIP_JC"),
+}
+# What is taken by place, and what beside it: the joint or the forefoot is in the middle.
+PLACES = {
+    "ankle": (MALLEOLI + HEELS, MEDIALS),
+    "knee": (KNEES, INNER_KNEES),
+    "toe": (TOES, FIFTHS),
+    "hip": (TROCHANTERS, ()),
+}
 
 
 def add_plates(file: Any, table: Table) -> None:
     """Add each leg's vertical force [N], and its ankle's moment [Nm] and angle [rad].
 
     They are ``plates.left``, and ``own.left_moment_nm`` and ``own.left_angle_rad`` where there are
-    markers at malleolus, knee and toes, and plates of the types 2 or 4. Nothing is added where the
-    file does not say where its plates are, or has no markers at the ankles.
+    markers at malleolus, knee and toes, and plates of the types 2 or 4; with these forward force
+    and foot, and where there are hips, these and the knee's angle. Nothing is added where the file
+    does not say where its plates are, or has no markers at the ankles.
     """
     corners = np.asarray(read_values(file, "FORCE_PLATFORM", "CORNERS"), dtype=np.float64)
     channels = np.asarray(read_values(file, "FORCE_PLATFORM", "CHANNEL"), dtype=np.int64)
@@ -54,7 +72,7 @@ def add_plates(file: Any, table: Table) -> None:
     up = _find_up(corners_m)
     axes = [(up + 1) % 3, (up + 2) % 3, up]
     floor_m = float(corners_m[:, :, up].mean())
-    markers = _read_markers(file, table, to_m, axes)
+    markers, centers = _read_markers(file, table, to_m, axes)
     ankles = {side: markers[side, "ankle"] for side in SIDES if (side, "ankle") in markers}
     if len(ankles) < 2:
         return
@@ -75,8 +93,10 @@ def add_plates(file: Any, table: Table) -> None:
             "N" if CALIBRATED in types else table.units.get(labels[channels[2, 0] - 1], "")
         )
         if ahead is not None and (side, "knee") in markers and (side, "toe") in markers:
-            moment, angle = _compute(load, markers, side, ahead, floor_m)
-            table[f"own.{side}_moment_nm"], table[f"own.{side}_angle_rad"] = moment, angle
+            leg = _make_leg(load, markers, centers, side, ahead, floor_m)
+            for channel, column in SIGNAL_LAYOUTS["garry"].legs[side].items():
+                if channel in leg and channel in CHANNELS[1:]:
+                    table[f"own.{column.name}"] = leg[channel]
     if unknown:
         table.notes = (
             f"{unknown} contacts of a plate are of both feet or of neither, and left out",
@@ -91,22 +111,33 @@ def _find_up(corners_m: Floats) -> int:
 
 def _read_markers(
     file: Any, table: Table, to_m: float, axes: list[int]
-) -> dict[tuple[str, str], Floats]:
-    """Return markers by side and place [m], shape (3, n): two horizontal axes, and upward.
+) -> tuple[dict[tuple[str, str], Floats], dict[tuple[str, str], Floats]]:
+    """Return markers, and what is in the middle of a joint or the forefoot, by side and place [m].
 
-    An ankle is a malleolus, or a heel, which does not tell an angle and has no other name.
+    Shape (3, n) each: two horizontal axes, and upward. An ankle is a malleolus, or a heel, which
+    does not tell an angle and has no other name.
     """
     names = {name.rpartition(":")[2].upper(): name for name in read_labels(file, "POINT")}
-    found = {}
-    for side, letter in (("left", "L"), ("right", "R")):
-        for place, endings in (("ankle", MALLEOLI + HEELS), ("knee", KNEES), ("toe", TOES)):
-            name = next((n for e in endings if (n := names.get(letter + e))), None)
+
+    def read(letter: str, endings: Sequence[str]) -> Floats | None:
+        for name in (names.get(letter + ending) for ending in endings):
             if name is not None and f"{name}.Z" in table:
-                rows = [table[f"{name}.{'XYZ'[axis]}"] for axis in axes]
-                found[side, place] = to_m * np.array(rows)
-                if place == "ankle" and name not in {names.get(letter + e) for e in MALLEOLI}:
-                    break
-    return found
+                return to_m * np.array([table[f"{name}.{'XYZ'[axis]}"] for axis in axes])
+        return None
+
+    markers, centers = {}, {}
+    for side, letter in (("left", "L"), ("right", "R")):
+        has_malleolus = read(letter, MALLEOLI) is not None
+        for place, (outer, inner) in PLACES.items():
+            marker, beside = read(letter, outer), read(letter, inner)
+            center = read(letter, CENTERS.get(place, ()))
+            if center is None and marker is not None and beside is not None:
+                center = (marker + beside) / 2
+            if marker is not None and (has_malleolus or place == "ankle"):
+                markers[side, place] = marker
+            if center is not None and has_malleolus and np.isfinite(center).any():
+                centers[side, place] = center
+    return markers, centers
 
 
 def _read_plate(
@@ -160,15 +191,23 @@ def _find_direction(markers: dict[tuple[str, str], Floats]) -> Floats | None:
     return ahead / size if size > 1 else None  # of two: else they turn, or are no feet
 
 
-def _compute(
-    load: Floats, markers: dict[tuple[str, str], Floats], side: str, ahead: Floats, floor_m: float
-) -> tuple[Floats, Floats]:
-    """Return a leg's ankle moment and angle by its loads and markers."""
-    up_n = load[0]
+def _make_leg(
+    load: Floats,
+    markers: dict[tuple[str, str], Floats],
+    centers: dict[tuple[str, str], Floats],
+    side: str,
+    ahead: Floats,
+    floor_m: float,
+) -> dict[str, Floats]:
+    """Return a leg's channels by its loads, its markers and what is in the middle of them."""
+    up_n, places = load[0], markers | centers
     with np.errstate(divide="ignore", invalid="ignore"):
         cop_m = (ahead[1] * load[3] - ahead[0] * load[4]) / up_n
     leg = {"force": up_n, "forward": ahead @ load[1:3], "cop": cop_m}
-    for place in ("ankle", "knee", "toe"):
-        at = markers[side, place]
+    for place in (one for one in PLACES if (side, one) in places):
+        at = places[side, place]
         leg |= {f"{place}_forward": ahead @ at[:2], f"{place}_up": at[2] - floor_m}
-    return compute_ankle(leg)
+    if (side, "ankle") in centers:
+        leg |= {MEDIAL[0]: leg["ankle_forward"], MEDIAL[1]: leg["ankle_up"]}
+    add_computed(leg)
+    return leg

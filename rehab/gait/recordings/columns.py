@@ -9,14 +9,19 @@ from dataclasses import dataclass, field, replace
 from rehab.gait.strides import GaitInputError
 
 # A leg's channels as they are called on the command line, in the order of ``LegSamples``.
-CHANNELS = ("force", "moment", "angle", "forward", "position")
+CHANNELS = (
+    *("force", "moment", "angle", "forward", "position"),
+    *("foot_up", "hip_forward", "hip_up", "knee_angle"),
+)
 REQUIRED = CHANNELS[:3]
-# Instead of moment and angle: what they are computed from (``ankle``), in its order.
+# Instead of moment and angle: what they are computed from (``ankle``), in its order; and the other
+# malleolus, without which the joint is guessed from the lateral one.
 MARKED = (
     *("force", "forward", "cop"),
     *("ankle_forward", "ankle_up", "knee_forward", "knee_up", "toe_forward", "toe_up"),
 )
-ALL_CHANNELS = tuple(dict.fromkeys((*CHANNELS, *MARKED)))
+MEDIAL = ("medial_forward", "medial_up")
+ALL_CHANNELS = tuple(dict.fromkeys((*CHANNELS, *MARKED, *MEDIAL)))
 SIDES = ("left", "right")
 FILTERED_HZ = (4.0, 50.0)  # cut-offs of labs' filters that can be put back
 # A column of a stored recording that is 1 where people walk over plates in a floor.
@@ -116,17 +121,16 @@ def _moore_leg(side: str) -> dict[str, SignalColumn]:
         "angle": SignalColumn(f"{side}AnklePlantarFlexionAngle"),
         "forward": SignalColumn(f"{side}GRF_x"),
         "position": SignalColumn(f"{side}Foot_x"),
+        "foot_up": SignalColumn(f"{side}Foot_y"),
+        "knee_angle": SignalColumn(f"{side}KneeFlexionAngle"),
     }
 
 
 def _own_leg(side: str) -> dict[str, SignalColumn]:
-    names = (
-        *("force_n", "moment_nm", "angle_rad", "forward_n", "position_m"),
-        *(f"{channel}_m" for channel in MARKED[2:]),
-    )
+    units = {"force": "n", "moment": "nm", "angle": "rad", "forward": "n", "knee_angle": "rad"}
     return {
-        channel: SignalColumn(f"{side}_{name}")
-        for channel, name in zip(ALL_CHANNELS, names, strict=True)
+        channel: SignalColumn(f"{side}_{channel}_{units.get(channel, 'm')}")
+        for channel in ALL_CHANNELS
     }
 
 

@@ -13,16 +13,14 @@ from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 
-from rehab.gait.recordings.ankle import compute_ankle
+from rehab.gait.recordings.ankle import add_computed
 from rehab.gait.recordings.columns import (
     CHANNELS,
-    MARKED,
     OVERGROUND,
     REQUIRED,
     SIGNAL_LAYOUTS,
     ColumnMap,
     SignalColumn,
-    find_required,
 )
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
@@ -126,8 +124,10 @@ def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floa
         )
     with open_text(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of rows that are too short, which are left out
+        # Between semicolons or tabs a comma is a decimal one, as in half of Europe.
+        lines = file if delimiter == "," else (line.replace(",", ".") for line in file)
         table = np.genfromtxt(
-            file,
+            lines,
             delimiter=delimiter,
             skip_header=1,
             usecols=[header.index(name) for name in wanted],
@@ -165,8 +165,7 @@ def apply_columns(
     legs = {}
     for side, leg in columns.legs.items():
         values = {channel: np.asarray(read(column)) for channel, column in leg.items()}
-        if find_required(leg) == MARKED:
-            values["moment"], values["angle"] = compute_ankle(values)
+        add_computed(values)
         force, moment, angle = (values[channel] for channel in REQUIRED)
         further = (values.get(channel) for channel in CHANNELS[3:])
         legs[side] = LegSamples(force, moment, angle, *further)

@@ -47,7 +47,7 @@ def read_storage(path: Path) -> Table:
 def read_markers(path: Path) -> Table:
     """Return the columns of a .trc file: ``time``, and ``marker.X`` to ``marker.Z``."""
     lines = _read_lines(path)
-    if len(lines) < 7 or not lines[3].lower().startswith("frame#"):
+    if not lines[3].lower().startswith("frame#"):
         raise GaitInputError(f"{path.name} is no marker file. Export it again.")
     markers = [name for name in lines[3].split("\t")[2:] if name.strip()]
     names = ["frame", "time", *(f"{m.strip()}.{axis}" for m in markers for axis in "XYZ")]
@@ -201,6 +201,6 @@ def _read_rows(path: Path, names: list[str], rows: object) -> Table:
 
 def _read_number(cell: str) -> float:
     try:
-        return float(cell)
+        return float(cell.replace(",", "."))
     except ValueError:
         return float("nan")

@@ -15,6 +15,7 @@ from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
 from rehab.gait.selfcheck.cures import CURES
 from rehab.gait.selfcheck.lag import find_deceleration_peak
 from rehab.gait.selfcheck.shapes import find_likeness, find_stances, make_profile
+from rehab.gait.selfcheck.unloaded import find_moment_zero, find_other_load
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
@@ -135,6 +136,7 @@ def check_signals(
         decelerations[side] = find_deceleration_peak(time, leg.angle_rad, own)
         findings += [Finding(code, message, side) for code, message in found]
         findings += _check_joint(time, force, np.asarray(leg.angle_rad, dtype=np.float64), side)
+        findings += _check_unloaded(time, leg, side, strides, mass_kg)
     ratios = [s.weight_ratio for s in strides if s.weight_ratio is not None]
     ratio = float(np.median(ratios)) if ratios else None
     findings += [] if is_overground else _check_weight(ratio, mass_kg)
@@ -248,6 +250,23 @@ def _check_joint(time: Floats, force: Floats, angle: Floats, side: str) -> list[
         return []
     message = "The angle moves as a knee's does, not as an ankle's. Check which column it is."
     return [Finding("angle_other", message, side, "doubt_angle")]
+
+
+def _check_unloaded(
+    time: Floats, leg: LegSamples, side: str, strides: list[Stride], mass_kg: float
+) -> list[Finding]:
+    """Check what a leg reads while its foot swings: its moment, and its plate's force."""
+    own, others = ([s for s in strides if (s.side == side) == is_own] for is_own in (True, False))
+    force, moment = (np.asarray(row, dtype=np.float64) for row in leg[:2])
+    found = []
+    if (zero := find_moment_zero(time, moment, own, mass_kg)) is not None:
+        found.append(Finding("moment_zero", zero[0], side, "doubt_moment" if zero[1] else ""))
+    zero_n = own[-1].offset_n if own else 0.0
+    load = find_other_load(time, force, others, zero_n, mass_kg * GRAVITY_M_S2)
+    if load is not None:
+        other = others[0].side
+        found.append(Finding("other_load", load[0], other, "doubt_load" if load[1] else ""))
+    return found
 
 
 def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> float:

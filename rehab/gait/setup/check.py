@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
 
 from rehab.gait.offline import measure_strides
-from rehab.gait.recordings.columns import FILTERED_HZ, REQUIRED, ColumnMap, SignalColumn
+from rehab.gait.recordings.columns import (
+    CHANNELS,
+    FILTERED_HZ,
+    REQUIRED,
+    SIGNAL_LAYOUTS,
+    ColumnMap,
+    SignalColumn,
+)
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.selfcheck.lag import find_deceleration_peak
-from rehab.gait.setup.find_columns import CERTAIN_LIKE, Proposal, propose
+from rehab.gait.setup.find_columns import CERTAIN_LIKE, OWN, Proposal, propose
 from rehab.gait.setup.names import read_label
 from rehab.gait.setup.own_kinetics import compare_with_own
 from rehab.gait.signals.clock import SampleClock
@@ -89,7 +96,7 @@ def check_setup(
         With the cure, where nothing is recognized.
     """
     proposal = propose(columns, mass_kg, is_overground=is_overground)
-    found = _make_map(proposal)
+    found = _make_map(proposal, columns)
     time_s, legs = apply_columns(columns, found)
     strides = _measure(time_s, legs, proposal)
     timing = {
@@ -166,7 +173,8 @@ def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
     return wrong
 
 
-def _make_map(proposal: Proposal) -> ColumnMap:
+def _make_map(proposal: Proposal, columns: Collection[str]) -> ColumnMap:
+    """Return what is proposed as a map, and what plates and markers came to beside it."""
     legs: dict[str, dict[str, SignalColumn]] = {}
     for (side, channel), guess in proposal.guesses.items():
         legs.setdefault(side, {})[channel] = SignalColumn(guess.column, guess.factor)
@@ -181,7 +189,25 @@ def _make_map(proposal: Proposal) -> ColumnMap:
             "has it in the same command."
         )
     frame = None if proposal.frame is None else SignalColumn(proposal.frame)
-    return ColumnMap(SignalColumn(proposal.time, proposal.time_factor), whole, frame)
+    time = SignalColumn(proposal.time, proposal.time_factor)
+    return add_own(ColumnMap(time, whole, frame), columns)
+
+
+def add_own(found: ColumnMap, columns: Collection[str]) -> ColumnMap:
+    """Return a map with what plates and markers came to beside its channels, where it has none."""
+    own = SIGNAL_LAYOUTS["garry"].legs
+    legs = {
+        side: {
+            **{
+                channel: SignalColumn(name)
+                for channel in CHANNELS
+                if (name := OWN + own[side][channel].name) in columns
+            },
+            **leg,
+        }
+        for side, leg in found.legs.items()
+    }
+    return replace(found, legs=legs)
 
 
 def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:

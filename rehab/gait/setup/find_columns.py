@@ -44,6 +44,7 @@ from rehab.gait.strides import GaitInputError
 CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next shape
 OWN = "own."  # begins columns that ``recordings.c3d_plates`` computes
 OTHER_PLANE = 0.15  # by how much more alike another plane than the label's has to be
+LENGTH_UNITS = {"mm", "cm", "m"}
 # Of each channel, the shapes that a column may have instead.
 RIVALS = {"moment": ("force", "forward", "knee angle"), "angle": ("knee angle", "hip angle")}
 
@@ -107,6 +108,7 @@ def propose(
     time_name, time_factor = _find_time(table)
     time_s = table[time_name] * time_factor
     labels = {name: read_label(name) for name in table if name != time_name}
+    labels = {name: one for name, one in labels.items() if one or not _is_place(table, name)}
     forces = find_forces(table, labels, time_s)
     if not forces:
         raise GaitInputError(_describe_no_force(labels))
@@ -146,6 +148,11 @@ def propose(
         _find_frame(table, time_name, time_s),
         table.notes,
     )
+
+
+def _is_place(table: Table, name: str) -> bool:
+    """Return whether a column without a label is a marker's position, or of our own making."""
+    return name.startswith(OWN) or table.units.get(name, "").strip() in LENGTH_UNITS
 
 
 def _describe_no_force(labels: dict[str, Label | None]) -> str:
@@ -201,8 +208,8 @@ def _find_time(columns: Mapping[str, Floats]) -> tuple[str, float]:
             if RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ and not is_frame:
                 return name, factor
     raise GaitInputError(
-        "No column is a time that goes on. Send the device's own times in seconds, or give the "
-        "rate of rows that are numbered: --rate 100."
+        "No column is a time that goes on. Export the samples with their times in seconds; one row "
+        "of names, then numbers."
     )
 
 

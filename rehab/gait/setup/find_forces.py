@@ -25,6 +25,9 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 SWING = (0.15, 0.98)  # of the time a plate is unloaded
+# Times (logarithm) that a column without a label carries another mass than the given one, in any
+# unit: a harness takes half of it, and what is no force carries anything.
+NO_FORCE = 0.9
 LOADED = 0.9  # of the time on a treadmill somebody loads the plates
 OTHER_SIDE = {"left": "right", "right": "left"}
 
@@ -206,6 +209,12 @@ def find_force_unit(
         doubt = ""
         if unit != near and off > 2 * FORCE_SPREAD:
             doubt = f"the file says {unit}, but in {near} it would carry {mass_kg:.1f} kg"
+        elif off > NO_FORCE and not any(force.label for force in forces):
+            raise GaitInputError(
+                f"No column is a vertical force: what looks most like one, {forces[0].name}, would "
+                f"carry {masses[unit]:.0f} kg, not {mass_kg:.1f} kg. Walk for half a minute with "
+                "the plates on, and send their vertical force."
+            )
         elif off > spread:
             doubt = f"it carries {masses[unit]:.0f} kg, not {mass_kg:.1f} kg"
         return factors[unit], unit, mass_kg, doubt

@@ -11,8 +11,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-SIDE = re.compile(r"\b(?:(left|lt|l)|(right|rt|r))(?=\d?\b| ?ank)")
-ANKLE = re.compile(r"\b[lr]?ank(le)?\b|\b[lr]?ankle|\b[lr]?ank(mom|ang)")
+# Words of English, German, French and Spanish labels.
+SIDE = re.compile(
+    r"\b(?:(left|lt|l|links|linke[rs]?|gauche|izq|izquierd[ao])"
+    r"|(right|rt|r|rechts|rechte[rs]?|droite?|derech[ao]))"
+    r"(?=\d?\b| ?ank)"
+)
+ANKLE = re.compile(
+    r"\b[lr]?ank(le)?\b|\b[lr]?ankle|\b[lr]?ank(mom|ang)|sprunggelenk|knöchel|cheville|tobillo"
+)
 # Joints and quantities that are none of ours, wherever they stand in a label.
 OTHER = [
     "knee",
@@ -45,15 +52,22 @@ OTHER = [
     "arm",
     "pressure",
     "emg",
+    "limit",
+    *("knie", "hüft", "becken", "rumpf", "schulter", "ellenbogen", "handgelenk"),
+    *("genou", "hanche", "bassin", "tronc", "épaule", "coude", "poignet"),
+    *("rodilla", "cadera", "hombro", "codo", "cuello", "muñeca"),
 ]
 MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b")
-ANGLE = re.compile(r"\bang(le)?s?\b|[a-z]angles?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b")
+ANGLE = re.compile(
+    r"winkel|[aá]ngulo|\bang(le)?s?\b|[a-z]angles?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b"
+)
 FORCE = re.compile(
-    r"\bplates (left|right)\b|\bvert(ical)?\b|\bforce n\b|\b[lr]?f ?z ?\d*\b"
+    r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?z ?\d*\b"
     r"|\b(forces?|for|grfs?|fp ?\d*|plate ?\d*) ?\d*( [lr]| left| right)? ?v? ?[yz] ?\d*\b"
     r"|\bv[yz]\b"
 )
 NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank")
+AXIS = re.compile(r"[XYZ](Inf|Sup)?$")
 PLANE = re.compile(r"\b([xyz])\b(?: theia)?$")
 # Which direction a label counts as positive, by the program that writes it.
 SIGNS = (
@@ -123,6 +137,9 @@ def read_unit(column: str, units: dict[str, str]) -> str:
 
 def split_label(column: str) -> str:
     """Return a label's words in lower case, without its unit."""
-    bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", column.rpartition(":")[2])
+    subject, _, name = column.rpartition(":")
+    if AXIS.match(name):  # of iSen, behind the label: a value, or the limits of usual ones
+        name = subject if name == "Y" else f"{subject} limit"
+    bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name)
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", bare)
     return re.sub(r"[\W_]+", " ", spaced).strip().lower()

@@ -155,7 +155,7 @@ class LegBuffer:
         self.rows: list[Floats] = list(table)  # of all samples, with those that wait
 
     def view(self, start: int, stop: int) -> Floats:
-        """Return samples ``start:stop`` of all channels, shape (6, samples), without copying."""
+        """Return samples ``start:stop`` of all channels, shape (rows, samples), not copied."""
         first = self.samples.first
         part: Floats = self._table[:, start - first : stop - first]
         return part

@@ -13,8 +13,11 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 # Rows of a leg's table of samples.
-TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION = range(6)
-CHANNEL_NAMES = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
+TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION, FOOT_UP, HIP, HIP_UP, KNEE = range(10)
+CHANNEL_NAMES = (
+    *("force_n", "moment_nm", "angle_rad", "forward_n", "position_m"),
+    *("foot_up_m", "hip_forward_m", "hip_up_m", "knee_angle_rad"),
+)
 
 
 class LegSamples(NamedTuple):
@@ -25,12 +28,16 @@ class LegSamples(NamedTuple):
     angle_rad: ArrayLike
     forward_n: ArrayLike | None = None
     position_m: ArrayLike | None = None
+    foot_up_m: ArrayLike | None = None
+    hip_forward_m: ArrayLike | None = None
+    hip_up_m: ArrayLike | None = None
+    knee_angle_rad: ArrayLike | None = None
 
 
 class ChannelLayout:
     """Where each channel of one or two legs lies in a table of samples, shape (rows, samples).
 
-    Time lies between two legs, so that each has its six rows side by side; rows that are seldom
+    Time lies between two legs, so that each has its rows side by side; rows that are seldom
     sent lie outside. A narrow table is one without them.
 
     Parameters

@@ -33,6 +33,7 @@ from rehab.gait.stances.lag_watch import (
     LagWatch,
     find_moment_lag,
 )
+from rehab.gait.stances.limb import find_belt_speed, find_trailing_limb
 from rehab.gait.stances.plausibility import (
     LEVER_FROM,
     STANCE_MAX_S,
@@ -73,6 +74,10 @@ class Stance:
         As in ``Stride``.
     position_m
         Of the foot at initial contact [m, forward].
+    belt_m_s
+        How fast the belt carried the foot back [m/s].
+    trailing_limb_deg
+        As in ``Stride``.
     flags
         What the therapist should know of it.
     late_s, lost_s, a2_sd_w_kg
@@ -85,6 +90,8 @@ class Stance:
     propulsion_impulse_n_s_kg: float | None = None
     braking_impulse_n_s_kg: float | None = None
     position_m: float | None = None
+    belt_m_s: float | None = None
+    trailing_limb_deg: float | None = None
     flags: tuple[Flag, ...] = ()
     late_s: float = 0.0
     lost_s: float = 0.0
@@ -180,6 +187,7 @@ class StanceAnalyzer:
             push_off,
             *self._find_propulsion(window, before, end - begin),
             self._find_position(contact),
+            *self._find_posture(begin, end),
             tuple(flags),
             clock.late_s,
             clock.lost_s,
@@ -271,6 +279,13 @@ class StanceAnalyzer:
         stance = smooth[max(0, stop - count // self._decimation) : stop]
         driving = float(np.maximum(stance, 0.0).sum()) / self._even_hz
         return peak, driving, driving - float(stance.sum()) / self._even_hz
+
+    def _find_posture(self, begin: int, end: int) -> tuple[float | None, float | None]:
+        """Return the belt's speed and the trailing limb angle, where positions are known."""
+        if not math.isfinite(self._buffer.channel(POSITION, end - 1, end).item()):
+            return None, None
+        belt_m_s = find_belt_speed(self._buffer, begin, end)
+        return belt_m_s, find_trailing_limb(self._buffer, begin, end, self._rate_hz)
 
     def _find_position(self, contact: Contact) -> float | None:
         index = contact.begin_index

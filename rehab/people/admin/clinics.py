@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from django.contrib import admin
 
-from rehab.people.models import Clinic
+from rehab.people.models import Clinic, SignOnGroup
 from rehab.people.web.admin_base import ScopedAdmin
 
 
@@ -19,3 +19,12 @@ class ClinicAdmin(ScopedAdmin):
         *("care_needs_consent", "research_needs_consent", "networks", "note_template"),
         *("retention_months", "log_retention_months"),
     )
+
+
+@admin.register(SignOnGroup)
+class SignOnGroupAdmin(ScopedAdmin):
+    """Groups of the hospital's sign-on: the host says which clinic and role they give."""
+
+    list_display = ("name", "clinic", "role")
+    list_select_related = ("clinic",)
+    fields = ("name", "clinic", "role")

@@ -56,6 +56,7 @@ class Act(models.TextChoices):
     FACTOR_REMOVED = "factor_removed", _("Removed a second factor")
     RECOVERY_CODES = "recovery_codes", _("Made new recovery codes")
     PASSWORD = "password", _("Changed a password")
+    SIGN_ON = "sign_on", _("Linked or unlinked a hospital account")
     TOKEN_USE = "token_use", _("Used a token from a new network")
     REFUSED = "refused", _("Was refused")
     TOKEN = "token", _("Gave a new token")
@@ -74,6 +75,7 @@ class Act(models.TextChoices):
 SIGN_IN_ACTS = (
     *(Act.SIGN_IN, Act.SIGN_IN_FAILED, Act.LOCK_OUT, Act.SIGN_INS_ENDED, Act.PASSWORD),
     *(Act.FACTOR_ADDED, Act.FACTOR_REMOVED, Act.RECOVERY_CODES, Act.TOKEN_USE, Act.REFUSED),
+    Act.SIGN_ON,
 )
 
 

@@ -12,6 +12,7 @@ from rehab.people.models.choices import (
 )
 from rehab.people.models.clinics import LANGUAGES, Clinic, validate_time_zone
 from rehab.people.models.patients import Patient, PatientErased, generate_pseudonym
+from rehab.people.models.sign_on import SignOnGroup
 
 __all__ = [
     "LANGUAGES",
@@ -27,6 +28,7 @@ __all__ = [
     "ScreenText",
     "ServerUserManager",
     "Severity",
+    "SignOnGroup",
     "User",
     "generate_pseudonym",
     "validate_time_zone",

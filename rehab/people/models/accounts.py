@@ -56,6 +56,8 @@ class User(AbstractUser):
         blank=True,
         help_text=_("Of the pages that this account opens; empty: the clinic's."),
     )
+    # Who this person is at the hospital's sign-on (OpenID Connect's `sub`); None: not linked.
+    subject = models.CharField(max_length=255, unique=True, null=True, editable=False)  # noqa: DJ001
     # Raised to end all sign-ins from before.
     sign_in_generation = models.PositiveIntegerField(default=0, editable=False)
     # The name of the API token through which this person acts, and what it may do.

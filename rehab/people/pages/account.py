@@ -19,7 +19,7 @@ from rehab.people.models import LANGUAGES
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
-from rehab.people.sign_in import devices, resets, step_up
+from rehab.people.sign_in import devices, resets, sign_on, step_up
 from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import NewPasswordForm
 from rehab.people.web.language import language_of
@@ -41,6 +41,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
         "codes_left": factors.count_recovery_codes(user),
         "passkeys": passkeys.are_supported(request),
         "resets": resets.requests_for(user, timezone.now()),
+        "sign_on": sign_on.button_text(),
     }
     return render(request, "people/account.html", context)
 

@@ -12,7 +12,7 @@ from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
-from rehab.people.sign_in import step_up
+from rehab.people.sign_in import sign_on, step_up
 from rehab.people.sign_in.factors import passkeys
 from rehab.people.sign_in.forms import ProofForm
 
@@ -29,6 +29,9 @@ def ask_again(request: HttpRequest, title: str, words: str, act: str) -> HttpRes
         return None
     passkey = passkeys.authentication_options(request, user)
     context = {"form": form, "title": title, "words": words, "act": act, "passkey": passkey}
+    if user.subject:
+        way_back = request.GET.get("next", request.get_full_path())
+        context |= {"sign_on": sign_on.button_text(), "next": way_back}
     return render(request, "people/sign_in/confirm.html", context)
 
 

@@ -19,7 +19,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 from rehab.people.access import public
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in import flow
+from rehab.people.sign_in import flow, sign_on
 from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import FactorForm, SignInForm
 
@@ -34,6 +34,10 @@ class SignIn(LoginView):
 
     template_name = "people/sign_in/sign_in.html"
     authentication_form = SignInForm
+
+    def get_context_data(self, **given: Any) -> dict[str, Any]:
+        """Return what the page shows, with the button of the hospital's sign-on."""
+        return super().get_context_data(sign_on=sign_on.button_text(), **given)
 
     def form_valid(self, form: Any) -> HttpResponse:
         """Sign in, or go on to the second factor."""
@@ -73,7 +77,9 @@ def verify_second_factor(request: HttpRequest) -> HttpResponse:
 @public
 @require_POST
 def sign_out(request: HttpRequest) -> HttpResponse:
-    """Sign this browser out."""
+    """Sign this browser out, and of the hospital's sign-on where it came from there."""
+    page = request.build_absolute_uri(reverse("sign-in"))
+    there = sign_on.sign_out_address(request, page)
     logout(request)
     messages.success(request, _("You are signed out."))
-    return redirect("sign-in")
+    return redirect(there or "sign-in")

@@ -10,6 +10,7 @@ from rehab.sessions.payloads import (
     change_mark,
     describe_cue,
     describe_now,
+    describe_robot_state,
     describe_source_phase,
     describe_state,
     describe_types,
@@ -34,9 +35,9 @@ def change_event(fold: SessionFold, kind: str, value: ChangeValue = None) -> Liv
 def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
     """Return the event that a phase began; ``switched`` where it has another feedback type."""
     patient, monitor = _phase_for_patient(fold), _phase_for_monitor(fold)
-    if not switched:
-        return event_for(fold, patient=patient, monitor=monitor)
-    monitor["mark"] = type_mark(fold.last_number, fold.valence.slug)
+    if switched:
+        monitor["mark"] = type_mark(fold.last_number, fold.valence.slug)
+    # A phase decides what its robot may do beside answers.
     return event_for(fold, patient=patient, monitor=monitor, robot=_cue(fold))
 
 
@@ -100,10 +101,9 @@ PAYLOADS: dict[tuple[Audience, Payload], Callable[[SessionFold, Control, ChangeV
     ),
     (Audience.MONITOR, Payload.STATE): lambda fold, _control, _value: _state(fold),
     (Audience.MONITOR, Payload.PHASE): lambda fold, _control, _value: _phase_for_monitor(fold),
-    (Audience.ROBOT, Payload.STATE): lambda fold, _control, _value: {
-        "type": "state",
-        "state": fold.state.value,
-    },
+    (Audience.ROBOT, Payload.STATE): lambda fold, control, _value: describe_robot_state(
+        fold, control.kind
+    ),
     (Audience.ROBOT, Payload.CUE): lambda fold, _control, _value: _cue(fold),
     (Audience.SOURCE, Payload.KIND): lambda _fold, control, _value: {"type": str(control.kind)},
     (Audience.SOURCE, Payload.VALUE): lambda fold, control, _value: {

@@ -25,6 +25,7 @@ from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import format_incidents, format_phases, format_summary
 from rehab.sessions.reports.text_note import write_text_note
 from rehab.training.changes import OPEN_STATES, State
+from robot.wire.incident import MOTION
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
@@ -76,6 +77,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
 def _list_incidents(user: User, session: TrainingSession) -> list[tuple[RobotIncident, datetime]]:
     """Return the incidents of a session's robot, without recordings, with their local times."""
     rows = RobotIncident.objects.visible_to(user).filter(session=session).defer("recording")
+    rows = rows.exclude(reason=MOTION)
     return [(row, clinic_time(row.at, session.clinic)) for row in rows.order_by("pk")]
 
 

@@ -144,7 +144,7 @@ def _replay(records: Sequence[Record], ticks: Sequence[Record]) -> dict[str, Any
     poses: list[list[float]] = []
     for one in ticks:
         at_s = round(one["at_s"] - from_s, 2)
-        if not poses or at_s - poses[-1][0] >= REPLAY_EVERY_S:
+        if not poses or at_s - poses[-1][0] >= REPLAY_EVERY_S - 0.01:
             poses.append([at_s, *one["tick"][2:5]])
     lights = [
         [round(record["at_s"] - from_s, 2), *map(str, sent["lights"][:2])]

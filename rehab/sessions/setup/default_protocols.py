@@ -126,15 +126,29 @@ PROTOCOLS: dict[str, Template] = {
 }
 
 
+# What of a shared measure follows corrections in code. Another unit or direction is another
+# measure, and gets a slug of its own: stored values have those of their day.
+CORRECTED = ("name", "value_min", "value_max", "goal_min", "goal_max", "first_goal", "channel")
+
+
 def install_defaults(using: str = "default", **_signal: Any) -> None:
-    """Add missing shared rows; existing ones are not changed."""
+    """Add missing shared rows, and let measures follow what was corrected in code.
+
+    Sessions are scored by their own plans, registered studies by their own documents
+    (`studies.registration.document`): neither changes.
+    """
     from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
         for slug, measure in MEASURES.items():
-            MeasureDefinition.everywhere.using(using).get_or_create(
+            row, is_new = MeasureDefinition.everywhere.using(using).get_or_create(
                 clinic=None, slug=slug, defaults=asdict(measure)
             )
+            corrected = {name: getattr(measure, name) for name in CORRECTED}
+            if not is_new and corrected != {name: getattr(row, name) for name in CORRECTED}:
+                for name, value in corrected.items():
+                    setattr(row, name, value)
+                row.save(using=using, update_fields=list(corrected))
         for name, template in PROTOCOLS.items():
             about = {"description": template.description, "wanted_hits": template.wanted_hits}
             protocol, is_new = Protocol.everywhere.using(using).get_or_create(

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from rehab.gait import Stride
-from rehab.gait.recordings.ankle import compute_ankle
-from rehab.gait.recordings.columns import MARKED, SIDES, find_required
+from rehab.gait.recordings.ankle import add_computed
+from rehab.gait.recordings.columns import SIDES
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
@@ -175,7 +175,7 @@ class Intake:
         if excluded:
             self._warn(
                 f"left out {excluded}",
-                f"Left out of the strides: {', '.join(excluded)[:120]}. Up to 32 further values "
+                f"Left out of the strides: {', '.join(excluded)[:120]}. Up to 40 further values "
                 "can travel, numbers named with letters, digits or _ . : -",
             )
         self._put(stride, is_timed=any(name in row for name in TIMES))
@@ -294,8 +294,10 @@ class Intake:
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
         for side in SIDES:
-            if (side, "cop") in values:
-                _add_ankle(values, side)
+            if (side, "ankle_forward") in values:
+                leg = {name: channel for (own, name), channel in values.items() if own == side}
+                add_computed(leg)
+                values |= {(side, name): channel for name, channel in leg.items()}
         if self._recorder is not None:
             self._recorder.write(t_s, values)
         if self._pipeline is None:
@@ -329,10 +331,3 @@ class Intake:
                 self._warned_s.clear()
             self._warned_s[kind] = now_s
             self._notify(text)
-
-
-def _add_ankle(values: dict[Channel, Floats], side: str) -> None:
-    """Add a leg's moment and angle to its channels, of plates and markers that are whole."""
-    leg = {name: channel for (own, name), channel in values.items() if own == side}
-    if find_required(leg) == MARKED and leg.keys() >= set(MARKED):
-        values[side, "moment"], values[side, "angle"] = compute_ankle(leg)

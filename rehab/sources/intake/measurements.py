@@ -29,6 +29,7 @@ EXTRA = (
     ),
     *("force_peak_n_kg", "moment_peak_nm_kg", "a2_moment_nm_kg", "a2_velocity_rad_s"),
     "a2_sd_w_kg",
+    *("trailing_limb_deg", "knee_flexion_deg", "walking_ratio_mm_min", "margin_m"),
     *("weight_ratio", "offset_n"),
 )
 

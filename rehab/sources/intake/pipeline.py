@@ -161,7 +161,7 @@ def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floa
 
 def _leg(values: dict[Channel, Floats], side: str, t_s: Floats) -> LegSamples:
     """Return a leg's channels; NaN for a required one that these samples lack."""
-    force, moment, angle, forward, position = [values.get(key) for key in LEGS[side]]
+    force, moment, angle, *further = [values.get(key) for key in LEGS[side]]
     if force is None or moment is None or angle is None:
         force, moment, angle = [_values(values, key, len(t_s)) for key in LEGS[side][:3]]
-    return LegSamples(force, moment, angle, forward, position)
+    return LegSamples(force, moment, angle, *further)

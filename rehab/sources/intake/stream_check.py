@@ -51,6 +51,13 @@ class StreamCheck(Intake):
     async def wait_for_start(self) -> None:
         """Return at once: there is no session."""
 
+    async def wait_until_done(self) -> None:
+        """Return once half a minute is over, whether or not the sender goes on."""
+        while not self.is_done.is_set():
+            if self._first_s is not None and self._clock() - self._first_s >= self._seconds:
+                return
+            await asyncio.sleep(0.1)
+
     def accepts(self, names: Iterable[str]) -> bool:
         """Return True: what the columns are is to be found."""
         return True

@@ -63,6 +63,7 @@ class SyntheticSource(PlayedSource):
         self._has_treadmill: bool = options.treadmill
         self._side = Side(options.side) if options.side else None
         self._open_signals = make_opener(options, notify) if options.signals else None
+        self._notify = notify
         self._limit: float = math.inf if options.strides is None else options.strides
 
     def open_walk(self, trained_side: Side) -> NextStride:
@@ -71,12 +72,18 @@ class SyntheticSource(PlayedSource):
         strider = walker = SyntheticWalker(self._profile, self._seed, self._side or trained_side)
         if self._open_signals is not None:
             strider = self._open_signals(walker)
-        left = self._limit
+        left, warned = self._limit, ""
 
         def walk(display: Display) -> Measurement | None:
-            nonlocal left
+            nonlocal left, warned
             left -= 1
             measure = MEASURES.get(display.measure, A2)
+            if measure.channel and strider is not walker and warned != measure.slug:
+                warned = measure.slug
+                self._notify(
+                    f"Simulated signals answer a goal of A2 alone, not of {measure.name}. Start "
+                    "this source without --signals: then the patient walks every measure."
+                )
             show_goal(walker, display.goal, measure)
             walker.valence = display.valence
             if left < 0:

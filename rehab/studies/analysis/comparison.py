@@ -1,27 +1,27 @@
 """Differences between arms, with intervals: one model for each outcome.
 
-A mixed model (`mixed_model`) of all visits that were walked, adjusted for the visit and the first
-baseline, so that who misses a visit at random, or because of what was seen before, shifts nothing.
-In parallel groups each arm has a mean of its own at each visit, and arms are compared in the mean
-over the visits that all of them walked, each with the same weight. In a crossover arms are compared
-within people, adjusted for the visit and with it the period. Bias, coverage and type I error:
-`tests/bench/test_study_bias.py`.
+A mixed model (`mixed_model`) of all visits that were walked, adjusted for the visit, the first
+baseline and the strata of the allocation, with variances of each arm's own: who misses a visit at
+random, or because of what was seen before, shifts nothing. In a crossover arms are compared within
+people, adjusted for the visit and with it the period. Bias, coverage, type I error and power:
+`tests/bench/test_study_bias.py`, `test_study_statistics.py`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from scipy.special import stdtrit
 
-from rehab.studies.analysis.mixed_model import Fit, fit
-from rehab.studies.analysis.walks import Floats
+from rehab.studies.analysis import designs
+from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Design, Observation
+from rehab.studies.analysis.missing import Missing, missing_of
+from rehab.studies.analysis.mixed_model import Estimate, Floats
 
 CONFIDENCE = 0.95
-MIN_PARTICIPANTS = 3  # of an arm for which an interval is given
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,28 +36,6 @@ class Interval:
         """Return the same in another unit. ``factor``: positive."""
         low, high = (None if end is None else factor * end for end in (self.low, self.high))
         return Interval(factor * self.estimate, low, high)
-
-
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """An outcome of one visit.
-
-    Attributes
-    ----------
-    participant, arm, visit
-        Whose, in which arm, at which visit, counted from 1 over all periods.
-    period
-        Of a crossover, from 0.
-    value, baseline
-        The outcome, and the participant's first baseline; None where that is unknown.
-    """
-
-    participant: str
-    arm: str
-    visit: int
-    value: float
-    baseline: float | None = None
-    period: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +55,10 @@ class Difference:
     effect
         The same difference and interval as a ratio to the standard deviation between participants
         (Hedges' g, with his correction for small groups).
+    estimate
+        What the interval was made of; None where there are too few participants for one.
+    missing
+        What visits that are missing could do to it; None where none is.
     """
 
     group: str
@@ -85,6 +67,35 @@ class Difference:
     paired: bool
     difference: Interval
     effect: Interval | None
+    estimate: Estimate | None = None
+    missing: Missing | None = None
+
+    @property
+    def p(self) -> float | None:
+        """Two-sided p of no difference, of this comparison alone."""
+        return None if self.estimate is None else self.estimate.p
+
+    def is_not_inferior(
+        self, margin: float, *, higher_is_better: bool, confidence: float = CONFIDENCE
+    ) -> bool | None:
+        """Return whether the interval leaves out that the group is worse by a margin.
+
+        None without an interval. The lower end of a two-sided 95 % interval is a one-sided test at
+        2.5 % (ICH E9, 3.3.2; CONSORT extension, Piaggio 2012, JAMA 308:2594-2604).
+
+        Parameters
+        ----------
+        margin
+            By how much the group may be worse, in the outcome's unit; positive.
+        higher_is_better
+            Of the outcome.
+        confidence
+            Of the interval (ratio).
+        """
+        if self.estimate is None:
+            return None
+        low, high = self.estimate.interval(confidence)
+        return low > -margin if higher_is_better else high < margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,35 +126,77 @@ def compare(
     Parameters
     ----------
     observations
-        All that were made of an outcome, in any order.
+        All of an outcome, in any order, also those that are missing.
     arms
         The codes of the arms; those without observations are left out.
     crossover
         Whether everybody walks every arm.
     """
-    walked = [arm for arm in arms if any(one.arm == arm for one in observations)]
+    walked = _walked(observations, arms)
     if not walked:
         return Comparison({}, ())
-    weights, fitted = (
-        _fit_crossover(observations, walked) if crossover else _fit_parallel(observations, walked)
-    )
-    people = {arm: _means(observations, arm) for arm in walked}
+    make = designs.crossover if crossover else designs.parallel
+    return _compare(make(observations, walked), observations, paired=crossover)
+
+
+def carry_over(observations: Sequence[Observation], arms: Sequence[str]) -> tuple[Difference, ...]:
+    """Return by how much more each arm of a crossover adds to the next period than an earlier one.
+
+    The comparison of arms is not chosen by it (Freeman 1989, Statistics in Medicine 8:1421-1432):
+    of two arms it is between people, and too weak to show that there is none.
+
+    Parameters
+    ----------
+    observations, arms
+        As for `compare`.
+    """
+    walked = _walked(observations, arms)
+    if len({one.period for one in observations if one.value is not None}) < 2:
+        return ()
+    design = designs.crossover(observations, walked, carry_over=True)
+    found = _compare(design, observations, paired=False)
+    return tuple(replace(one, effect=None, missing=None) for one in found.differences)
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Return p adjusted for their number, in their order (Holm 1979, Scand J Statist 6:65-70)."""
+    order = sorted(range(len(p)), key=lambda index: p[index])
+    adjusted, most = [0.0] * len(p), 0.0
+    for rank, index in enumerate(order):
+        most = max(most, min(1.0, (len(p) - rank) * p[index]))
+        adjusted[index] = most
+    return adjusted
+
+
+def _walked(observations: Sequence[Observation], arms: Sequence[str]) -> list[str]:
+    have = {one.arm for one in observations if one.value is not None}
+    return [arm for arm in arms if arm in have]
+
+
+def _compare(design: Design, observations: Sequence[Observation], *, paired: bool) -> Comparison:
+    fitted, weights = design.fit, design.weights
+    people = {arm: _means(observations, arm) for arm in design.arms}
     means = {
-        arm: _interval(fitted, weights[arm], len(people[arm]))
-        for arm in walked
+        arm: _interval(fitted.estimate(weights[arm]), len(people[arm]))
+        for arm in design.arms
         if arm in weights and fitted.tells(weights[arm])
     }
     differences = []
-    for reference, group in combinations(walked, 2):
+    for reference, group in combinations(design.arms, 2):
         if group not in weights or reference not in weights:
             continue
         apart = weights[group] - weights[reference]
         if fitted.tells(apart):
             sizes = len(people[group]), len(people[reference])
-            found = _interval(fitted, apart, min(sizes))
+            estimate = fitted.estimate(apart)
+            found = _interval(estimate, min(sizes))
             effect = _effect(found, people[group], people[reference])
-            paired = crossover
-            differences.append(Difference(group, reference, sizes, paired, found, effect))
+            has_ends = found.low is not None
+            missing = missing_of(design, group, reference, estimate) if has_ends else None
+            with_ends = estimate if has_ends else None
+            differences.append(
+                Difference(group, reference, sizes, paired, found, effect, with_ends, missing)
+            )
     return Comparison(means, tuple(differences))
 
 
@@ -151,13 +204,12 @@ def _means(observations: Sequence[Observation], arm: str) -> Floats:
     """Return each participant's mean in an arm, shape (n,)."""
     of_person: dict[str, list[float]] = {}
     for one in observations:
-        if one.arm == arm:
+        if one.arm == arm and one.value is not None:
             of_person.setdefault(one.participant, []).append(one.value)
     return np.array([sum(values) / len(values) for values in of_person.values()])
 
 
-def _interval(fitted: Fit, weights: Floats, participants: int) -> Interval:
-    found = fitted.estimate(weights)
+def _interval(found: Estimate, participants: int) -> Interval:
     if participants < MIN_PARTICIPANTS or found.freedom < 1:
         return Interval(found.value)
     return Interval(found.value, *found.interval(CONFIDENCE))
@@ -174,82 +226,3 @@ def _effect(difference: Interval, a: Floats, b: Floats) -> Interval | None:
     if not spread > 0:
         return None
     return difference.times((1 - 3 / (4 * (len(a) + len(b) - 2) - 1)) / spread)
-
-
-def _fit_parallel(
-    observations: Sequence[Observation], arms: Sequence[str]
-) -> tuple[dict[str, Floats], Fit]:
-    """Return each arm's weights of the effects, and the fit with an effect of each arm's visit."""
-    cells = sorted({(one.arm, one.visit) for one in observations})
-    place = {cell: index for index, cell in enumerate(cells)}
-    common = [
-        visit
-        for visit in sorted({one.visit for one in observations})
-        if all((arm, visit) in place for arm in arms)
-    ]
-    table = _Table(observations, len(cells) + 1)
-    for person, column, one in table.places():
-        table.x[person, column, place[one.arm, one.visit]] = 1.0
-        table.x[person, column, -1] = table.baselines[person]
-    weights = {arm: np.zeros(len(cells) + 1) for arm in arms if common}
-    for arm, of_arm in weights.items():
-        of_arm[[place[arm, visit] for visit in common]] = 1 / len(common)
-    return weights, fit(table.x, table.y, table.seen, np.ones((1, *table.y.shape[1:] * 2)))
-
-
-def _fit_crossover(
-    observations: Sequence[Observation], arms: Sequence[str]
-) -> tuple[dict[str, Floats], Fit]:
-    """Return each arm's weights of the effects, and the fit with effects of arms and of visits."""
-    table = _Table(observations, len(arms) + len({one.visit for one in observations}) - 1)
-    last = table.y.shape[1] - 1
-    periods = np.zeros(last + 1)
-    for person, column, one in table.places():
-        row = table.x[person, column]
-        row[arms.index(one.arm)] = 1.0
-        if column == last:  # visits' effects sum to 0
-            row[len(arms) :] = -1.0
-        else:
-            row[len(arms) + column] = 1.0
-        periods[column] = one.period
-    weights = {arm: np.eye(table.x.shape[2])[index] for index, arm in enumerate(arms)}
-    alike = np.array([np.ones((last + 1, last + 1)), periods[:, None] == periods[None, :]])
-    return weights, fit(table.x, table.y, table.seen, alike.astype(float))
-
-
-class _Table:
-    """Observations as arrays: a row for each participant, a column for each visit."""
-
-    def __init__(self, observations: Sequence[Observation], effects: int) -> None:
-        self._observations = observations
-        people = dict.fromkeys(one.participant for one in observations)
-        self._rows = {person: row for row, person in enumerate(people)}
-        visits = sorted({one.visit for one in observations})
-        self._columns = {visit: column for column, visit in enumerate(visits)}
-        shape = len(people), len(visits)
-        self.x = np.zeros((*shape, effects))
-        self.y = np.zeros(shape)
-        self.seen = np.zeros(shape, bool)
-        self.baselines = np.full(shape[0], np.nan)
-        for row, column, one in self.places():
-            self.y[row, column], self.seen[row, column] = one.value, True
-            if one.baseline is not None:
-                self.baselines[row] = one.baseline
-        self.baselines = _standardize(self.baselines)
-
-    def places(self) -> list[tuple[int, int, Observation]]:
-        """Return row and column of each observation."""
-        rows, columns = self._rows, self._columns
-        return [(rows[one.participant], columns[one.visit], one) for one in self._observations]
-
-
-def _standardize(baselines: Floats) -> Floats:
-    """Return baselines about 0 with a spread of 1, unknown ones at 0; all 0 without a spread.
-
-    The mean in place of a baseline that is missing keeps a randomized comparison unbiased (White
-    and Thompson 2005, Statistics in Medicine 24:993-1007).
-    """
-    known = np.isfinite(baselines)
-    if known.sum() < 2 or not (spread := float(baselines[known].std())) > 0:
-        return np.zeros_like(baselines)
-    return np.where(known, (baselines - baselines[known].mean()) / spread, 0.0)

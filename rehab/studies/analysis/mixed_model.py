@@ -10,10 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
+from numpy.typing import NDArray
+from scipy.special import stdtr, stdtrit
 
-from rehab.studies.analysis.walks import Flags, Floats
-
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 MAX_ROUNDS = 200
 TOLERANCE = 1e-9  # relative change of the variances at which the iteration ends
 LEAST_EIGENVALUE = 1e-7  # of a person's covariance, as a share of the residual variance
@@ -30,8 +31,19 @@ class Estimate:
 
     def interval(self, confidence: float) -> tuple[float, float]:
         """Return both ends of Student's interval."""
-        half = float(stdtrit(self.freedom, (1 + confidence) / 2)) * self.error
+        half = self.quantile(confidence) * self.error
         return self.value - half, self.value + half
+
+    def quantile(self, confidence: float) -> float:
+        """Return Student's quantile of a two-sided interval. ``confidence``: ratio."""
+        return float(stdtrit(self.freedom, (1 + confidence) / 2))
+
+    @property
+    def p(self) -> float:
+        """Student's two-sided p of no effect; 0 or 1 where nothing scatters."""
+        if self.error == 0:
+            return float(self.value == 0)
+        return float(2 * stdtr(self.freedom, -abs(self.value) / self.error))
 
 
 @dataclass(frozen=True)
@@ -52,6 +64,8 @@ class Fit:
         Shape (v, v): covariance of the estimated variances.
     freedom
         Observations less effects; without any there are no intervals.
+    variances
+        Shape (v,): of each part of the covariance, 0 where the data do not tell it.
     """
 
     effects: Floats
@@ -61,6 +75,7 @@ class Fit:
     slopes: Floats
     of_variances: Floats
     freedom: int
+    variances: Floats
 
     def tells(self, weights: Floats) -> bool:
         """Return whether the data tell a combination of effects. ``weights``: shape (k,)."""
@@ -78,7 +93,7 @@ class Fit:
         return Estimate(value, max(error, plain) ** 0.5, freedom)
 
 
-def fit(x: Floats, y: Floats, seen: Flags, alike: Floats) -> Fit:
+def fit(x: Floats, y: Floats, seen: Flags, parts: Floats) -> Fit:
     """Return the model that explains values by effects, with visits of a person that are alike.
 
     Parameters
@@ -87,12 +102,19 @@ def fit(x: Floats, y: Floats, seen: Flags, alike: Floats) -> Fit:
         Shape (n, t, k): for each person and visit what each effect is multiplied with.
     y, seen
         Shape (n, t): the values, and whether there is one.
-    alike
-        Shape (a, t, t): 1 where two visits of a person share a variance, as all of them do, or
-        those of one period; 0 elsewhere. The variance that each visit has of its own is added.
+    parts
+        Shape (v, n, t, t): what each variance adds to each person's covariance. Parts on the
+        diagonal are the variances that each visit has of its own, and add up to 1 there; in the
+        others 1 stands where two visits of a person share a variance.
     """
     x, y = np.where(seen[..., None], x, 0.0), np.where(seen, y, 0.0)
-    parts = _parts(seen, alike)
+    every, parts = parts, parts * (seen[:, :, None] & seen[:, None, :])
+    off_diagonal = 1 - np.eye(seen.shape[1])
+    own = ~np.asarray((parts * off_diagonal).any(axis=(1, 2, 3)))
+    # A part that no two visits of anybody share could not be told from the visits' own.
+    of_visits = ~np.asarray((every * off_diagonal).any(axis=(1, 2, 3)))
+    used = np.asarray(parts.any(axis=(1, 2, 3))) & (~own | of_visits)
+    parts = parts[used]
     count, rank = int(seen.sum()), int(np.linalg.matrix_rank(x.reshape(-1, x.shape[2])))
     effects, span, residual = _least_squares(x, y)
     freedom = count - rank
@@ -100,9 +122,10 @@ def fit(x: Floats, y: Floats, seen: Flags, alike: Floats) -> Fit:
     if residual_variance <= EXACT * max(float((y * y).sum()) / max(count, 1), 1e-300):
         zero = np.zeros_like(span)
         none = np.zeros((len(parts), *span.shape))
-        return Fit(effects, span, zero, zero, none, np.zeros((len(parts),) * 2), freedom)
-    variances = np.zeros(len(parts))
-    variances[0] = residual_variance
+        of_variances = np.zeros((len(parts),) * 2)
+        nothing = np.zeros(len(every))
+        return Fit(effects, span, zero, zero, none, of_variances, freedom, nothing)
+    variances = np.where(own[used], residual_variance, 0.0)
     for _ in range(MAX_ROUNDS):
         _round = _Round(x, y, seen, parts, variances)
         target = np.linalg.pinv(_round.information) @ (_round.squares / 2)
@@ -112,18 +135,9 @@ def fit(x: Floats, y: Floats, seen: Flags, alike: Floats) -> Fit:
         variances = moved
         if change < TOLERANCE:
             break
-    return _Round(x, y, seen, parts, variances).to_fit(span, freedom)
-
-
-def _parts(seen: Flags, alike: Floats) -> Floats:
-    """Return what each variance adds to each person's covariance, shape (v, n, t, t).
-
-    A part that no two visits of anybody share is left out: it could not be told from the rest.
-    """
-    both = seen[:, :, None] & seen[:, None, :]
-    own = np.eye(seen.shape[1]) * both
-    off = [part * both for part in alike]
-    return np.array([own, *(part for part in off if ((part > 0) & (own == 0)).any())])
+    estimated = np.zeros(len(every))
+    estimated[used] = variances
+    return _Round(x, y, seen, parts, variances).to_fit(span, freedom, estimated)
 
 
 def _least_squares(x: Floats, y: Floats) -> tuple[Floats, Floats, float]:
@@ -174,8 +188,8 @@ class _Round:
         twice = np.einsum("vkl,wlk->vw", mixed, mixed)
         self.information = (traces - 2 * once + twice) / 2
 
-    def to_fit(self, span: Floats, freedom: int) -> Fit:
-        """Return the fit with the correction of Kenward and Roger."""
+    def to_fit(self, span: Floats, freedom: int, variances: Floats) -> Fit:
+        """Return the fit with the correction of Kenward and Roger; the rest as `Fit` has it."""
         of_variances = np.linalg.pinv(self.information, hermitian=True)
         pairs = np.einsum("vw,vwnst->nst", of_variances, self._pairs)
         crossed = np.einsum(
@@ -184,4 +198,6 @@ class _Round:
         inner = (self._across @ pairs @ self._x).sum(0) - crossed
         adjusted = self.plain + 2 * self.plain @ inner @ self.plain
         slopes = self.plain @ self.slopes @ self.plain
-        return Fit(self.effects, span, self.plain, adjusted, slopes, of_variances, freedom)
+        return Fit(
+            *(self.effects, span, self.plain, adjusted, slopes, of_variances, freedom, variances)
+        )

@@ -192,6 +192,9 @@ MEANINGS = {
     "steps": "Judged strides with feedback.",
     "active_minutes": "Time that was walked.",
 }
+LOWER_IS_BETTER = frozenset(
+    {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"}
+)
 # Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
     slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()

@@ -8,14 +8,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
-from rehab.studies.analysis.comparison import (
-    MIN_PARTICIPANTS,
-    Difference,
-    Interval,
-    Observation,
-    compare,
-)
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
+from rehab.studies.analysis.designs import Observation
 from rehab.studies.analysis.outcomes import compute_outcomes
 from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
 from rehab.studies.analysis.walk_figures import History
@@ -81,6 +75,8 @@ class Participant:
         A curve for each arm.
     baseline, measure
         Mean of the first session's baseline, None of too few valid strides; what it is a mean of.
+    levels
+        Of the factors that the allocation balances.
     """
 
     code: str
@@ -90,6 +86,7 @@ class Participant:
     curves: dict[str, Curve] = field(default_factory=dict)
     baseline: float | None = None
     measure: str = ""
+    levels: tuple[str, ...] = ()
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -98,16 +95,17 @@ class Participant:
 
     def outcome(self, slug: str, arm: str) -> float | None:
         """Return the mean of an outcome over the visits in an arm; None where no one has it."""
-        found = [one.value for one in self.observe(slug) if one.arm == arm]
+        visits = self.visits if self.is_analyzed else ()
+        found = [v.outcomes[slug] for v in visits if v.arm == arm and slug in v.outcomes]
         return sum(found) / len(found) if found else None
 
     def observe(self, slug: str) -> Iterator[Observation]:
-        """Yield an outcome of each visit that counts and has it."""
+        """Yield an outcome of each visit that was due, also where it is missing."""
         for visit in self.visits if self.is_analyzed else ():
-            if slug in visit.outcomes:
-                value = visit.outcomes[slug]
-                place = visit.arm, visit.number
-                yield Observation(self.code, *place, value, self.baseline, visit.period)
+            if visit.is_due:
+                value = visit.outcomes.get(slug)
+                of_person = self.baseline, visit.period, self.levels
+                yield Observation(self.code, visit.arm, visit.number, value, *of_person)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +124,7 @@ def make_participant(
     *,
     has_left: bool = False,
     is_analyzed: bool = True,
+    levels: Sequence[str] = (),
 ) -> Participant:
     """Return a participant from the planned visits and what was walked of them.
 
@@ -137,6 +136,8 @@ def make_participant(
         The visits in their order, each with its session; None where none counts.
     has_left, is_analyzed
         Whether the participant withdrew; whether the sessions count in the results.
+    levels
+        Of the factors that the allocation balances.
     """
     visits: list[ParticipantVisit] = []
     walks: dict[str, list[Walk | None]] = {}
@@ -165,7 +166,8 @@ def make_participant(
         before = walked.walk
     curves = {arm: curve_of(of_arm) for arm, of_arm in walks.items()}
     baseline, measure = (first.walk.baseline, first.measure) if first else (None, "")
-    return Participant(code, tuple(visits), has_left, is_analyzed, curves, baseline, measure)
+    about = curves, baseline, measure, tuple(levels)
+    return Participant(code, tuple(visits), has_left, is_analyzed, *about)
 
 
 def by_arm(
@@ -178,66 +180,6 @@ def by_arm(
         }
         for arm in arms
     }
-
-
-@dataclass(frozen=True, slots=True)
-class ArmFigure:
-    """An outcome in one arm: how many have it and how many lack it, and the model's mean."""
-
-    arm: str
-    participants: int
-    missing: int
-    mean: Interval | None
-
-
-@dataclass(frozen=True, slots=True)
-class OutcomeResult:
-    """An outcome over all arms, and the differences between them."""
-
-    slug: str
-    arms: tuple[ArmFigure, ...]
-    differences: tuple[Difference, ...]
-
-    def without_few(self) -> OutcomeResult:
-        """Return the same without figures of fewer people than an interval needs."""
-        arms = tuple(
-            one if one.participants >= MIN_PARTICIPANTS else replace(one, mean=None)
-            for one in self.arms
-        )
-        kept = (one for one in self.differences if min(one.participants) >= MIN_PARTICIPANTS)
-        return OutcomeResult(self.slug, arms, tuple(kept))
-
-
-def find(
-    participants: Sequence[Participant], arms: Sequence[str], slug: str, *, crossover: bool
-) -> OutcomeResult:
-    """Return what was found of an outcome.
-
-    Parameters
-    ----------
-    participants, arms
-        Everybody who was allocated; the codes of the arms, in the order of the differences.
-    slug
-        Of the outcome, or `CHANNEL` and a channel's name.
-    crossover
-        Whether everybody walks every arm, so that differences are within people.
-    """
-    observed = observations(participants, slug)
-    compared = compare(observed, arms, crossover=crossover)
-    figures = []
-    for arm in arms:
-        meant = sum(one.is_analyzed and arm in one.arms for one in participants)
-        have_it = len({one.participant for one in observed if one.arm == arm})
-        figures.append(ArmFigure(arm, have_it, meant - have_it, compared.means.get(arm)))
-    return OutcomeResult(slug, tuple(figures), compared.differences)
-
-
-def observations(participants: Sequence[Participant], slug: str) -> list[Observation]:
-    """Return an outcome of all visits; without baselines where arms measure different things."""
-    found = [one for participant in participants for one in participant.observe(slug)]
-    if len({one.measure for one in participants if one.baseline is not None}) > 1:
-        return [replace(one, baseline=None) for one in found]
-    return found
 
 
 def curves_by_arm(

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from rehab.studies.analysis.mixed_model import Flags
 from rehab.studies.analysis.walk_figures import change, detrended, memory, variation
-from rehab.studies.analysis.walks import Flags, Walk
+from rehab.studies.analysis.walks import Walk
 
 
 def channel_changes(walk: Walk) -> dict[str, float]:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.studies.analysis.walks import Floats, Walk
+from rehab.studies.analysis.mixed_model import Floats
+from rehab.studies.analysis.walks import Walk
 
 # A mean of so many strides has a standard error of 1-2 % (docs/reference/gait.md#phases).
 ENDS = 50

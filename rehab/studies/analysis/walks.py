@@ -10,11 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rehab.studies.analysis.mixed_model import Flags, Floats
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import Phase
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

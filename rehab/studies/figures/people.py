@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from rehab.sessions.reports.report_chart import round_steps
-from rehab.studies.analysis.participants import OutcomeResult
+from rehab.studies.analysis.findings import OutcomeResult
 from rehab.studies.figures.canvas import COLORS, INK, LEFT, MUTED, RIGHT, Canvas, number, shorten
 
 WIDTH, HEIGHT = 1000.0, 400.0

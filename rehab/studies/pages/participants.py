@@ -16,13 +16,15 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
+from rehab.studies.agreements import agree, agreed_version, version_to_agree_to
 from rehab.studies.enrolling import enroll, withdraw
-from rehab.studies.forms import EnrollmentForm, PlaceForm
+from rehab.studies.guesses import GUESSERS, UNKNOWN, group_labels, may_guess, record_guess
 from rehab.studies.pages.planning import get_study, is_assessor
 from rehab.studies.pages.refusals import refuse
+from rehab.studies.participant_forms import EnrollmentForm, PlaceForm
 from rehab.studies.participants import Enrollment
 from rehab.studies.screening import find_unmet, turn_away
-from rehab.studies.unblinding import reveal_arms
+from rehab.studies.unblinding import arms_of, find_request, may_read_arm, reveal_arms
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -83,17 +85,26 @@ def render_participant(
         What else the template shows: a form as it was sent, why something was refused, the arms
         that were revealed.
     """
-    user = user_of(request)
+    user, now = user_of(request), timezone.now()
     first_station(enrollment.patient.clinic)
     blind = is_assessor(enrollment.study, user)
     visits = list(enrollment.visits.select_related("session"))
+    if not blind and "revealed" not in more and may_read_arm(enrollment, user, now):
+        more["revealed"] = arms_of(enrollment)
     is_walking = any(visit.session and visit.session.state in OPEN_STATES for visit in visits)
+    guesser = may_guess(enrollment, user)
     context = {
         "enrollment": enrollment,
         "study": enrollment.study,
         "visits": visits,
         "next": None if is_walking else next_visit(enrollment),
         "blind": blind,
+        "guesser": GUESSERS[guesser] if guesser else "",
+        "groups": group_labels(enrollment.study) if guesser else {},
+        "unknown": UNKNOWN,
+        "asked": find_request(enrollment, now),
+        "agreed": agreed_version(enrollment),
+        "to_agree_to": version_to_agree_to(enrollment),
         "place": PlaceForm(patient=enrollment.patient, by=user),
         **more,
     }
@@ -132,6 +143,20 @@ def leave_study(request: HttpRequest, enrollment_id: int) -> HttpResponse:
 
 
 @for_roles(Role.LEAD, Role.PT)
+@require_POST
+def note_guess(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Note what the participant, or the assessor who asks, guesses about the group."""
+    user = user_of(request)
+    enrollment = get_enrollment(user, enrollment_id)
+    try:
+        record_guess(enrollment, request.POST.get("group", ""), user, timezone.now())
+    except InvalidSetting as problem:
+        return render_participant(request, enrollment, 403, refused=refuse(request, problem))
+    messages.success(request, _("The guess is noted."))
+    return redirect("participant", enrollment_id=enrollment.pk)
+
+
+@for_roles(Role.LEAD, Role.PT)
 @step_up.required
 @require_POST
 def reveal(request: HttpRequest, enrollment_id: int) -> HttpResponse:
@@ -139,9 +164,24 @@ def reveal(request: HttpRequest, enrollment_id: int) -> HttpResponse:
     user = user_of(request)
     enrollment = get_enrollment(user, enrollment_id)
     reason = request.POST.get("reason", "")[:1000]
-    emergency = request.POST.get("emergency") == "yes"
+    emergency, alone = (request.POST.get(name) == "yes" for name in ("emergency", "alone"))
     try:
-        arms = reveal_arms(enrollment, reason, emergency=emergency, by=user, now=timezone.now())
+        arms = reveal_arms(
+            *(enrollment, reason),
+            emergency=emergency,
+            second=not alone,
+            by=user,
+            now=timezone.now(),
+        )
     except InvalidSetting as problem:
         return render_participant(request, enrollment, 403, refused=refuse(request, problem))
-    return render_participant(request, enrollment, revealed=arms, told=_("The arm is revealed."))
+    return render_participant(request, enrollment, revealed=arms)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def agree_again(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Record that a participant agreed to the study's newer version."""
+    user = user_of(request)
+    agree(get_enrollment(user, enrollment_id), user, timezone.now())
+    return redirect("participant", enrollment_id=enrollment_id)

@@ -29,6 +29,7 @@ from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draf
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState, has_mark
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
+from rehab.studies.record.adverse_events import may_monitor
 from rehab.studies.registration.lifecycle import close, register, revise, start
 from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
 from rehab.studies.registration.protocol_json import write_json
@@ -84,7 +85,8 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
             else:
                 with transaction.atomic():
                     save_arms(arms, study)
-                    revise(study, form.cleaned_data["reason"], user, timezone.now())
+                    reason, again = (form.cleaned_data[n] for n in ("reason", "needs_consent"))
+                    revise(study, reason, user, timezone.now(), needs_consent=again)
         except InvalidSetting as problem:
             form.add_error(None, format_refusal(problem))
             if study_id is None:
@@ -119,6 +121,7 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "by_name": by_name,
         "may_look": may_look(study, user),
         "may_plan": user.role in {Role.LEAD, Role.RESEARCHER},
+        "may_see_harms": may_monitor(study, user) or user.role in {Role.LEAD, Role.PT},
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),

@@ -17,7 +17,9 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import format_number
-from rehab.studies.analysis.comparison import Interval
+from rehab.studies.analysis.comparison import CONFIDENCE, Difference, Interval
+from rehab.studies.analysis.findings import OutcomeResult
+from rehab.studies.guesses import GUESSERS, Guesser, group_labels, guess_rows
 from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
 from rehab.studies.results.drawing import (
@@ -47,12 +49,25 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
     """Show what a study found. A look before its end is recorded."""
     study, user = _open(request, study_id)
     now = timezone.now()
-    note_look(study, user, now)
     results = read_results(study, now)
+    note_look(results, user, now)
     context = {
         "study": study,
         "interim": results.is_interim,
         "changes": results.changes,
+        "level": results.level,
+        "information": results.information,
+        "blinded_size": results.blinded_size,
+        "carry_over": [
+            {
+                "outcome": outcome_label(slug),
+                "label": name_pair(results, one.group, one.reference),
+                "difference": _format_interval(one.difference, outcome_unit(slug)),
+                "p": _format_p(one.p),
+            }
+            for slug in results.registered
+            for one in results.find(slug).carry_over
+        ],
         "arms": results.arms.values(),
         "conduct": results.conduct,
         "figures": {
@@ -62,6 +77,10 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
         },
         "registered": [_describe(results, slug) for slug in results.registered],
         "exploratory": [_describe(results, slug) for slug in results.exploratory],
+        "groups": group_labels(study),
+        "guesses": []
+        if results.is_interim
+        else [_describe_guess(study, row) for row in guess_rows(study)],
         "tables": [name for name in TABLES if is_shown(results, name)],
     }
     return render(request, "studies/results.html", context)
@@ -94,10 +113,46 @@ def _describe(results: Results, slug: str) -> dict[str, Any]:
                 "paired": one.paired,
                 "difference": _format_interval(one.difference, unit),
                 "effect": _format_interval(one.effect, ""),
+                "p": _format_p(one.p),
+                "p_holm": _format_p(results.adjusted_p.get((slug, one.group, one.reference))),
+                "per_protocol": _of_protocol(found, one, unit),
+                "missing": one.missing and sum(one.missing.visits),
+                "tipping_point": _tipping_point(one, unit),
+                "not_inferior": results.is_not_inferior(slug, one),
             }
             for one in found.differences
         ],
     }
+
+
+def _describe_guess(study: Study, row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row of guesses as the page's table has it."""
+    estimate = row["estimate"]
+    interval = None if estimate is None else Interval(estimate, row["low_95"], row["high_95"])
+    return {
+        "guesser": GUESSERS[Guesser(row["guesser"])],
+        "group": group_labels(study).get(row["group"], ""),
+        "counts": [row[name] for name in row if name.startswith("guessed_")],
+        "do_not_know": row["do_not_know"],
+        "index": row["index"],
+        "found": _format_interval(interval, ""),
+    }
+
+
+def _format_p(p: float | None) -> str:
+    if p is None:
+        return ""
+    return f"< {format_number(0.001, 3)}" if p < 0.001 else format_number(p, 3)
+
+
+def _of_protocol(found: OutcomeResult, one: Difference, unit: str) -> dict[str, str] | None:
+    followed = found.of_protocol(one)
+    return None if followed is None else _format_interval(followed.difference, unit)
+
+
+def _tipping_point(one: Difference, unit: str) -> str:
+    point = one.missing and one.missing.tipping_point(CONFIDENCE)
+    return f"{format_number(point, 1 if unit else 2)} {unit}".strip() if point else ""
 
 
 def _format_interval(interval: Interval | None, unit: str) -> dict[str, str] | None:
@@ -123,7 +178,7 @@ def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
     results = read_results(study, now)
     if not is_shown(results, name):
         raise PermissionDenied
-    note_look(study, user, now)
+    note_look(results, user, now)
     audit_log.record(Act.EXPORT, user, about=f"{study.code} {name}.{kind}", now=now)
     if kind == "svg":
         response = HttpResponse(FIGURES[name](results), content_type="image/svg+xml")

@@ -16,13 +16,26 @@ from rehab.questionnaires.instrument import Instrument
 from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.models import Arm, Study
 from rehab.training.goals import GoalRule
-from rehab.training.measures import A2
+from rehab.training.measures import Measure
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Side
 from rehab.training.valences import find_valence
 
+# What a document leaves out: A2 as it was when the first studies were registered, whatever was
+# corrected since.
+FIRST_A2 = Measure(
+    slug="a2",
+    name="ankle push-off power A2",
+    unit="W/kg",
+    value_min=0.0,
+    value_max=20.0,
+    goal_min=0.0,
+    goal_max=15.0,
+    first_goal=3.9,
+)
+ANALYSIS = ("margin", "spending", "planned_sd")
 USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
 
 
@@ -54,10 +67,26 @@ def describe(study: Study) -> dict[str, Any]:
         document["visits"]["days_to_follow_up"] = plan.follow_up_days
         for arm in study.arms.all():
             arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
+    document |= {"analysis": planned} if planned else {}
+    document |= {"facts": study.facts} if study.facts else {}
     criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}
     document |= {name: asked for name, asked in criteria.items() if asked}
     stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
     return stored
+
+
+def find_rule(study: Study, arm: Arm) -> Measure:
+    """Return how an arm's measure is scored.
+
+    Measures that all clinics share follow corrections in code; a study that is registered stays
+    with what it was registered with, also in later versions.
+    """
+    version = None if study.is_draft or arm.measure.clinic_id else study.versions.last()
+    for one in version.document.get("arms", ()) if version is not None else ():
+        if (one["code"], one["measure"]) == (arm.code, arm.measure.slug):
+            return Measure(**one["measure_rule"]) if "measure_rule" in one else FIRST_A2
+    return arm.measure.to_rule()
 
 
 def digest_of(document: dict[str, Any]) -> str:
@@ -68,7 +97,7 @@ def digest_of(document: dict[str, Any]) -> str:
 
 def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
     phases, schedule = arm.phases(), arm.to_rule().condition.schedule
-    measure, protocol = arm.measure.to_rule(), arm.protocol
+    measure, protocol = find_rule(study, arm), arm.protocol
     assert protocol is not None  # noqa: S101 - phases() refuses an arm without one
     SessionPlan(  # raises InvalidSetting for one that could not be walked
         measure=measure,
@@ -89,7 +118,7 @@ def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
         "protocol": protocol.name,
         "phases": [_describe_phase(phase) for phase in phases],
     }
-    if measure != A2:
+    if measure != FIRST_A2:
         described["measure_rule"] = asdict(measure)
     if not schedule.answers_all:
         described["schedule"] = asdict(schedule)

@@ -14,7 +14,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
 from rehab.studies.participants import Allocation, StudyEvent
-from rehab.studies.registration.document import describe, digest_of
+from rehab.studies.registration.document import ANALYSIS, describe, digest_of
 from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -25,6 +25,7 @@ REVISABLE = (
     *("title", "question", "participants", "months_since_stroke", "goal_percent"),
     *("inclusion", "exclusion", "follow_up_days"),
     *("visits", "days_between", "washout_days", "primary_outcome", "secondary_outcomes"),
+    *(*ANALYSIS, "facts"),
 )
 
 
@@ -54,7 +55,9 @@ def _expect(study: Study, state: StudyState) -> None:
         raise InvalidSetting(message % {"state": study.get_state_display().lower()})
 
 
-def _add_version(study: Study, by: User | None, now: datetime, reason: str = "") -> StudyVersion:
+def _add_version(
+    study: Study, by: User | None, now: datetime, reason: str = "", **more: Any
+) -> StudyVersion:
     document = describe(study)
     number = study.versions.count() + 1
     return StudyVersion.everywhere.create(
@@ -65,6 +68,7 @@ def _add_version(study: Study, by: User | None, now: datetime, reason: str = "")
         reason=reason,
         by=by,
         at=now,
+        **more,
     )
 
 
@@ -143,7 +147,9 @@ def current_version(study: Study) -> StudyVersion:
     return version
 
 
-def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVersion:
+def revise(
+    study: Study, reason: str, by: User | None, now: datetime, *, needs_consent: bool = False
+) -> StudyVersion:
     """Store the changes of a study after its registration, and return its new version.
 
     Parameters
@@ -154,6 +160,8 @@ def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVe
         Why it is changed; part of the version.
     by, now
         Who changes it (None for a program), and when.
+    needs_consent
+        Whether participants have to agree to it before their next visit.
 
     Raises
     ------
@@ -180,8 +188,15 @@ def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVe
                     "Close this study and plan a new one to change them."
                 )
             )
+        if stored.started_at and document.get("analysis") != last.document.get("analysis"):
+            raise InvalidSetting(
+                gettext(
+                    "Margin, looks and the planned SD stay as they were when the study started: "
+                    "chosen later, they could follow the results."
+                )
+            )
         study.save(update_fields=REVISABLE)
-        version = _add_version(study, by, now, reason.strip())
+        version = _add_version(study, by, now, reason.strip(), needs_consent=needs_consent)
         note(study, Kind.REVISED, by, now, about=version.digest, reason=reason.strip())
     return version
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from rehab.studies.allocation.draws import RULE
 from rehab.studies.models import Study, StudyState
+from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.registration.sealing import unseal
 
@@ -31,6 +32,8 @@ def write_json(study: Study, *, has_dates: bool = True) -> str:
                 "at": version.at,
                 "reason": version.reason,
                 "sha256": version.digest,
+                "needs_consent": version.needs_consent,
+                "estimands": list(estimands(version.document)),
                 "study": version.document,
             }
             for version in study.versions.all()

@@ -15,13 +15,16 @@ from rehab.studies.figures.flow import Box, draw_flow
 from rehab.studies.figures.forest import ForestRow, draw_forest
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
-from rehab.studies.results.results import (
-    Results,
+from rehab.studies.guesses import guess_rows
+from rehab.studies.results.results import Results
+from rehab.studies.results.tables import (
+    carry_over_rows,
     change_rows,
     conduct_rows,
     curve_rows,
     difference_rows,
     flow_rows,
+    look_rows,
     occurrence_rows,
     outcome_rows,
     phase_rows,
@@ -168,17 +171,22 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
     "outcomes": outcome_rows,
     "phases": phase_rows,
     "differences": difference_rows,
+    "carry_over": carry_over_rows,
     "curves": curve_rows,
     "flow": flow_rows,
+    "looks": look_rows,
     "screening": screening_rows,
     "changes": change_rows,
     "conduct": conduct_rows,
     "occurrences": occurrence_rows,
+    "guesses": lambda results: guess_rows(results.study),
 }
 
 
 # What is shown before the end: the rest shows single people, or what tells an arm.
-INTERIM = frozenset({"registered", "differences", "flow", "screening", "changes", "conduct"})
+INTERIM = frozenset(
+    {"registered", "differences", "flow", "looks", "screening", "changes", "conduct"}
+)
 
 
 def is_shown(results: Results, name: str) -> bool:

@@ -20,14 +20,13 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.studies.analysis.curves import Point
+from rehab.studies.analysis.findings import Departure, OutcomeResult, find
 from rehab.studies.analysis.participants import (
     AnalyzedSession,
     Attendance,
-    OutcomeResult,
     Participant,
     ParticipantVisit,
     curves_by_arm,
-    find,
     make_participant,
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
@@ -51,15 +50,25 @@ class Analysis:
     crossover: bool
 
     @cached_property
-    def _findings(self) -> dict[str, OutcomeResult]:
+    def _findings(self) -> dict[tuple[str, frozenset[Departure]], OutcomeResult]:
         return {}
 
-    def find(self, slug: str) -> OutcomeResult:
-        """Return what was found of an outcome."""
-        if slug not in self._findings:
-            found = find(self.participants, self.arms, slug, crossover=self.crossover)
-            self._findings[slug] = found
-        return self._findings[slug]
+    def find(self, slug: str, departures: frozenset[Departure]) -> OutcomeResult:
+        """Return what was found of an outcome.
+
+        Parameters
+        ----------
+        slug, departures
+            Of the outcome; who departed from the protocol, and at which visit.
+        """
+        place = slug, departures
+        if place not in self._findings:
+            self._findings[place] = find(
+                *(self.participants, self.arms, slug),
+                crossover=self.crossover,
+                departures=departures,
+            )
+        return self._findings[place]
 
     @cached_property
     def curves(self) -> dict[str, list[Point]]:
@@ -172,6 +181,7 @@ def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Part
         planned,
         has_left=enrollment.withdrawn_at is not None,
         is_analyzed=enrollment.is_analyzed,
+        levels=enrollment.levels,
     )
 
 

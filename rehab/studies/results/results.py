@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import date, datetime
 from functools import cached_property
 from hashlib import sha256
-from typing import Any
 
 from django.utils.translation import gettext
 
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
+from rehab.studies.analysis import sequential
+from rehab.studies.analysis.comparison import Difference, holm
 from rehab.studies.analysis.curves import Point
-from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.designs import MIN_PARTICIPANTS
+from rehab.studies.analysis.findings import Departure, OutcomeResult
+from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, OUTCOMES
 from rehab.studies.analysis.participants import (
     CHANNEL,
     ArmFlow,
-    OutcomeResult,
     Participant,
-    ParticipantVisit,
+    by_arm,
     flow,
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
@@ -52,15 +53,24 @@ def may_look(study: Study, user: User) -> bool:
     return study.state == StudyState.RUNNING and has_mark(study, user, StudyMark.Task.INTERIM)
 
 
-def note_look(study: Study, user: User, now: datetime) -> None:
-    """Record an interim look, once a day and person, among the study's events."""
+def note_look(results: Results, user: User, now: datetime) -> None:
+    """Record an interim look among the study's events: once a day, person and number of people.
+
+    Parameters
+    ----------
+    results
+        What is looked at.
+    user, now
+        Who looks, and when.
+    """
+    study = results.study
     if study.state == StudyState.CLOSED:
         return
     today = clinic_time(now, study.clinic).date()
     looks = StudyEvent.everywhere.filter(study=study, kind=StudyEvent.Kind.LOOKED, by=user)
-    last = looks.order_by("-at").first()
-    if last is None or clinic_time(last.at, study.clinic).date() != today:
-        note(study, StudyEvent.Kind.LOOKED, user, now)
+    last, about = looks.order_by("-at").first(), f"{results.information}/{study.participants}"
+    if last is None or (clinic_time(last.at, study.clinic).date(), last.about) != (today, about):
+        note(study, StudyEvent.Kind.LOOKED, user, now, about=about)
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,8 @@ class Results:
         The registered outcomes, the first primary one first; every change of them.
     occurrences, assessed
         Harms and deviations; the numbers of the screening log.
+    looks
+        How many had the primary outcome at each earlier look, growing.
     """
 
     study: Study
@@ -89,6 +101,7 @@ class Results:
     changes: tuple[OutcomeChange, ...]
     occurrences: tuple[Occurrence, ...]
     assessed: Assessed
+    looks: tuple[int, ...] = ()
 
     @property
     def participants(self) -> tuple[Participant, ...]:
@@ -123,8 +136,86 @@ class Results:
 
     def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
-        found = self.analysis.find(slug)
-        return found.without_few() if self.is_interim else found
+        if self.is_interim:
+            return self.analysis.find(slug, frozenset()).without_few()
+        return self.analysis.find(slug, self.departures)
+
+    @cached_property
+    def departures(self) -> frozenset[Departure]:
+        """Who departed from the protocol, at which visit: not analyzed per protocol."""
+        return frozenset(
+            (one.participant, one.visit) for one in self.occurrences if not one.is_harm
+        )
+
+    @cached_property
+    def information(self) -> int:
+        """How many participants have the primary outcome."""
+        people = (one for one in self.participants if one.is_analyzed)
+        return sum(any(self.primary in visit.outcomes for visit in one.visits) for one in people)
+
+    @cached_property
+    def levels(self) -> tuple[tuple[int, float | None], ...]:
+        """How many had the primary outcome at each look, now the last; below which p it is found.
+
+        None at looks that were not planned: they may find nothing.
+        """
+        study, count = self.study, self.information
+        if not count:
+            return ()
+        counts = [*(earlier for earlier in self.looks if earlier < count), count]
+        is_last = not self.is_interim
+        if not study.spending:
+            levels = [None] * (len(counts) - 1) + [sequential.ALPHA if is_last else None]
+        else:
+            levels = [
+                *sequential.levels(study.spending, counts, study.participants, is_last=is_last)
+            ]
+        return tuple(zip(counts, levels, strict=True))
+
+    @property
+    def level(self) -> float | None:
+        """Below which p the primary outcome is found now; None where it was not planned."""
+        return self.levels[-1][1] if self.levels else None
+
+    @cached_property
+    def blinded_size(self) -> tuple[float, int] | None:
+        """The spread of all participants together, and how many it needs; None without a plan."""
+        study, arms = self.study, list(self.arms)
+        found = by_arm(self.participants, arms, self.primary).values()
+        values = [value for people in found for value in people.values()]
+        if study.planned_sd is None or len(values) < 2 * MIN_PARTICIPANTS:
+            return None
+        return sequential.blinded_size(values, study.planned_sd, study.participants)
+
+    @cached_property
+    def adjusted_p(self) -> dict[tuple[str, str, str], float]:
+        """Holm's p by outcome, group and reference: of the primary's pairs, of all secondary's."""
+        primary = [slug for slug in self.registered if slug == self.primary]
+        secondary = [slug for slug in self.registered if slug != self.primary]
+        found: dict[tuple[str, str, str], float] = {}
+        for family in (primary, secondary):
+            p = {
+                (slug, one.group, one.reference): one.p
+                for slug in family
+                for one in self.find(slug).differences
+                if one.p is not None
+            }
+            found |= dict(zip(p, holm(list(p.values())), strict=True))
+        return found
+
+    def is_not_inferior(self, slug: str, one: Difference) -> bool | None:
+        """Return whether a group is not worse by the margin; None where that is not asked.
+
+        Parameters
+        ----------
+        slug, one
+            The outcome's; a difference of it.
+        """
+        margin, level = self.study.margin, self.level
+        if slug != self.primary or margin is None or level is None:
+            return None
+        better = slug not in LOWER_IS_BETTER
+        return one.is_not_inferior(margin, higher_is_better=better, confidence=1 - level)
 
     @property
     def curves(self) -> dict[str, list[Point]]:
@@ -174,116 +265,11 @@ def read_results(study: Study, now: datetime) -> Results:
         outcome_changes(study),
         (*read_occurrences(study), *unwalked(analysis.participants)),
         count_assessed(study),
+        _looks(study),
     )
 
 
-def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
-    """Yield the visits of those who are analyzed, each with the columns that say whose it is."""
-    for one in results.participants:
-        for visit in one.visits if one.is_analyzed else ():
-            group = results.arms[visit.arm]
-            place = {"participant": one.code, "group": group, "visit": visit.number}
-            yield visit, place | {"attendance": visit.attendance.value}
-
-
-def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each participant, visit and outcome: missing ones are empty."""
-    for visit, whose in _visits(results):
-        for slug in (*results.registered, *results.exploratory):
-            about = {"outcome": slug, **_status(results, slug)}
-            yield whose | about | {"value": visit.outcomes.get(slug)}
-
-
-def _status(results: Results, slug: str) -> dict[str, Any]:
-    """Return the columns that say as what an outcome was registered, and in which versions."""
-    one = results.registered.get(slug)
-    return {
-        "status": "exploratory" if one is None else one.status,
-        "since_version": one and one.since,
-        "dropped_in_version": one and one.dropped_in,
-    }
-
-
-def phase_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each participant, visit and phase."""
-    for visit, whose in _visits(results):
-        yield from (whose | phase for phase in visit.phases)
-
-
-def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each outcome and pair of groups."""
-    for slug in (*results.registered, *results.exploratory):
-        for found in results.find(slug).differences:
-            yield {
-                "outcome": slug,
-                **_status(results, slug),
-                "group": results.arms[found.group],
-                "reference": results.arms[found.reference],
-                "participants": found.participants[0],
-                "participants_reference": found.participants[1],
-                "paired": found.paired,
-                "difference": found.difference.estimate,
-                "low_95": found.difference.low,
-                "high_95": found.difference.high,
-                "hedges_g": found.effect and found.effect.estimate,
-                "g_low_95": found.effect and found.effect.low,
-                "g_high_95": found.effect and found.effect.high,
-            }
-
-
-def curve_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each point of each group's curve, in percent of the baseline."""
-    for arm, points in results.curves.items():
-        for point in points:
-            yield {
-                "group": results.arms[arm],
-                "visit": point.place.visit + 1,
-                "phase": point.place.phase + 1,
-                "block_of_10": point.place.bin + 1,
-                "participants": point.participants,
-                "percent_of_baseline": point.mean,
-                "low_95": point.low,
-                "high_95": point.high,
-            }
-
-
-def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
-    """Return one row for each group of the flow of participants."""
-    rows = [asdict(one) | {"primary_outcome": results.primary} for one in results.flow]
-    return [{"group": results.arms[row.pop("arm")]} | row for row in rows]
-
-
-def screening_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each number of the screening log, and for each criterion not met."""
-    assessed = results.assessed
-    for name in ("people", "not_eligible", "declined"):
-        yield {"what": name, "criterion": "", "people": getattr(assessed, name)}
-    for criterion, people in assessed.reasons.most_common():
-        yield {"what": "criterion not met", "criterion": criterion, "people": people}
-
-
-def change_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each version that changed outcomes."""
-    for one in results.changes:
-        row = asdict(one)
-        yield row | {name: " ".join(row[name]) for name in ("added", "removed")}
-
-
-def conduct_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each group and kind of harm or deviation."""
-    for row in results.conduct:
-        for arm, (events, people) in row.counts.items():
-            about = {"group": results.arms[arm], "kind": row.kind, "what": row.what}
-            yield about | {"events": events, "participants": people}
-
-
-def occurrence_rows(results: Results) -> Iterator[dict[str, Any]]:
-    """Yield one row for each harm and deviation."""
-    for one in results.occurrences:
-        place = {"participant": one.participant, "group": results.arms[one.arm]}
-        yield place | {
-            "visit": one.visit,
-            "kind": one.kind,
-            "what": one.what,
-            "value": one.value,
-        }
+def _looks(study: Study) -> tuple[int, ...]:
+    looks = study.events.filter(kind=StudyEvent.Kind.LOOKED).values_list("about", flat=True)
+    counts = (about.partition("/")[0] for about in looks)
+    return tuple(sorted({int(count) for count in counts if count.isdecimal() and count != "0"}))

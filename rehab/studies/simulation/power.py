@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ class PairPower:
     studies
         How many were simulated.
     power, low, high
-        Share of intervals without zero (ratio), with its own 95 % interval.
+        Share of studies that found it (ratio), with its own 95 % interval.
     estimate
         Mean difference that was found, in the outcome's unit.
     """
@@ -72,18 +72,42 @@ def simulate_from(
         yield batch
 
 
-def summarize(found: Sequence[SimulatedDifference]) -> list[PairPower]:
-    """Return the power for each pair of arms, in the order in which they were found."""
+def summarize(
+    found: Sequence[SimulatedDifference],
+    margin: float | None = None,
+    *,
+    higher_is_better: bool = True,
+) -> list[PairPower]:
+    """Return the power for each pair of arms, in the order in which they were found.
+
+    Parameters
+    ----------
+    found
+        What the simulated studies found.
+    margin, higher_is_better
+        Of non-inferiority, in the outcome's unit: then power is to find that a group is not worse
+        by it; None to find any difference. The direction of the outcome.
+    """
     pairs = dict.fromkeys((one.group, one.reference) for one in found)
-    return [_power(group, reference, found) for group, reference in pairs]
+
+    def is_found(one: SimulatedDifference) -> bool:
+        if one.low is None or one.high is None:
+            return False
+        if margin is None:
+            return one.low > 0 or one.high < 0
+        return one.low > -margin if higher_is_better else one.high < margin
+
+    return [_power(group, reference, found, is_found) for group, reference in pairs]
 
 
-def _power(group: str, reference: str, found: Sequence[SimulatedDifference]) -> PairPower:
+def _power(
+    group: str,
+    reference: str,
+    found: Sequence[SimulatedDifference],
+    is_found: Callable[[SimulatedDifference], bool],
+) -> PairPower:
     mine = [one for one in found if (one.group, one.reference) == (group, reference)]
-    hits = sum(
-        one.low is not None and one.high is not None and (one.low > 0 or one.high < 0)
-        for one in mine
-    )
+    hits = sum(map(is_found, mine))
     low, high = wilson(hits, len(mine))
     estimate = sum(one.estimate for one in mine) / len(mine)
     return PairPower(group, reference, len(mine), hits / len(mine), low, high, estimate)

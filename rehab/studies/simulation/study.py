@@ -159,7 +159,7 @@ def _walk_all(
         if visit.session is not None and visit.session.state != State.ABORTED:
             return
         session = start_session(enrollment, PLACE, None, now)
-        walker = person.at_visit(visit.number, trial.effects[arm.code], trial.population.kept)
+        walker = person.at_visit(visit.number, trial.effects[arm.code], trial.population.retained)
         asyncio.run(run_session(session.pk, partial(walk_through, walker), pace))
 
 

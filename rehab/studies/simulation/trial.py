@@ -12,12 +12,12 @@ from rehab.studies.allocation.crossover import VisitPlan
 from rehab.studies.allocation.groups import Allocated, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
 from rehab.studies.analysis.comparison import Difference, compare
+from rehab.studies.analysis.findings import observations
 from rehab.studies.analysis.participants import (
     AnalyzedSession,
     Participant,
     ParticipantVisit,
     make_participant,
-    observations,
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.simulation.walkers import ENDLESS, Person, Population, draw_person, walk_through
@@ -146,8 +146,8 @@ def simulate(trial: Trial, seed: int) -> list[Participant]:
             has_left = 0 < person.leaves_before <= visit.number
             walked = None
             if not has_left:
-                kept = trial.population.kept
-                walker = person.at_visit(visit.number, trial.effects[arm], kept)
+                retained = trial.population.retained
+                walker = person.at_visit(visit.number, trial.effects[arm], retained)
                 walked = walk_by_fold(trial.plans[arm], walker)
             planned.append((ParticipantVisit(visit.number, arm, period=visit.period), walked))
         participants.append(

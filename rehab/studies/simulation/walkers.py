@@ -30,7 +30,7 @@ class Population:
         Standard deviation between participants of what training adds [% of the baseline], besides
         what strides scatter. No study of feedback of push-off in stroke has reported it; the five
         recorded sessions of two people lie 5 to 25 % apart.
-    kept
+    retained
         Share of effect and difference that remains without feedback (catch, washout, retention).
     dropout
         Probability that a participant leaves before a visit, for each visit (ratio).
@@ -42,13 +42,13 @@ class Population:
     """
 
     sd_percent: float = 10.0
-    kept: float = 0.25
+    retained: float = 0.25
     dropout: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.sd_percent <= 100:
             raise InvalidSetting("Participants differ by 0 to 100 % of their baseline.")
-        if not 0 <= self.kept <= 1:
+        if not 0 <= self.retained <= 1:
             raise InvalidSetting("What is kept of an effect is a share from 0 to 1.")
         if not 0 <= self.dropout < 1:
             raise InvalidSetting("The share that leaves before a visit is 0 or more, and below 1.")
@@ -69,7 +69,7 @@ class SimulatedParticipant(SyntheticWalker):
         baseline_w_kg: float,
         is_first: bool,
         percent: float,
-        kept: float,
+        retained: float,
     ) -> None:
         """Make a participant for one visit. ``percent``: what training adds [% of baseline]."""
         # Who has trained before searches no more: retention between sessions was about 100 %
@@ -78,14 +78,14 @@ class SimulatedParticipant(SyntheticWalker):
         profile = replace(GOOD, baseline_w_kg=baseline_w_kg, exploration_strides=search)
         super().__init__(profile, seed, side)
         self._added_w_kg = baseline_w_kg * percent / 100
-        self._kept = kept
+        self._retained = retained
 
     def next_stride(self, phase: Phase) -> Measurement:
         """Return the next stride, walked in a phase."""
         stride = super().next_stride(phase)
         if stride.value is None or phase.kind == "baseline":
             return stride
-        added = self._added_w_kg if phase.feedback else self._added_w_kg * self._kept
+        added = self._added_w_kg if phase.feedback else self._added_w_kg * self._retained
         return replace(stride, value=round(max(0.0, stride.value + added), 4))
 
 
@@ -99,7 +99,7 @@ class Person:
     leaves_before: int
 
     def at_visit(
-        self, visit: int, effect_percent: float, kept: float, side: Side = Side.LEFT
+        self, visit: int, effect_percent: float, retained: float, side: Side = Side.LEFT
     ) -> SimulatedParticipant:
         """Return the walker of one visit.
 
@@ -109,7 +109,7 @@ class Person:
             Number of the visit, from 1.
         effect_percent
             What the arm adds to training [% of the baseline].
-        kept
+        retained
             Share of what training adds that remains without feedback (ratio).
         side
             The leg that is trained.
@@ -121,7 +121,7 @@ class Person:
             baseline_w_kg=self.baseline_w_kg,
             is_first=visit == 1,
             percent=effect_percent + self.response_percent,
-            kept=kept,
+            retained=retained,
         )
 
 

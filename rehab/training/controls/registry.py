@@ -199,6 +199,7 @@ CONTROLS: dict[str, Control] = {
                 Audience.PATIENT: Payload.PHASE,
                 Audience.MONITOR: Payload.PHASE,
                 Audience.SOURCE: Payload.PHASE,
+                Audience.ROBOT: Payload.CUE,
             },
             value_format=ValueFormat.PHASE,
         ),

@@ -6,8 +6,8 @@ from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable
 from typing import ClassVar
 
-from robot.bases.avatar.page_server import PageServer
-from robot.bases.base import Abilities, Answer, BadOption, BaseLost, Indication
+from robot.bases.avatar.face_screen import FaceScreen, read_face
+from robot.bases.base import Abilities, Answer, Indication
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.motion.twist import Twist
 
@@ -25,9 +25,7 @@ class AvatarBase(KinematicBase):
 
     def __init__(self, monotonic: Callable[[], float]) -> None:
         super().__init__(monotonic, IDEAL)  # a screen has no dead time
-        self.host, self.page_port = "127.0.0.1", DEFAULT_PORT
-        self.words = {True: "", False: ""}  # what it says, by whether it is glad
-        self._pages: PageServer | None = None
+        self.face = FaceScreen(monotonic, "127.0.0.1", DEFAULT_PORT, {True: "", False: ""})
 
     @classmethod
     def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
@@ -47,38 +45,25 @@ class AvatarBase(KinematicBase):
     def configure(self, options: Namespace) -> None:
         """Apply the page's address. Raises BadOption."""
         super().configure(options)
-        if not 0 <= options.avatar_port <= 65535:
-            raise BadOption("--avatar-port: a port is a number from 1 to 65535.")
-        self.host, self.page_port = options.avatar_host, options.avatar_port
-        self.words = {True: options.say_glad, False: options.say_sad}
+        self.face = read_face(options, self._monotonic, "avatar")
 
     def open(self) -> None:
         """Serve the page. Raises BaseLost where its address is taken."""
-        try:
-            self._pages = PageServer(self.host, self.page_port)
-        except OSError as problem:
-            raise BaseLost(
-                f"The avatar's page cannot be served at {self.host}:{self.page_port} "
-                f"({problem.strerror}). Choose another --avatar-port."
-            ) from None
+        self.face.open()
 
     def close(self) -> None:
         """Close its pages."""
-        if self._pages is not None:
-            self._pages.close()
+        self.face.close()
 
     @property
     def url(self) -> str:
         """Where its page is; empty while it is not open."""
-        return "" if self._pages is None else self._pages.url
+        return self.face.url
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity, and show where it has come to."""
         ordered = super().drive(twist)
-        if self._pages is not None:
-            pose = super().read().pose
-            at = [round(one, 3) for one in (pose.x_m, pose.y_m, pose.heading_rad)]
-            self._pages.show(pose=at)
+        self.face.tick(super().read().pose)
         return ordered
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
@@ -91,20 +76,8 @@ class AvatarBase(KinematicBase):
         aloud
             Has no effect: its voice belongs to its answers.
         """
-        if self._pages is not None:
-            self._pages.show(state=str(indication))
-            if indication is not Indication.MOVING:
-                self._pages.show(answer=None)
+        self.face.show(indication)
 
     def answer(self, answer: Answer) -> None:
-        """Celebrate or droop by face, arms and voice."""
-        if self._pages is not None:
-            self._pages.say(
-                {
-                    "gesture": answer.gesture,
-                    "glad": answer.is_glad,
-                    "quiet": answer.is_quiet,
-                    "strength": answer.strength,
-                    "words": self.words[answer.is_glad],
-                }
-            )
+        """Act by face, arms and voice."""
+        self.face.answer(answer)

@@ -14,6 +14,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection, serve
 
+from robot.motion.looks import REST, to_message
+
 SOCKET_PATH = "/avatar"
 FILES = {
     "/": ("page.html", "text/html; charset=utf-8"),
@@ -39,6 +41,8 @@ class PageServer:
             "pose": [0, 0, 0],
             "answer": None,
             "answers": 0,
+            "act": "rest",
+            "look": to_message(REST),
         }
         self._changed = threading.Condition()
         self._version = self._pages = 0

@@ -84,7 +84,9 @@ class VoiceAndJoints:
         self._is_raised = False
 
     def answer(self, answer: Answer) -> Iterator[Frame]:
-        """Yield what begins an answer."""
+        """Yield what begins an answer; nothing for what answers no window."""
+        if answer.is_glad is None:
+            return
         voice, joints = self._voice, self._joints
         if voice is not None and not answer.is_quiet:
             words = voice.glad if answer.is_glad else voice.sad

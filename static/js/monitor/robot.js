@@ -169,7 +169,12 @@ export class RobotPanel {
     this.#button("stop").classList.toggle("done", this.#isStopped);
     this.#button("arm").hidden = !this.#isHeld;
     this.#placing.show(this.#isPlaceable);
-    this.#scene.draw({ poses: this.#trail, lights: this.#status?.lights, mood: this.#status?.mood });
+    this.#scene.draw({
+      poses: this.#trail,
+      lights: this.#status?.lights,
+      mood: this.#status?.mood,
+      look: this.#status?.look,
+    });
   }
 
   #enlarge(button) {

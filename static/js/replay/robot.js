@@ -1,4 +1,4 @@
-// The robot in a replay: what its black box recorded, and else its gestures as they were ordered.
+// The robot in a replay: how it moved, as its black box recorded it, and else as its gestures were ordered.
 
 import { _ } from "garry/shared/language";
 import { describeDecision } from "garry/monitor/robot_text";
@@ -11,7 +11,18 @@ export function createReplayedRobot({ show }, pieces, player) {
 
   function find(at_s) {
     const now = pieces.filter((piece) => piece.at_s <= at_s && at_s < piece.at_s + piece.took_s);
-    return now.find(({ recorded }) => recorded) ?? now.at(-1);
+    const [recorded, ordered] = [true, false].map((is) => now.findLast((piece) => piece.recorded === is));
+    if (!recorded || !ordered) return recorded ?? ordered;
+    // It went as recorded; what it showed meanwhile is what its gesture orders.
+    const after_s = ordered.at_s - recorded.at_s;
+    const later = (entries) => entries.map(([from_s, ...shown]) => [from_s + after_s, ...shown]);
+    const lights = later(ordered.lights);
+    return {
+      ...recorded,
+      lights: recorded.lights.length ? recorded.lights : lights,
+      mood: ordered.mood,
+      looks: later(ordered.looks),
+    };
   }
 
   return {

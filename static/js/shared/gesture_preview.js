@@ -36,7 +36,7 @@ export function scheduleNotes(audio, notes) {
 }
 
 // Draw a preview (robot/motion/preview.py) as it is at a moment; return whether it is over.
-export function drawMoment(scene, { took_s, poses, lights, mood }, at_s) {
+export function drawMoment(scene, { took_s, poses, lights, mood, looks = [] }, at_s) {
   const passed = poses.filter(([from_s]) => from_s <= at_s);
   const shown = (passed.length ? passed : poses.slice(0, 1)).map(([, x_m, y_m, heading_rad]) => ({
     x_m,
@@ -45,7 +45,8 @@ export function drawMoment(scene, { took_s, poses, lights, mood }, at_s) {
   }));
   const isOver = at_s >= took_s;
   const [, first, second] = (!isOver && sinceOf(lights, at_s)) || [0, "off", "off"];
-  scene.draw({ poses: shown, lights: [first, second], mood: isOver ? "calm" : mood });
+  const look = isOver ? undefined : sinceOf(looks, at_s)?.slice(1);
+  scene.draw({ poses: shown, lights: [first, second], mood: isOver ? "calm" : mood, look });
   return isOver;
 }
 

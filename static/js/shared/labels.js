@@ -68,6 +68,8 @@ const REASONS = {
   no_push_off: _("no push-off"),
   doubt_weight: _("the plates do not carry the body mass"),
   doubt_angle: _("the angle is not an ankle’s"),
+  doubt_moment: _("the moment’s zero is off"),
+  doubt_load: _("the other plate is loaded"),
 };
 
 // What to do about the signals' clock: late, lost, drifting (rehab/gait/selfcheck/cures.py).
@@ -88,6 +90,12 @@ const DOUBTS = {
   ),
   doubt_angle: _(
     "The angle moves as a knee’s does. Check the source’s columns; if right, pause and go on: strides then count.",
+  ),
+  doubt_moment: _(
+    "The ankle’s moment does not rest in swing. Zero the plates before the lab’s computation; if right, pause and go on.",
+  ),
+  doubt_load: _(
+    "The other plate is loaded while one foot stands: cane, hand or a foot that drags. If right, pause and go on: strides then count.",
   ),
 };
 

@@ -8,8 +8,17 @@ const BASE_M = 0.175;
 const HALF_M = 0.5; // of the drawing, to each side
 const MOVE_MS = 250; // between two reports of a robot that moves
 const COLORS = { off: "none", green: "#1f9d55", orange: "#e0861a", red: "#d03434" };
-// The mouth of each mood, seen as the robot's face is seen by who stands before it.
-const MOUTHS = { calm: "M-.045 -.02h.09", glad: "M-.055 -.035q.055 .07 .11 0", sad: "M-.055 0q.055 -.07 .11 0" };
+// The mouth of each look (robot/motion/looks.py), seen as the robot's face is seen by who stands before it.
+const MOUTHS = {
+  calm: "M-.045 -.02h.09",
+  smile: "M-.05 -.03q.05 .05 .1 0",
+  laugh: "M-.055 -.035q.055 .1 .11 0Z",
+  sad: "M-.055 0q.055 -.07 .11 0",
+  small: "M-.015 -.02h.03",
+  wry: "M-.045 -.015q.05 .01 .08 -.025",
+};
+const OF_MOODS = { glad: "laugh", sad: "sad" }; // where no look is known
+const EYE_M = 0.014;
 
 const FLOOR =
   shape("circle", {
@@ -60,6 +69,8 @@ const BASE =
   shape("path", { class: "heading", d: `M-.05 -.13L0 -.215L.05 -.13Z`, fill: "currentColor" }) +
   shape("circle", { class: "light", cx: -0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
   shape("circle", { class: "light", cx: 0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
+  shape("ellipse", { class: "eye", cx: -0.03, cy: -0.065, rx: EYE_M, ry: EYE_M, fill: "currentColor" }) +
+  shape("ellipse", { class: "eye", cx: 0.03, cy: -0.065, rx: EYE_M, ry: EYE_M, fill: "currentColor" }) +
   shape("path", {
     class: "mood",
     fill: "none",
@@ -75,6 +86,7 @@ export class RobotScene {
   #base;
   #lights;
   #mouth;
+  #eyes;
 
   // `isFollowed`: whether reports come now and then, so that it glides from one to the next.
   constructor(svg, { isFollowed = true } = {}) {
@@ -96,13 +108,15 @@ export class RobotScene {
     this.#base.innerHTML = BASE;
     this.#lights = this.#base.querySelectorAll(".light");
     this.#mouth = this.#base.querySelector(".mood");
+    this.#eyes = this.#base.querySelectorAll(".eye");
     const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.#base.style.transition = isCalm || !isFollowed ? "none" : `transform ${MOVE_MS}ms linear`;
     this.draw({ poses: [] });
   }
 
-  // `poses`: those that it had, oldest first; `lights`: two colors; `mood`: calm, glad or sad.
-  draw({ poses, lights, mood }) {
+  // `poses`: those that it had, oldest first; `lights`: two colors; `mood`: calm, glad or sad; `look`: which mouth, and
+  // how far its eyes are open.
+  draw({ poses, lights, mood, look }) {
     const { x_m = 0, y_m = 0, heading_rad = 0 } = poses.at(-1) ?? {};
     this.#base.style.opacity = poses.length ? 1 : 0.35;
     // In units of the drawing, which CSS calls pixels.
@@ -114,6 +128,9 @@ export class RobotScene {
       light.setAttribute("fill", COLORS[light.dataset.color] ?? "none");
     }
     this.#mouth.dataset.mood = mood ?? "calm";
-    this.#mouth.setAttribute("d", MOUTHS[mood] ?? MOUTHS.calm);
+    const [mouth, open] = look ?? [OF_MOODS[mood], 1];
+    this.#mouth.dataset.look = mouth ?? "calm";
+    this.#mouth.setAttribute("d", MOUTHS[mouth] ?? MOUTHS.calm);
+    for (const eye of this.#eyes) eye.setAttribute("ry", EYE_M * Math.max(Math.min(open, 1.2), 0.2));
   }
 }

@@ -47,9 +47,11 @@ HIDDEN = {
         ("angle +", "angle -", "moment +", "moment -", "drift of"),
     ),
     4: Hidden(
-        "plates that carry less than a mass say what a handrail says, which strides are told as",
-        "the mass as measured by the plates",
-        ("mass ×",),
+        "plates that carry a twentieth less than a mass say what a handrail says, and a cane on "
+        "the other belt that takes so much what a foot says that drags",
+        "the mass as measured by the plates, and 'the other plate carries': from a tenth on "
+        "strides wait until somebody has looked",
+        ("mass ×", "cane"),
     ),
     5: Hidden(
         "samples made up before sending are like others: an even grid has no stalls, as nothing is "

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rehab.gait.selfcheck.shapes import SHAPES
 from tests.gait.walks import ANGLE, FORCE, MOMENT, Walk
 
 SIDES = ("left", "right")
@@ -78,6 +79,58 @@ def drift(walk, _clean, rows, last_s):
 def scale(walk, _clean, rows, factor):
     """Turn a sign, take another unit or a wrong gain."""
     return change_rows(walk, rows, lambda x: x * factor)
+
+
+def shift(walk, _clean, rows, by):
+    """Let channels have another zero."""
+    return change_rows(walk, rows, lambda x: x + by)
+
+
+def take_knee(walk, clean):
+    """Take the knees' angles for the ankles'."""
+    legs = legs_of(walk)
+    for side, leg in legs.items():
+        begins_s = [s.initial_contact_s for s in clean if s.side == side]
+        for begin_s, end_s in itertools.pairwise(begins_s):
+            rows = find_rows(walk, begin_s, end_s)
+            share = (walk.t_s[rows] - begin_s) / (end_s - begin_s)
+            leg[ANGLE, rows] = np.interp(share, np.arange(100) / 100, SHAPES["knee angle"])
+    return replace(walk, **legs)
+
+
+def lean_on_cane(walk, clean, share):
+    """Let a cane on the right belt carry a share of the weight while the left foot stands."""
+    legs = legs_of(walk)
+    for stride in (s for s in clean if s.side == "left"):
+        rows = find_rows(walk, stride.initial_contact_s, stride.terminal_contact_s)
+        count = rows.stop - rows.start
+        cane_n = 9.81 * walk.mass_kg * share * np.sin(np.pi * np.arange(count) / count)
+        left = 1 - np.minimum(cane_n / np.maximum(legs["left"][FORCE, rows], 1), 0.9)
+        legs["left"][FORCE : MOMENT + 1, rows] *= left
+        legs["right"][FORCE, rows] += cane_n
+    return replace(walk, **legs)
+
+
+def land_on_toes(walk, clean):
+    """Let the left foot touch with its toes first, as an equinus foot does, and load slowly."""
+    legs = legs_of(walk)
+    leg = legs["left"]
+    for stride in (s for s in clean if s.side == "left"):
+        begin_s, stance_s = stride.initial_contact_s, stride.stance_s
+        rows = find_rows(walk, begin_s - 0.12, begin_s)
+        leg[FORCE, rows] += np.linspace(20, 60, rows.stop - rows.start)
+        rows = find_rows(walk, begin_s, stride.terminal_contact_s)
+        share = (walk.t_s[rows] - begin_s) / stance_s
+        leg[FORCE, rows] *= np.interp(share, [0, 0.25, 1], [0.35, 1, 1])
+        lever = np.interp(share, [0, 0.08, 0.35, 0.6, 1], [0.13, 0.12, 0.06, 0.1, 0.15])
+        early = np.interp(share, [0, 0.5, 0.75, 1], [1, 1, 0, 0])
+        leg[MOMENT, rows] *= 1 - early
+        leg[MOMENT, rows] += early * lever * np.maximum(leg[FORCE, rows], 0)
+        rows = find_rows(walk, begin_s - 0.3, begin_s + 0.3 * stance_s)
+        since = walk.t_s[rows] - begin_s
+        away = np.minimum(np.where(since < 0, -since / 0.3, since / (0.3 * stance_s)), 1)
+        leg[ANGLE, rows] += 0.15 * (1 + np.cos(np.pi * away))
+    return replace(walk, **legs)
 
 
 def weigh(walk, _clean, factor):

@@ -14,7 +14,8 @@ class Tally:
 
     ``strides`` are valid without the fault; ``lost`` of them are not valid with it, and ``wrong``
     are shown with an A2 that is off by more than a tenth. ``worst`` is the largest error shown,
-    ``contacts_s`` are the errors of the valid strides' contacts.
+    ``contacts_s`` are the errors of the valid strides' contacts, and ``doubts`` why none is shown
+    until a person has looked.
     """
 
     strides: int
@@ -22,6 +23,7 @@ class Tally:
     wrong: int
     worst: float
     contacts_s: tuple[float, ...]
+    doubts: tuple[str, ...] = ()
 
 
 def count(found, clean, side="left") -> Tally:

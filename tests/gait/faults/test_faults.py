@@ -182,6 +182,38 @@ def test_channels_that_drift(name, fault):
     assert tally.lost >= 0.5 * tally.strides
 
 
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("fault", ["toes first", "drag 90 N, first third", "clonus 1"])
+def test_strides_of_stroke_are_kept(name, fault):
+    tally = try_fault(name, fault)
+
+    assert tally.wrong == tally.lost == 0
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [
+        ("moment -5 Nm", "moment_"),
+        ("moment +5 Nm", "moment_"),
+        ("mass × 1.2", "weight"),
+        ("the knee's angle", "angle_other"),
+        ("cane 10%", "other_load"),
+        ("cane 15%", "other_load"),
+    ],
+)
+def test_what_no_stride_shows_is_told_and_not_shown(name, fault, code):
+    """Where A2 is off by more than a tenth, no stride is shown until a person has looked."""
+    walk, clean = open_walk(name)
+    spoiled = FAULTS[fault](walk, clean)
+    strides = spoiled.both_legs()
+    codes = {finding.code for finding in spoiled.check(strides).findings}
+
+    assert any(one.startswith(code) for one in codes) or not any(s.valid for s in strides)
+    assert try_fault(name, fault).wrong == 0
+    assert not {"moment_zero", "other_load"} & {f.code for f in walk.check(clean).findings}
+
+
 @pytest.mark.parametrize("fault", ["scuff 60 N", "straddle"])
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_steps_that_go_wrong(name, fault):

@@ -70,7 +70,7 @@ def simulated(name):
     clock = Clock()
     base: Any = IdealBase(clock) if name == "kinematic" else BASES[name](clock)
     if name == "avatar":
-        base.page_port = 0
+        base.face.port = 0
     yield Stage(base, clock)
 
 

@@ -316,6 +316,20 @@ def test_an_open_loop_refuses_long_gestures_and_halves_the_others(gesture):
     assert opened.share == 0.5
 
 
+@pytest.mark.parametrize(
+    ("pose", "doubt_rad", "is_home"),
+    [
+        (Pose(0.05, 0.0, 0.087), 0.035, True),
+        (Pose(0.0501, 0.0, 0.0), 0.0, False),
+        (Pose(0.0, 0.0, -0.0871), 0.0, False),
+        (Pose(), 0.0351, False),
+    ],
+)
+def test_home_is_near_straight_and_known(pose, doubt_rad, is_home):
+    there = BaseState(pose, STILL, SensorState(doubt_rad=doubt_rad))
+    assert Safety.is_at_home(there) is is_home
+
+
 def test_an_open_loop_has_to_be_looked_at_after_twenty_gestures():
     for abilities, refusal in ((REAL, ""), (OPEN, "place_unknown")):
         watch = Watch(abilities)  # which begins the first

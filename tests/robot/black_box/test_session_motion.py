@@ -1,56 +1,19 @@
 """The motion of a session as MCAP, read by the format's own reader."""
 
-import json
 from itertools import pairwise
-from typing import Any
 
 import pytest
 
-from robot.black_box.capture import Capture
-from robot.black_box.recorder import BlackBox
 from robot.wire.cue_limits import VARIED
-from robot.wire.incident import TICK, read_lines
-from tests.support.robot_stage import CUE, WELCOME, Stage
+from robot.wire.incident import MOTION, TICK, read_lines, unpack
+from tests.support.recorded_stage import RecordedStage, read
+from tests.support.robot_stage import CUE, WELCOME
 
-mcap_reader = pytest.importorskip("mcap.reader", reason="pip install garry[mcap]")
-
-
-class Walked(Stage):
-    """A stage whose black box records it."""
-
-    def __init__(self, folder):
-        super().__init__()
-        self.box = BlackBox(folder, lambda: self.now_s, keeps_motion=True)
-        self.box.begin()
-        self.capture = Capture(self.box, self.robot, self.base)
-
-    def hear(self, **message):
-        super().hear(**message)
-        self.capture.record_message(message)
-
-    def wait(self, span_s):
-        for _ in range(round(span_s / 0.02)):
-            super().wait(0.02)
-            self.capture.record_tick(self.now_s)
-
-    def close(self):
-        self.box._is_closing.set()
-        self.box.write()
-
-
-def read(path):
-    """Return each topic's messages of a file."""
-    topics: dict[str, list[tuple[int, Any]]] = {}
-    with path.open("rb") as file:
-        for _, channel, message in mcap_reader.make_reader(file).iter_messages():
-            topics.setdefault(channel.topic, []).append(
-                (message.log_time, json.loads(message.data))
-            )
-    return topics
+pytest.importorskip("mcap.reader", reason="pip install garry[motion]")
 
 
 def walked(folder):
-    stage = Walked(folder)
+    stage = RecordedStage(folder)
     cue = CUE | {"above": VARIED, "below": VARIED}
     stage.hear(**WELCOME | {"cue": cue})
     stage.walk(*[1.0, 1.2, 0.4, 0.5] * 8)
@@ -91,8 +54,41 @@ def test_two_of_a_study_are_shown_to_have_seen_the_same(tmp_path):
 
 
 def test_without_a_session_there_is_no_file(tmp_path):
-    stage = Walked(tmp_path)
+    stage = RecordedStage(tmp_path)
     stage.hear(type="welcome", session=None)
     stage.wait(2)
     stage.close()
     assert not (tmp_path / "sessions").exists()
+
+
+def test_parts_for_the_server_have_a_tenth_of_a_second_and_each_report(tmp_path):
+    stage = walked(tmp_path)
+    assert {one.reason for one in stage.box.motion} == {MOTION}
+    assert {one.session for one in stage.box.motion} == {7}
+    sent = [record for one in stage.box.motion for record in unpack(one.recording)]
+    logged = read_lines("".join(path.read_text() for path in sorted(tmp_path.glob("*.jsonl"))))
+    known = {one["at_s"]: one["tick"] for one in logged if "tick" in one}
+    ticks = {one["at_s"]: one["tick"] for one in sent if "tick" in one}
+    assert all(known[at_s] == tick for at_s, tick in ticks.items())
+    assert max(after - before for before, after in pairwise(ticks)) < 1.1
+    assert min(after - before for before, after in pairwise(ticks)) > 0.09
+    decisions = [one["sent"] for one in sent if one.get("sent", {}).get("kind") == "decision"]
+    assert decisions == stage.of("decision")[: len(decisions)]
+    assert all(len(one.recording) < 40_000 for one in stage.box.motion)
+
+
+def test_the_end_of_a_session_sends_its_last_part_and_a_still_robot_sends_none(tmp_path):
+    stage = RecordedStage(tmp_path)
+    cue = CUE | {"above": VARIED, "below": VARIED}
+    stage.hear(**WELCOME | {"cue": cue, "state": "ready"})
+    stage.wait(70)
+    stage.box.write()
+    assert not stage.box.motion
+    stage.hear(type="state", state="running", gesture="greeting")
+    stage.wait(6)
+    stage.hear(type="state", state="finished", gesture="farewell")
+    stage.wait(7)
+    stage.box.write()
+    records = [record for one in stage.box.motion for record in unpack(one.recording)]
+    names = [one["sent"]["name"] for one in records if "sent" in one]
+    assert [name.rpartition("_")[0] for name in names] == ["greeting"] * 2 + ["farewell"] * 2

@@ -77,7 +77,7 @@ BAD_FRAMES: dict[str, Any] = {
     "extra_text": a_step(2, extra={"a": "b"}),
     "extra_bool": a_step(2, extra={"a": True}),
     "extra_nested": a_step(2, extra={"a": {"b": 1}}),
-    "extra_many": a_step(2, extra={f"n{i}": i for i in range(33)}),
+    "extra_many": a_step(2, extra={f"n{i}": i for i in range(41)}),
     "extra_name": a_step(2, extra={"x" * 65: 1}),
     "plain_words": "four, three",
     "plain_one_number": "4.0",

@@ -74,6 +74,26 @@ async def test_a_session_keeps_so_many_and_no_more(place, begun, monkeypatch):
     assert kept[2] is None
 
 
+async def test_parts_of_the_motion_are_counted_apart(place, begun, monkeypatch):
+    monkeypatch.setattr(incidents, "MAX_INCIDENTS", 1)
+    monkeypatch.setattr(incidents, "MAX_PARTS", 2)
+    session = await begun(place)
+    store = sync_to_async(incidents.store_incident)
+    reasons = ("motion", "bump", "motion", "bump", "motion")
+    kept = [await store(session.pk, timezone.now(), one, pack(RECORDED)) for one in reasons]
+    assert [key is not None for key in kept] == [True, True, True, False, False]
+
+
+async def test_a_part_of_the_motion_is_announced_to_nobody(place, begun):
+    session = await begun(place)
+    robot, monitor = await place.robot().open(), await place.monitor(session).open()
+    await robot.say(incident(session, reason="motion"))
+    await monitor.overhear()
+    (row,) = await stored()
+    assert row.reason == "motion"
+    assert not [one for one in monitor.events if one.get("report", {}).get("kind") == "incident"]
+
+
 async def test_a_disk_that_takes_none_changes_nothing_else(place, begun, monkeypatch):
     tried = threading.Event()
 

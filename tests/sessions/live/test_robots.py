@@ -115,6 +115,7 @@ async def test_a_robot_that_stopped_itself_stays_stopped_for_everyone(place, beg
         await robot.say({"type": "report", "report": {"kind": "stop", "reason": "bump"}})
         await robot.hear("stop")
     await monitor.until(is_stopped(True))
+    await monitor.until(lambda event: event["kind"] == "alarms")
     data = {"device": place.devices["robot"].pk, "reason": "bump"}
     assert await log_of(session) == [
         {"kind": "robot_stop", "by": None, "data": data, "after_number": 0}

@@ -66,6 +66,17 @@ def test_every_measure_is_walked_and_answers_its_goal(measure):
     assert better > 1.05
 
 
+def test_signals_of_another_measure_say_that_they_do_not_answer_its_goal():
+    said: list[str] = []
+    settings = {"mass": 75.0, "rate": 100.0, "look_ahead": 0.05, "keep": None}
+    options = Namespace(seed=3, profile="good", side=None, signals=True, strides=None, **settings)
+    live = SyntheticSource(options, said.append).open_walk(Side.LEFT)
+    for slug in ("a2", "step_length", "step_length"):
+        live(Display(make_phase("training"), 0.5, "positive", slug))
+    (text,) = [one for one in said if "A2 alone" in one]
+    assert "not of step length" in text
+
+
 def test_the_plateau_follows_the_gain():
     plateaus = [
         mean(find_plateau(gain, seed) for seed in range(8)) for gain in (1, 0.9, 0.85, 0.75)

@@ -24,6 +24,7 @@ from rehab.people.models import User
 from rehab.people.sign_in.factors.factors import Authenticator, add_authenticator, authenticators_of
 
 CHALLENGE = "passkey"  # key of the browser session, until the browser has answered
+KIND = Authenticator.Kind.PASSKEY
 VERIFICATION = UserVerificationRequirement.PREFERRED
 
 
@@ -78,15 +79,16 @@ def register(request: HttpRequest, user: User, name: str, answer: str) -> list[s
         )
     except Exception as problem:  # fido2 raises many types of errors for malformed answers
         raise PasskeyRejected from problem
-    if registered.credential_data is None:
-        raise PasskeyRejected
-    credential = websafe_encode(registered.credential_data)
-    return add_authenticator(user, Authenticator.Kind.PASSKEY, name, credential, registered.counter)
+    new = registered.credential_data
+    if new is None or new.credential_id in map(_id_of, Authenticator.everywhere.filter(kind=KIND)):
+        raise PasskeyRejected  # stored twice, its counter would be too (WebAuthn 3, section 7.1)
+    credential = websafe_encode(new)
+    return add_authenticator(user, KIND, name, credential, registered.counter)
 
 
 def verify(request: HttpRequest, user: User, answer: str, now: datetime) -> None:
     """Verify a signature by one of the account's passkeys. Raises PasskeyRejected."""
-    own = {_credential(key).credential_id: key for key in _passkeys_of(user)}
+    own = {_id_of(key): key for key in _passkeys_of(user)}
     try:
         response = AuthenticationResponse.from_dict(json.loads(answer))
         _relying_party(request).authenticate_complete(
@@ -118,11 +120,15 @@ def _pop_challenge(request: HttpRequest) -> Any:
 
 
 def _passkeys_of(user: User) -> list[Authenticator]:
-    return list(authenticators_of(user).filter(kind=Authenticator.Kind.PASSKEY))
+    return list(authenticators_of(user).filter(kind=KIND))
 
 
 def _credential(key: Authenticator) -> AttestedCredentialData:
     return AttestedCredentialData(websafe_decode(key.credential))
+
+
+def _id_of(key: Authenticator) -> bytes:
+    return _credential(key).credential_id
 
 
 def _credentials_of(user: User) -> list[AttestedCredentialData]:

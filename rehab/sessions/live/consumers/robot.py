@@ -19,6 +19,7 @@ from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.frames import BadFrame, read_name
+from robot.wire.incident import MOTION
 from robot.wire.limits import MAX_REPORT_CHARS
 
 log = logging.getLogger(__name__)
@@ -108,7 +109,7 @@ class RobotConsumer(DeviceSocket):
             return
         finally:
             self._incidents_waiting -= 1
-        if stored is not None:
+        if stored is not None and incident.reason != MOTION:
             live.robot_orders.record_report({"kind": "incident", "incident": stored}, now)
 
     def on_disconnect(self) -> None:

@@ -89,6 +89,7 @@ class _Status(Struct):
     bumpers: bool = False
     lights: tuple[_Light, _Light] = ("off", "off")
     mood: Literal["calm", "glad", "sad"] | None = None
+    look: tuple[Name, Number] | None = None
 
 
 class _Stop(Struct):
@@ -115,6 +116,8 @@ class _Gesture(Struct):
     phase: Literal["started", "ended"]
     outcome: Code
     open_loop: bool = False
+    pool: Name | None = None
+    seed: Whole | None = None
 
 
 class _Remark(Struct):

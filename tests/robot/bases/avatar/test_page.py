@@ -11,8 +11,12 @@ import pytest
 from websockets.sync.client import connect
 
 from robot.bases.avatar import AvatarBase
+from robot.bases.avatar.face_screen import FaceScreen
 from robot.bases.base import Answer, BaseLost, Indication
+from robot.bases.kobuki import KobukiBase
 from robot.motion.gestures import GESTURES
+from robot.motion.looks import REST, to_message
+from robot.motion.pose import HOME
 from robot.motion.twist import Twist
 from robot.play_gesture import play_gesture
 
@@ -37,7 +41,7 @@ AudioScheduledSourceNode.prototype.stop = function (at) {
 @contextmanager
 def opened(monotonic=time.monotonic):
     base = AvatarBase(monotonic)
-    base.page_port = 0
+    base.face.port = 0
     with base:
         yield base
 
@@ -58,7 +62,8 @@ def listening(avatar):
 def test_a_page_gets_the_present_state_and_what_changes(avatar):
     avatar.show(Indication.READY, aloud=False)
     with listening(avatar) as take:
-        assert take() == {"state": "ready", "pose": [0, 0, 0], "answer": None, "answers": 0}
+        still = {"act": "rest", "look": to_message(REST), "pose": [0, 0, 0]}
+        assert take() == {"state": "ready", "answer": None, "answers": 0} | still
         avatar.answer(Answer("celebrate", True, False, 0.8))
         answer = {
             "gesture": "celebrate",
@@ -67,7 +72,12 @@ def test_a_page_gets_the_present_state_and_what_changes(avatar):
             "strength": 0.8,
             "words": "",
         }
-        assert take() | {"pose": 0} == {"state": "ready", "pose": 0, "answer": answer, "answers": 1}
+        states = [take()]
+        while states[-1]["answer"] is None:
+            states.append(take())
+        assert (states[-1]["answer"], states[-1]["answers"]) == (answer, 1)
+        assert states[-1]["act"] == "celebrating"
+        assert states[-1]["look"]["mouth"] == "laugh"
         avatar.show(Indication.STOPPED, aloud=True)
         states = [take()]
         while states[-1]["answer"] is not None:
@@ -79,7 +89,7 @@ def test_a_page_that_reads_nothing_holds_nothing_up(avatar):
     with listening(avatar):
         began_s = time.monotonic()
         for number in range(20_000):
-            avatar._pages.show(pose=[number, 0, 0])
+            avatar.face._pages.show(pose=[number, 0, 0])
         assert time.monotonic() - began_s < 5
 
 
@@ -108,7 +118,7 @@ def test_there_is_one_page_and_no_other_file(avatar):
 
 def test_an_address_that_is_taken_is_told_with_the_cure(avatar):
     second = AvatarBase(time.monotonic)
-    second.page_port = int(avatar.url.rstrip("/").rpartition(":")[2])
+    second.face.port = int(avatar.url.rstrip("/").rpartition(":")[2])
     with pytest.raises(BaseLost, match="Choose another --avatar-port"):
         second.__enter__()
 
@@ -145,7 +155,7 @@ def test_it_is_seen_and_heard_to_celebrate_and_to_droop(page, avatar):
     avatar.show(Indication.READY, aloud=False)
     mood(page, "rest")
     page.evaluate("window.heard.length = 0")
-    avatar.words[False] = "Next one."
+    avatar.face.words[False] = "Next one."
     avatar.answer(Answer("droop", is_glad=False))
     mood(page, "droop")
     page.wait_for_function("window.said.includes('Next one.')")
@@ -164,15 +174,42 @@ def test_it_acts_each_gesture_and_its_variants_differ(page, avatar):
 
     assert acts("sway", "swaying")[0] == "calm"
     assert acts("effort_2", "trying", is_glad=False)[0] == "calm"
-    assert acts("joy_1", "droop", is_glad=False)[0] == "droop"  # never glad after weak walking
-    first = acts("joy_1", "celebrate")
+    assert acts("joy_1", "drooping", is_glad=False)[0] == "droop"  # never glad after weak walking
+    first = acts("joy_1", "celebrating")
     avatar.show(Indication.READY, aloud=False)
     mood(page, "rest")
-    second = acts("joy_2", "celebrate")
+    second = acts("joy_2", "celebrating")
     assert first[0] == second[0] == "celebrate"
     assert first[1] != second[1]
-    assert acts("streak_10_3", "celebrate")[0] == "celebrate"
-    assert acts("wave", "droop", is_glad=False)[0] == "droop"  # a clinic's own
+    assert acts("streak_10_3", "celebrating")[0] == "celebrate"
+    assert acts("wave", "drooping", is_glad=False)[0] == "droop"  # a clinic's own
+
+
+@pytest.mark.browser
+def test_a_screen_on_a_mast_shows_the_head_alone_and_its_hand(browser):
+    """A Kobuki's face: what it acts goes on in time, and the picture stays where it is."""
+    base = KobukiBase(time.monotonic)
+    base.face = FaceScreen(time.monotonic, "127.0.0.1", 0, {True: "Well done!", False: ""})
+    base.face.open()
+    page = browser.new_page()
+    page.goto(base.face.url + "?face")
+    page.wait_for_selector("body[data-view=face][data-state=waiting]")
+    assert page.locator("#hand").is_hidden()
+    assert page.locator("#torso").is_hidden()
+    base.show(Indication.MOVING, aloud=False)
+    base.answer(Answer("greeting_1", None))
+    page.wait_for_selector("body[data-hand][data-act=greeting]")
+    assert page.locator("#hand").is_visible()
+    angle = page.evaluate("document.body.style.getPropertyValue('--hand')")
+    time.sleep(0.45)
+    base.face.tick(HOME)
+    page.wait_for_function(
+        "(was) => document.body.style.getPropertyValue('--hand') !== was", arg=angle
+    )
+    base.show(Indication.READY, aloud=False)
+    page.wait_for_selector("body:not([data-hand])[data-act=rest]")
+    base.close()
+    page.close()
 
 
 @pytest.mark.browser
@@ -219,7 +256,7 @@ def test_a_gesture_on_the_avatar(avatar):
     said = list[dict[str, Any]]()
     with listening(avatar) as take:
         played = play_gesture(GESTURES["droop"], avatar, time.monotonic, time.sleep)
-        avatar._pages.show(state="end")
+        avatar.face._pages.show(state="end")
         while not said or said[-1]["state"] != "end":
             said.append(take())
     assert played["outcome"] == "done"

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from robot.bases.twin.__main__ import main
-from robot.bases.twin.camera import HEIGHT, WIDTH, Camera
+from robot.bases.twin.camera import Camera
 from robot.motion.pose import HOME, Pose
 
 pytest.importorskip("pybullet")
 from PIL import Image  # comes with the twin
+
+from robot.bases.twin.renderer import ROOM
 
 
 def pixels(data):
@@ -44,7 +46,7 @@ def test_it_shows_where_the_twin_is_now(tmp_path):
     file, poses = tmp_path / "twin.png", [HOME]
     with Camera(file, lambda: poses[0]):
         assert wait_for(file, lambda _: True)
-        assert pixels(file.read_bytes()).shape == (HEIGHT, WIDTH, 4)
+        assert pixels(file.read_bytes()).shape == (ROOM.height_px, ROOM.width_px, 4)
         at_home = dark(file.read_bytes())
         poses[0] = Pose(0.3, 0.2, 1.0)
         assert wait_for(file, lambda data: abs(dark(data) - at_home) > 20)

@@ -1,37 +1,31 @@
-"""Studies: what is compared, in which versions, and who must not know or may look early."""
+"""Studies: what is compared and how it is analyzed, in versions."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from django.core.validators import RegexValidator
 from django.db import models
-from django.db.models import Q
 from django.utils import timezone
-from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.feedback.translation import valence_choices
-from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
-from rehab.people.audit.sealing import SealableModel
+from rehab.people.append_only import ACCOUNT_DELETED, AppendOnlyModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
-from rehab.people.scope import ClinicModel, Scope, ScopedModel
-from rehab.sessions.formatting import format_schedule
-from rehab.sessions.setup.options import OPTIONS, build_parts
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.people.scope import ClinicModel, Scope
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
 from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
 from rehab.studies.analysis import outcomes
-from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms, check_channels
-from rehab.training.measures import InvalidSetting
-from rehab.training.phases import Phase
-from rehab.training.plans import ROBOT_LEVELS
+from rehab.studies.arms import EARLY_MONTHS, ArmRule, check_arms, check_channels
 
 OUTCOMES = [(slug, _(label)) for slug, (label, _unit) in outcomes.OUTCOMES.items()]
 SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
+SPENDINGS = {
+    "obrien_fleming": _("Seldom early (O’Brien and Fleming)"),
+    "pocock": _("Alike at each look (Pocock)"),
+}
 METHODS = {
     Method.BLOCKS: _("Permuted blocks of random size"),
     Method.MINIMIZATION: _("Minimization"),
@@ -122,6 +116,37 @@ class Study(ClinicModel):
     )
     primary_outcome = models.CharField(_("primary outcome"), max_length=32, choices=OUTCOMES)
     secondary_outcomes = models.JSONField(_("secondary outcomes"), default=list, blank=True)
+    margin = models.FloatField(
+        _("margin of non-inferiority"),
+        null=True,
+        blank=True,
+        validators=between(0.001, 1000),
+        help_text=_(
+            "By how much a later arm may be worse than an earlier one in the primary outcome, in "
+            "its unit. Empty: the study asks which arm is better."
+        ),
+    )
+    spending = models.CharField(
+        _("looks before the end"),
+        max_length=16,
+        blank=True,
+        choices=list(SPENDINGS.items()),
+        help_text=_(
+            "How alpha, the chance of a false finding (0.05), is spent. Without it no look may "
+            "stop the study."
+        ),
+    )
+    planned_sd = models.FloatField(
+        _("SD that the size rests on"),
+        null=True,
+        blank=True,
+        validators=between(0.001, 1000),
+        help_text=_(
+            "Between people, of the primary outcome. A look then says how many participants the "
+            "spread of all together needs."
+        ),
+    )
+    facts = models.JSONField(default=dict, editable=False)  # what `record.facts` asks, by slug
     created_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
     created_at = models.DateTimeField(default=timezone.now, editable=False)
     registered_at = models.DateTimeField(null=True, editable=False)
@@ -204,6 +229,8 @@ class StudyVersion(AppendOnlyModel):
     document = models.JSONField()
     digest = models.CharField(max_length=64)
     reason = models.TextField(_("why it is changed"), max_length=1000, blank=True)
+    # Whether who takes part has to agree to it before the next visit.
+    needs_consent = models.BooleanField(_("participants have to agree again"), default=False)
     by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
     at = models.DateTimeField(default=timezone.now)
 
@@ -216,135 +243,3 @@ class StudyVersion(AppendOnlyModel):
 
     def __str__(self) -> str:
         return f"{self.study.code} v{self.number}"
-
-
-class Arm(ScopedModel):
-    """One condition of a study: what a session of a participant is created with."""
-
-    scope = Scope(clinic="study__clinic")
-
-    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="arms")
-    position = models.PositiveSmallIntegerField()
-    code = models.CharField(_("code"), max_length=4)
-    name = models.CharField(_("name"), max_length=64)
-    weight = models.PositiveSmallIntegerField(_("part of the ratio"), default=1)
-    valence = models.CharField(_("feedback type"), max_length=16, choices=valence_choices)
-    gain = models.FloatField(_("gain"), default=1.0)
-    robot_intensity = models.FloatField(
-        _("robot"),
-        choices=[(value, _(level)) for level, value in ROBOT_LEVELS.items()],
-        default=1.0,
-    )
-    schedule = models.CharField(
-        _("feedback comes"),
-        max_length=16,
-        choices=OPTIONS["schedule"].choices_for(None),
-        default=OPTIONS["schedule"].default,
-    )
-    schedule_steps = models.PositiveSmallIntegerField(
-        _("steps between feedback"),
-        default=OPTIONS["schedule_steps"].default,
-        validators=OPTIONS["schedule_steps"].validators,
-    )
-    schedule_band = models.PositiveSmallIntegerField(
-        _("band without feedback, ± % of the goal"),
-        default=OPTIONS["schedule_band"].default,
-        validators=OPTIONS["schedule_band"].validators,
-    )
-    measure = models.ForeignKey(
-        MeasureDefinition, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
-    )
-    # None once it was deleted; the study's versions still have what was walked.
-    protocol = models.ForeignKey(
-        Protocol, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("protocol")
-    )
-
-    class Meta(ScopedModel.Meta):
-        verbose_name = _("arm")
-        ordering: ClassVar = ["study", "position"]
-        constraints: ClassVar = [
-            models.UniqueConstraint(fields=["study", "code"], name="arm_code_once_per_study")
-        ]
-
-    def __str__(self) -> str:
-        return f"{self.code}: {self.name}"
-
-    @property
-    def feedback_schedule(self) -> str:
-        """When feedback comes, in words."""
-        return format_schedule(self.to_rule().condition.schedule)
-
-    def phases(self) -> tuple[Phase, ...]:
-        """Return the protocol's phases with the arm's gain. Raises InvalidSetting without one."""
-        if self.protocol is None:
-            message = gettext("The protocol of arm %(code)s was deleted. Choose another one.")
-            raise InvalidSetting(message % {"code": self.code})
-        return self.to_rule().condition.apply_to(self.protocol.to_rules())
-
-    def baseline(self) -> tuple[Phase, ...]:
-        """Return the first baseline alone, which a follow-up walks. Raises InvalidSetting."""
-        found = next((phase for phase in self.phases() if phase.kind == "baseline"), None)
-        if found is None:
-            message = gettext("The protocol of arm %(code)s has no baseline for a follow-up.")
-            raise InvalidSetting(message % {"code": self.code})
-        return (found,)
-
-    def to_rule(self) -> ArmRule:
-        """Return the arm in the form that the rules use. Raises InvalidSetting."""
-        answers = {name: getattr(self, name) for name in SCHEDULE_FIELDS}
-        condition = Condition(
-            self.valence,
-            self.gain,
-            self.robot_intensity,
-            self.measure_id,
-            self.protocol_id or 0,
-            build_parts(answers)["schedule"].essential,
-        )
-        return ArmRule(self.code, self.name, self.weight, condition)
-
-
-class StudyMark(SealableModel):
-    """What an account is in a study besides its role, until ``ended_at``."""
-
-    class Task(models.TextChoices):
-        """What the mark allows or hides."""
-
-        ASSESSOR = "assessor", _("Assesses, and must not know the arm")
-        INTERIM = "interim", _("May look before the study is closed")
-
-    scope = Scope(clinic="study__clinic")
-    # With the event, which is sealed, of who ended it.
-    allowed_changes = (
-        Allowed(
-            ("ended_at",),
-            "OLD.ended_at IS NULL AND EXISTS (SELECT 1 FROM rehab_studyevent e WHERE "
-            "e.study_id = NEW.study_id AND e.kind = 'unmarked' AND e.at = NEW.ended_at)",
-        ),
-    )
-    sealed_fields = ("study", "user", "task", "by", "at")
-
-    study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="marks")
-    user = models.ForeignKey(User, on_delete=models.PROTECT, related_name="study_marks")
-    task = models.CharField(_("task"), max_length=8, choices=Task.choices)
-    by = models.ForeignKey(User, on_delete=models.PROTECT, related_name="+", null=True)
-    at = models.DateTimeField(default=timezone.now)
-    ended_at = models.DateTimeField(null=True)
-
-    class Meta(SealableModel.Meta):
-        verbose_name = _("mark")
-        ordering: ClassVar = ["pk"]
-        constraints: ClassVar = [
-            models.UniqueConstraint(
-                fields=["study", "user", "task"],
-                condition=Q(ended_at=None),
-                name="study_mark_holds_once",
-            )
-        ]
-
-    def __str__(self) -> str:
-        return f"{self.user}: {self.get_task_display()}"
-
-
-def has_mark(study: Study, user: Any, task: StudyMark.Task) -> bool:
-    """Return whether the account ``user`` has the mark ``task`` in a study now."""
-    return study.marks.filter(user=user, task=task, ended_at=None).exists()

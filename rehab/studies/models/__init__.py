@@ -1,0 +1,24 @@
+"""Studies: what is compared, in which versions, and who must not know or may look early."""
+
+from rehab.studies.models.arm import Arm
+from rehab.studies.models.marks import StudyMark, has_mark
+from rehab.studies.models.protocol import (
+    METHODS,
+    OUTCOMES,
+    SCHEDULE_FIELDS,
+    Study,
+    StudyState,
+    StudyVersion,
+)
+
+__all__ = [
+    "METHODS",
+    "OUTCOMES",
+    "SCHEDULE_FIELDS",
+    "Arm",
+    "Study",
+    "StudyMark",
+    "StudyState",
+    "StudyVersion",
+    "has_mark",
+]

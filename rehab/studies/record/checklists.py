@@ -1,0 +1,184 @@
+"""SPIRIT 2025, CONSORT 2025, TIDieR and WHO's registry items, filled from what is known and asked.
+
+Item numbers are those of the statements (Chan 2025, BMJ 389:e081477; Hopewell 2025, BMJ
+389:e081123; Hoffmann 2014, BMJ 348:g1687; WHO Trial Registration Data Set 1.3.1); the words are
+ours, and short. An item without an answer is still to be written: GARRY says so, and invents none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rehab.studies.models import Study
+from rehab.studies.record.facts import ASKED
+from rehab.studies.record.known import know
+from rehab.studies.results.results import Results
+
+BY_HAND = "to be written in the report"
+# List; then one line for each item: number | words | what answers it.
+ITEMS = {
+    "SPIRIT 2025": """
+        1a | title says it is a protocol, and the design | scientific_title
+        1b | structured summary | title design arms outcomes
+        2 | version and date | version
+        3a | who wrote it | contributors
+        3b | sponsor, contact | sponsor
+        3c | part of sponsor and funders | sponsor funding
+        3d | committees | committees
+        4 | registration | registry
+        5 | where protocol and analysis plan are | plan
+        6 | data and code that are shared | sharing
+        7a | funding | funding
+        7b | conflicts of interest | conflicts
+        8 | dissemination | dissemination
+        9a | background | background
+        9b | choice of comparator | comparator
+        10 | objectives | question
+        11 | patients and public | involvement
+        12 | design | design
+        13 | setting | clinic setting
+        14a | eligibility of participants | eligibility
+        14b | eligibility of sites and providers | provider
+        15a | interventions | arms phases
+        15b | when they are changed or stopped | adherence
+        15c | adherence | adherence
+        15d | concomitant care | concomitant
+        16 | outcomes | outcomes
+        17 | harms | harms_defined harms
+        18 | timeline | timeline
+        19 | sample size | participants size
+        20 | recruitment | recruitment
+        21a | who makes the sequence | sequence
+        21b | type of randomization | allocation
+        22 | concealment | concealment
+        23 | implementation | implementation
+        24a | who is blinded | blinding blinded
+        24b | how | blinding
+        24c | unblinding | unblinding
+        25a | collection of data | data
+        25b | retention | retention
+        26 | management of data | data
+        27a | statistical methods | analysis
+        27b | who is analyzed | populations
+        27c | missing data | missing
+        27d | further analyses | further
+        28a | data monitoring committee | committees
+        28b | interim analyses, stopping | looks stopping
+        29 | monitoring of the conduct | monitoring
+        30 | ethics approval | ethics
+        31 | amendments | changes
+        32a | consent | consents consent
+        32b | consent to further use | consent
+        33 | confidentiality | confidentiality
+        34 | care after the trial | aftercare""",
+    "CONSORT 2025": """
+        1a | title says randomized | scientific_title
+        1b | structured summary | -
+        2 | registration | registry
+        3 | protocol and analysis plan | plan
+        4 | sharing | sharing
+        5a | funding | funding
+        5b | conflicts of interest | conflicts
+        6 | background | background
+        7 | objectives | question
+        8 | patients and public | involvement
+        9 | design | design
+        10 | changes after the start | changes
+        11 | setting | clinic setting
+        12a | eligibility of participants | eligibility
+        12b | sites and providers | provider
+        13 | interventions | arms phases
+        14 | outcomes | outcomes
+        15 | how harms were assessed | harms_defined harms
+        16a | sample size | participants size
+        16b | interim analyses, stopping | looks stopping
+        17a | sequence | sequence
+        17b | type of randomization | allocation
+        18 | concealment | concealment
+        19 | implementation | implementation
+        20a | who was blinded | blinding blinded unblinded
+        20b | how | blinding
+        21a | statistical methods | analysis
+        21b | who is analyzed | populations
+        21c | missing data | missing
+        21d | further analyses | further
+        22a | flow | flow
+        22b | losses and exclusions | losses
+        23a | dates | dates
+        23b | why it ended | ended stopping
+        24a | interventions as delivered | delivered
+        24b | concomitant care | concomitant
+        25 | baseline data | -
+        26 | numbers, outcomes, estimates | estimates
+        27 | harms | harms_found
+        28 | ancillary analyses | further
+        29 | interpretation | -
+        30 | limitations | -""",
+    "TIDieR": """
+        1 | name | title
+        2 | why | background
+        3 | materials | materials
+        4 | procedures | arms phases
+        5 | who provides | provider
+        6 | how | arms
+        7 | where | clinic setting
+        8 | when and how much | timeline phases
+        9 | tailoring | tailoring
+        10 | modifications | changes
+        11 | adherence as planned | adherence
+        12 | adherence as it was | delivered""",
+    "WHO": """
+        1 | registry and number | registry
+        2 | date of registration | registry
+        3 | further numbers | secondary_ids
+        4 | support | funding
+        5 | primary sponsor | sponsor
+        6 | further sponsors | secondary_sponsors
+        7 | contact for the public | contact_public
+        8 | contact for science | contact_scientific
+        9 | public title | title
+        10 | scientific title | scientific_title
+        11 | countries | countries
+        12 | condition | condition
+        13 | interventions | arms
+        14 | eligibility | eligibility
+        15 | type | design allocation
+        16 | first enrollment | dates
+        17 | size, planned and reached | participants flow
+        18 | status | status
+        19 | primary outcome | outcomes
+        20 | secondary outcomes | outcomes
+        21 | ethics | ethics
+        22 | completion | ended
+        23 | summary of results | estimates
+        24 | sharing of data | sharing""",
+}
+
+
+def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, str]]:
+    """Yield each item of each list, with its answer and what is still asked.
+
+    Parameters
+    ----------
+    study
+        The study.
+    results
+        Of a closed study; None before.
+    """
+    answers = know(study, results) | study.facts
+    for name, items in ITEMS.items():
+        for line in items.strip().splitlines():
+            number, words, slugs = (part.strip() for part in line.split("|"))
+            named = slugs.split()
+            given = [answers[slug] for slug in named if answers.get(slug)]
+            asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
+            lacking = [str(ASKED[slug]) for slug in asked]
+            if slugs == "-" or not (given or lacking):
+                lacking = [BY_HAND]
+            yield {
+                "list": name,
+                "item": number,
+                "what": words,
+                "answer": " ".join(given),
+                "still asked": "; ".join(lacking),
+            }

@@ -1,0 +1,154 @@
+"""What GARRY itself knows of a study, as a protocol and a report say it. English, as registries."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.models import Study, StudyMark
+from rehab.studies.participants import StudyEvent
+from rehab.studies.registration.document import describe
+from rehab.studies.registration.estimands import METHOD, SUMMARY, estimands
+from rehab.studies.registration.outcome_changes import outcome_changes
+from rehab.studies.results.results import Results
+
+METHODS = {
+    "blocks": "permuted blocks of random, sealed size",
+    "minimization": "minimization with a random part",
+    "list": "the study's own sealed list",
+}
+CONCEALED = (
+    "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
+    "first participant; a group is drawn when a person is enrolled, and shown to nobody."
+)
+HARMS = (
+    "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
+    "themselves and are offered as adverse events, each with severity, relation, expectedness and "
+    "the day by which it has to be reported."
+)
+
+
+def know(study: Study, results: Results | None) -> dict[str, str]:
+    """Return what is known, by slug.
+
+    Parameters
+    ----------
+    study
+        The study, registered or not.
+    results
+        Of a closed study; None before.
+    """
+    version = study.versions.last()
+    document = version.document if version else describe(study)
+    known = {**_planned(study, document), **_conducted(study)}
+    return known | (_found(study, results) if results is not None else {})
+
+
+def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
+    arms, visits = document["arms"], document["visits"]
+    allocation, plan = document["allocation"], document.get("analysis", {})
+    ratio = ":".join(str(group["weight"]) for group in allocation["groups"])
+    framework = f"non-inferiority by {plan['margin']:g}" if "margin" in plan else "superiority"
+    factors = ", ".join(factor["name"] for factor in allocation["factors"]) or "none"
+    [primary, *_secondary] = list(estimands(document))
+    names = [OUTCOMES.get(slug, (slug, ""))[0] for slug in document["secondary_outcomes"]]
+    spending = plan.get("spending")
+    follow_up = visits.get("days_to_follow_up")
+    return {
+        "title": document["title"],
+        "question": document["question"],
+        "design": f"Randomized, {document['design']}, {len(arms)} arms, {ratio}, {framework}.",
+        "arms": "; ".join(
+            f"{arm['code']} ({arm['name']}): {arm['feedback_type']} feedback, gain {arm['gain']:g},"
+            f" protocol {arm['protocol']}, robot at {arm['robot_intensity']:g}"
+            for arm in arms
+        ),
+        "phases": "; ".join(
+            f"{arm['code']}: {', '.join(phase['name'] for phase in arm['phases'])}" for arm in arms
+        ),
+        "eligibility": primary["population"],
+        "outcomes": f"Primary: {primary['variable']} Secondary: {', '.join(names) or 'none'}.",
+        "timeline": f"{visits['in_each_period']} visits in each period, "
+        f"{visits['days_between']} days apart; {visits['days_between_periods']} days between "
+        f"periods; follow-up after {follow_up or 'no'} days.",
+        "participants": f"{document['participants']} participants are planned.",
+        "allocation": f"{METHODS[allocation['method']]}; factors: {factors}.",
+        "sequence": "GARRY draws it from a seed of 128 random bits; the rule is in the protocol.",
+        "concealment": CONCEALED,
+        "implementation": "Therapists and leads enroll; GARRY assigns; assessors can do neither.",
+        "analysis": f"{SUMMARY[document['design']]} {METHOD}",
+        "populations": "Intention to treat: all visits that were walked, as allocated. Per "
+        "protocol: without visits that deviated.",
+        "missing": "As the model expects (at random); beside it how far missing visits would have "
+        "to lie to change the conclusion (tipping point).",
+        "further": "Exploratory outcomes are named so. Carry-over is estimated in crossovers."
+        " No subgroups.",
+        "looks": f"By alpha spending ({spending.replace('_', ' ')})." if spending else "None.",
+        "harms_defined": HARMS,
+        "unblinding": "Two people, with a reason, logged; alone in an emergency, which is said.",
+        "confidentiality": "Pseudonyms; exports by roles, logged; erasure on demand.",
+        "consents": "Each consent to research names its text's version; a new version of the study "
+        "may require each participant's consent before the next visit.",
+    }
+
+
+def _conducted(study: Study) -> dict[str, str]:
+    versions = list(study.versions.order_by("number"))
+    marks = study.marks.filter(ended_at=None)
+    assessors = marks.filter(task=StudyMark.Task.ASSESSOR).count()
+    changes = [f"version {v.number} ({v.at:%Y-%m-%d}): {v.reason}" for v in versions[1:]]
+    dates = {
+        "registered": study.registered_at,
+        "first enrollment": study.enrollments.order_by("enrolled_at").values_list(
+            "enrolled_at", flat=True
+        ).first(),
+        "closed": study.closed_at,
+    }  # fmt: skip
+    return {
+        "clinic": study.clinic.name,
+        "version": f"Version {versions[-1].number}, {versions[-1].at:%Y-%m-%d}, SHA-256 "
+        f"{versions[-1].digest}" if versions else "A draft.",
+        "changes": "; ".join((*changes, *map(str, outcome_changes(study)))) or "None.",
+        "dates": ", ".join(f"{name} {at:%Y-%m-%d}" for name, at in dates.items() if at),
+        "status": str(study.state),
+        "blinded": f"{assessors} assessors are kept from sessions, arms and boards by GARRY.",
+    }  # fmt: skip
+
+
+def _found(study: Study, results: Results) -> dict[str, str]:
+    flow, assessed = results.flow, results.assessed
+    primary = results.find(results.primary).differences
+    kinds = StudyEvent.Kind
+    revealed = study.events.filter(kind__in=(kinds.UNBLINDED, kinds.EMERGENCY))
+    alone = revealed.filter(about="alone").count()
+    return {
+        "flow": f"{assessed.people} assessed, {assessed.turned_away} turned away; "
+        + "; ".join(
+            f"{one.arm}: {one.allocated} allocated, {one.began} began, {one.completed} completed, "
+            f"{one.analyzed} analyzed"
+            for one in flow
+        ),
+        "losses": "; ".join(f"{one.arm}: {one.left} left, {one.removed} removed" for one in flow),
+        "delivered": "; ".join(
+            f"{one.arm}: {one.visits_walked} of {one.visits_planned} visits walked, "
+            f"{one.visits_unfinished} ended early"
+            for one in flow
+        ),
+        "estimates": "; ".join(
+            f"{one.group} - {one.reference}: {one.difference.estimate:.3g} "
+            f"[{_end(one.difference.low)}, {_end(one.difference.high)}]"
+            for one in primary
+        ),
+        "harms_found": "; ".join(
+            f"{row.what}: "
+            + ", ".join(f"{arm} {n} in {people}" for arm, (n, people) in row.counts.items())
+            for row in results.conduct
+            if row.kind == "harm"
+        ),
+        "unblinded": f"{revealed.count()} arms revealed, {alone} of them by one person alone.",
+        "ended": f"Closed on {study.closed_at:%Y-%m-%d}." if study.closed_at else "",
+    }
+
+
+def _end(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"

@@ -1,0 +1,50 @@
+"""What exactly each outcome of a registered study estimates, in the five parts of ICH E9 (R1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from rehab.studies.analysis.outcomes import OUTCOMES, define_outcomes
+
+SUMMARY = {
+    "parallel": "Difference of the arms' means over the visits that all arms have, adjusted for "
+    "visit, first baseline and strata of the allocation.",
+    "crossover": "Difference within people between the arms, adjusted for visit and with it the "
+    "period.",
+}
+EVENTS = (
+    ("a session ends early, or deviates from the plan", "treatment policy: counted as it was"),
+    ("a visit is missed, also after leaving", "hypothetical: as if it had been walked, given all "
+     "that was seen of the person (missing at random); beside it the tipping point"),
+    ("a person wanted the data removed", "not in the population: nothing may be used"),
+    ("the arm was revealed", "treatment policy; left out per protocol"),
+)  # fmt: skip
+METHOD = (
+    "Linear mixed model by restricted maximum likelihood with variances of each arm's own and the "
+    "small-sample correction of Kenward and Roger; two-sided at 5 %. Secondary outcomes, and pairs "
+    "of several arms, by Holm. Per protocol: without visits that deviated."
+)
+
+
+def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the estimand of each registered outcome, the primary one first.
+
+    Parameters
+    ----------
+    document
+        Of a study's version.
+    """
+    meanings = {row["outcome"]: row["meaning"] for row in define_outcomes()}
+    people = [*document.get("inclusion", ()), *(f"not: {o}" for o in document.get("exclusion", ()))]
+    if months := document["months_since_stroke_at_least"]:
+        people.insert(0, f"{months} months or more since the stroke")
+    for slug in dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])):
+        yield {
+            "outcome": slug,
+            "population": "; ".join(people) or "every patient of the clinic who consents",
+            "treatments": [f"{arm['code']}: {arm['name']}" for arm in document["arms"]],
+            "variable": f"{OUTCOMES[slug][0]}: {meanings[slug]}" if slug in OUTCOMES else slug,
+            "intercurrent_events": dict(EVENTS),
+            "summary": SUMMARY[document["design"]],
+        }

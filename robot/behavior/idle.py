@@ -1,0 +1,76 @@
+"""Idle life: small motions between answers, by which a robot seems to be there.
+
+A session's order allows them (``Cue.idles``) or does not. They begin only while the robot may act
+and no answer can be due before they end, so that they never cost one; and they answer nothing:
+when one begins follows from the session's seed, and none follows anything else at once. Time is a
+parameter.
+"""
+
+from __future__ import annotations
+
+import random
+
+from robot.behavior.cue import QUIET_PACE
+from robot.behavior.safety import ANNOUNCE_S
+from robot.motion.gesture import Gesture, stages
+from robot.motion.limits import DEFAULT_LIMITS
+from robot.motion.pools import IDLE
+
+# All ours: from one to the next at least this [s] and up to so much more; so long after anything
+# else that moved or was decided; and what a late base takes beyond what a motion needs.
+LEAST_S, SPREAD_S = 5.0, 9.0
+PAUSE_S = 0.8
+LATE_S = 0.8
+
+
+def needed_s(gesture: Gesture, pace: float) -> float:
+    """Return how long a motion is to be free of answers [s], its announcement included."""
+    limits = DEFAULT_LIMITS.scaled(pace)
+    moving_s = sum(
+        hold_s + sum(segment.min_duration_s(its) for segment in segments)
+        for segments, its, hold_s in stages(gesture.waypoints, limits)
+    )
+    return ANNOUNCE_S + moving_s + LATE_S
+
+
+class IdleLife:
+    """Says which idle motion begins now, if any.
+
+    Parameters
+    ----------
+    seed
+        Of the session.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._chance = random.Random(f"{seed} idle")  # noqa: S311 (nothing here is a secret)
+        self._due_s: float | None = None
+        self._disturbed_s: float | None = None
+        self._gesture = IDLE[0]
+
+    def disturb(self, now_s: float) -> None:
+        """Note that something else moves, was decided, or forbids it now [s]."""
+        self._disturbed_s = now_s
+
+    def next(self, now_s: float, free_s: float, *, is_quiet: bool) -> Gesture | None:
+        """Return the motion that begins now; None for none.
+
+        Parameters
+        ----------
+        now_s
+            The time [s].
+        free_s
+            How long no answer can be due [s].
+        is_quiet
+            Whether it would move at ``QUIET_PACE``.
+        """
+        if self._due_s is None:
+            others = [one for one in IDLE if one is not self._gesture]
+            self._gesture = others[int(self._chance.random() * len(others))]
+            self._due_s = now_s + LEAST_S + SPREAD_S * self._chance.random()
+        was_disturbed = self._disturbed_s is not None and now_s - self._disturbed_s < PAUSE_S
+        pace = QUIET_PACE if is_quiet else 1.0
+        if now_s < self._due_s or was_disturbed or free_s < needed_s(self._gesture, pace):
+            return None
+        self._due_s = None
+        return self._gesture

@@ -1,0 +1,248 @@
+"""The record of a trial: checklists, consents to versions, adverse events, two people to reveal."""
+
+from __future__ import annotations
+
+import csv
+import io
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.urls import reverse
+
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.sessions.log import SessionEvent
+from rehab.studies.agreements import agree, agreed_version, agreement_rows
+from rehab.studies.models import Study
+from rehab.studies.participants import Enrollment, StudyEvent
+from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
+from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
+from rehab.studies.record.facts import ASKED
+from rehab.studies.registration.estimands import estimands
+from rehab.studies.registration.lifecycle import close, register, revise
+from rehab.studies.results.results import read_results
+from rehab.studies.unblinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms
+from rehab.studies.visits import Place, start_session
+from rehab.training.measures import InvalidSetting
+from tests.support.studies import draft_study, enrolled, new_patient, running_study
+from tests.support.world import NOW, client_of, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def test_lists_have_every_item_of_their_statements():
+    numbers = {
+        name: [line.split("|")[0].strip() for line in items.strip().splitlines()]
+        for name, items in ITEMS.items()
+    }
+    plain = {name: {int(n.rstrip("abcd")) for n in found} for name, found in numbers.items()}
+    sizes = {"SPIRIT 2025": 34, "CONSORT 2025": 30, "TIDieR": 12, "WHO": 24}
+    assert plain == {name: set(range(1, size + 1)) for name, size in sizes.items()}
+    assert all(len(set(found)) == len(found) for found in numbers.values())
+
+
+def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
+    study = draft_study(world, margin=2.0, spending="pocock")
+    rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
+    assert "non-inferiority by 2" in rows["CONSORT 2025", "9"]["answer"]
+    assert "6 months or more since the stroke" in rows["WHO", "14"]["answer"]
+    assert "pocock" in rows["SPIRIT 2025", "28b"]["answer"]
+    assert rows["SPIRIT 2025", "30"]["still asked"] == str(ASKED["ethics"])
+    assert rows["CONSORT 2025", "30"]["still asked"] == BY_HAND
+    asked = {slug for items in ITEMS.values() for line in items.splitlines() for slug in ASKED
+             if slug in line.rpartition("|")[2].split()}  # fmt: skip
+    assert asked == set(ASKED)  # nothing is asked in vain
+    study.facts = dict.fromkeys(ASKED, "Zq")
+    lacking = [row for row in checklist_rows(study, None) if row["still asked"]]
+    assert {row["still asked"] for row in lacking} == {BY_HAND}
+    assert {row["list"] for row in lacking} <= {"CONSORT 2025", "TIDieR", "WHO"}
+
+
+def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
+    study = running_study(world)
+    enrollment = enrolled(study, new_patient(world))
+    reveal_arms(enrollment, "Fell", emergency=True, by=world.people[Role.LEAD], now=NOW)
+    close(study, None, NOW)
+    rows = list(checklist_rows(study, read_results(study, NOW)))
+    consort = {row["item"]: row["answer"] for row in rows if row["list"] == "CONSORT 2025"}
+    assert "1 allocated" in consort["22a"]
+    assert "fall: A 0 in 0" in consort["27"]
+    assert "1 arms revealed, 1 of them by one person alone" in consort["20a"]
+
+
+def test_every_outcome_has_an_estimand_in_the_registered_study(world):
+    study = draft_study(world, secondary_outcomes=["late_change"])
+    document = register(study, None, NOW).document
+    found = list(estimands(document))
+    assert [one["outcome"] for one in found] == ["washout_change", "late_change"]
+    parts = {"population", "treatments", "variable", "intercurrent_events", "summary"}
+    assert all(parts <= one.keys() and all(one.values()) for one in found)
+
+
+def test_facts_are_asked_on_a_page_and_a_later_answer_is_a_version(world):
+    study, lead = draft_study(world), client_of(world, Role.LEAD)
+    url = reverse("study-facts", args=[study.pk])
+    assert lead.get(url).status_code == 200
+    lead.post(url, {"ethics": "BASEC 2026-01234"})
+    study.refresh_from_db()
+    assert study.facts == {"ethics": "BASEC 2026-01234"}
+    register(study, None, NOW)
+    refused = lead.post(url, {"ethics": "BASEC 2026-01234", "registry": "NCT1"})
+    assert refused.status_code == 200  # a reason is missing
+    lead.post(url, {"ethics": "x", "registry": "NCT1", "reason": "The number came."})
+    assert study.versions.last().document["facts"] == {"ethics": "x", "registry": "NCT1"}
+    text = lead.get(reverse("study-checklists", args=[study.pk])).content.decode()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert next(row for row in rows if row["list"] == "WHO")["answer"] == "NCT1"
+    assert client_of(world, Role.PT).get(url).status_code == 403
+
+
+def test_margin_and_looks_stay_as_they_were_once_the_study_runs(world):
+    study = running_study(world, spending="pocock")
+    for change in ({"margin": 3.0}, {"spending": "obrien_fleming"}, {"planned_sd": 4.0}):
+        changed = Study.everywhere.get(pk=study.pk)
+        for name, value in change.items():
+            setattr(changed, name, value)
+        with pytest.raises(InvalidSetting, match="stay as they were"):
+            revise(changed, "A better one.", None, NOW)
+
+
+def test_who_has_not_agreed_to_a_version_that_asks_for_it_does_not_walk(world):
+    study = running_study(world)
+    early = enrolled(study, new_patient(world))
+    study.question = "Another question?"
+    revise(study, "A blood sample.", None, NOW, needs_consent=True)
+    late = enrolled(study, new_patient(world, 2))
+    with pytest.raises(InvalidSetting, match="Version 2 of the study changes"):
+        start_session(early, Place(), None, NOW)
+    start_session(late, Place(), None, NOW)
+    page = client_of(world, Role.PT)
+    assert "A blood sample." in page.get(reverse("participant", args=[early.pk])).content.decode()
+    page.post(reverse("agree-again", args=[early.pk]))
+    assert agreed_version(early) == 2
+    agree(early, None, NOW)  # nothing is left to agree to
+    assert early.events.filter(kind=StudyEvent.Kind.CONSENTED).count() == 1
+    study.question = "A third one?"
+    revise(study, "Wording.", None, NOW)  # without asking again
+    start_session(Enrollment.everywhere.get(pk=early.pk), Place(), None, NOW)
+    rows = list(agreement_rows(study))
+    assert [row["agreed_to_version"] for row in rows] == [2, 2]
+    assert [row["enrolled_under_version"] for row in rows] == [1, 2]
+    assert [row["versions_of_visits"] for row in rows] == ["1:3", "1:2"]
+
+
+def fallen(world, *kinds: str):
+    """Return a running study, and a participant in whose session this was noted."""
+    study = running_study(world)
+    enrollment = enrolled(study, new_patient(world))
+    session = start_session(enrollment, Place(), None, NOW)
+    for kind in kinds:
+        SessionEvent.everywhere.create(session=session, kind=kind, after_number=0, at=NOW)
+    return study, enrollment
+
+
+def test_falls_and_stops_of_the_robot_are_proposed_until_they_are_judged(world):
+    study, enrollment = fallen(world, "fall", "fall", "fall_withdrawn", "robot_stop", "rest")
+    found = propose(study)
+    assert [(whose.code, event.kind) for whose, event in found] == [
+        (enrollment.code, "fall"),
+        (enrollment.code, "robot_stop"),
+    ]
+    event = AdverseEvent(enrollment=enrollment, entry=found[0][1], grade=2, relation="possible")
+    record(event, NOW)
+    assert [one.kind for _whose, one in propose(study)] == ["robot_stop"]
+    with pytest.raises(InvalidSetting, match="judged already"):
+        record(AdverseEvent(enrollment=enrollment, entry=found[0][1], grade=1), NOW)
+    with pytest.raises(InvalidSetting, match="Say what happened"):
+        record(AdverseEvent(enrollment=enrollment, what=" ", grade=1), NOW)
+    [row] = listing_rows(study, by_arm=True)
+    assert (row["arm"], row["what"], row["due_on_day"]) == (
+        enrollment.allocation.group,
+        "fall",
+        None,
+    )
+
+
+@pytest.mark.parametrize(
+    ("grade", "serious", "relation", "expected", "days"),
+    [
+        (3, False, "certain", False, None),
+        (2, True, "possible", False, 15),
+        (4, False, "probable", False, 7),
+        (5, True, "certain", True, 1),
+        (3, True, "none", False, 1),
+    ],
+)
+def test_deadlines_follow_from_how_an_event_is_judged(grade, serious, relation, expected, days):
+    event = AdverseEvent(grade=grade, serious=serious, relation=relation, expected=expected, at=NOW)
+    assert event.due_at == (None if days is None else NOW + timedelta(days=days))
+
+
+def test_who_treats_judges_and_reports_and_only_a_monitor_sees_arms(world):
+    study, enrollment = fallen(world, "fall")
+    url = reverse("study-harms", args=[study.pk])
+    pt = client_of(world, Role.PT)
+    [(_whose, entry)] = propose(study)
+    judged = {"entry": entry.pk, "grade": 4, "relation": "possible", "what": ""}
+    assert pt.post(url, judged).status_code == 302
+    again = pt.post(url, judged, follow=True).content.decode()
+    assert "judged already" in again
+    event = AdverseEvent.everywhere.get(enrollment=enrollment)
+    assert (event.grade, event.entry_id, event.by.role) == (4, entry.pk, Role.PT)
+    assert "Has been reported" in again
+    arm_column = "<th>Arm</th>"
+    assert arm_column not in again
+    pt.post(url, {"report": event.pk})
+    event.refresh_from_db()
+    assert event.reported_at is not None
+    monitor = User.everywhere.create_user("mo", role=Role.RESEARCHER, clinic=world.clinic)
+    assert signed_in(monitor).get(url).status_code == 403
+    give_mark(study, monitor, Task.MONITOR, None, NOW)
+    with pytest.raises(InvalidSetting, match="Let one person"):
+        give_mark(study, monitor, Task.INTERIM, None, NOW)
+    seen = signed_in(monitor).get(url).content.decode()
+    assert arm_column in seen
+    assert f"<td>{enrollment.allocation.group}</td>" in seen
+    assert enrollment.patient.nickname not in seen
+    assessor = User.everywhere.create_user("as", role=Role.PT, clinic=world.clinic)
+    study.marks.create(study=study, user=assessor, task="assessor")
+    assert signed_in(assessor).get(url).status_code == 403
+    assert signed_in(assessor).get(reverse("study-checklists", args=[study.pk])).status_code == 403
+
+
+def test_two_people_reveal_an_arm_and_one_alone_is_recorded_as_alone(world):
+    study = running_study(world)
+    enrollment = enrolled(study, new_patient(world))
+    lead, pt = world.people[Role.LEAD], world.people[Role.PT]
+    options: dict[str, Any] = {"emergency": False, "now": NOW}
+    assert reveal_arms(enrollment, "a rash", by=pt, **options) == []
+    assert reveal_arms(enrollment, "still", by=pt, **options) == []  # oneself confirms nothing
+    assert find_request(enrollment, NOW + ASKED_FOR + timedelta(seconds=1)) is None
+    [arm] = reveal_arms(enrollment, "confirmed", by=lead, **options)
+    assert arm.code == enrollment.allocation.group
+    asked = client_of(world, Role.PT).get(reverse("participant", args=[enrollment.pk]))
+    assert "The arm is revealed" in asked.content.decode()  # to who asked, too
+    other = enrolled(study, new_patient(world, 2))
+    assert reveal_arms(other, "dizzy", emergency=True, second=True, by=pt, now=NOW) == []
+    assert len(reveal_arms(other, "yes", emergency=False, by=lead, now=NOW)) == 1
+    third = enrolled(study, new_patient(world, 3))
+    assert len(reveal_arms(third, "bleeding", emergency=True, by=pt, now=NOW)) == 1
+    revealed = study.events.filter(kind__in=("unblinded", "emergency")).order_by("pk")
+    assert list(revealed.values_list("kind", "about")) == [
+        ("unblinded", f"asked by {pt}"),
+        ("emergency", f"asked by {pt}"),
+        ("emergency", "alone"),
+    ]
+
+
+def test_a_look_records_how_many_have_the_outcome(world):
+    study = running_study(world, spending="pocock", planned_sd=1.0)
+    results = read_results(study, NOW)
+    assert (results.level, results.blinded_size) == (None, None)  # nobody has the outcome
+    page = client_of(world, Role.RESEARCHER)
+    researcher = world.people[Role.RESEARCHER]
+    give_mark(study, researcher, Task.INTERIM, None, NOW)
+    assert page.get(reverse("study-results", args=[study.pk])).status_code == 200
+    look = study.events.get(kind=StudyEvent.Kind.LOOKED)
+    assert look.about == "0/20"
