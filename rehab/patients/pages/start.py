@@ -18,6 +18,7 @@ from rehab.patients.forms import PatientForm, ScreenForm
 from rehab.patients.screen_check import LETTERS, propose
 from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.consent.services import current_text
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
@@ -117,7 +118,8 @@ def add_patient(request: HttpRequest) -> HttpResponse:
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.save_or_report():
         return redirect("setup", patient_id=form.instance.pk)
-    return render(request, "patients/form.html", {"form": form})
+    context = {"form": form, "words": current_text(clinic_of(user)).text}
+    return render(request, "patients/form.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
