@@ -11,7 +11,15 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.sign_in import attempts, resets  # noqa: F401
 from rehab.people.sign_in.factors import factors  # noqa: F401
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions import corrections, incidents, log, models, ownership, seals  # noqa: F401
+from rehab.sessions import (  # noqa: F401
+    assessments,
+    corrections,
+    incidents,
+    log,
+    models,
+    ownership,
+    seals,
+)
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase

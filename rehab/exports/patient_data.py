@@ -23,6 +23,7 @@ from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
 from rehab.people.field_policy import describe
 from rehab.people.models import Patient, User
+from rehab.sessions.assessments import Assessment
 from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import Enrollment, Screening
 from rehab.studies.record.adverse_events import AdverseEvent
@@ -33,6 +34,7 @@ FILES = {
     "patient.json": _("who it is, and how the pages are set"),
     "consent.json": _("what was agreed to, in which words, and when"),
     "visits.json": _("the days on which a visit is or was planned"),
+    "tests.json": _("results of standard tests, also those struck out"),
     "family.json": _("which links a family was given, and how often they were opened"),
     "boards.json": _("the rows on leaderboards, and the groups of boards"),
     "studies.json": _("participation in studies; the arm once a study is closed"),
@@ -70,6 +72,7 @@ def _patient_tables(user: User, patient: Patient, now: datetime) -> Iterator[tup
     yield "patient.json", write_json(describe(patient))
     yield "consent.json", write_json(list_consents(user, patient))
     yield "visits.json", write_json(list_visits(user, patient))
+    yield "tests.json", write_json(list_assessments(user, patient))
     yield "family.json", write_json(list_family_links(user, patient))
     yield "boards.json", write_json(list_boards(user, patient, now))
     yield "studies.json", write_json(list_studies(user, patient))
@@ -108,6 +111,12 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
         }
         for row in rows.order_by("pk")
     ]
+
+
+def list_assessments(user: User, patient: Patient) -> list[Any]:
+    """Return the results of standard tests, also of a patient without a session."""
+    rows = Assessment.objects.visible_to(user).filter(patient=patient).order_by("at", "pk")
+    return [describe(row) | {"unit": row.definition.unit} for row in rows]
 
 
 def list_visits(user: User, patient: Patient) -> list[Any]:

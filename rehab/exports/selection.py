@@ -26,7 +26,8 @@ from django.db.models import (
 from django.db.models.functions import Cast, Coalesce
 
 from rehab.people.models import User
-from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.conditions import CONDITIONS, RATED
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.steps import InvalidReason
 
@@ -53,6 +54,10 @@ class Selection:
         ``late_strides`` of each: those of the trained leg that do not count as they came late.
         """
         metrics = Prefetch("metrics", SessionMetric.objects.visible_to(self.user))
+        noted = SessionEvent.objects.visible_to(self.user).filter(
+            kind__in=[kind.value for kind in (*CONDITIONS, *RATED)]
+        )
+        events = Prefetch("events", noted.order_by("pk").defer("data"), to_attr="walked_under")
         related = ("patient", "measure", "protocol")
         late = (
             Step.objects.visible_to(self.user)
@@ -63,7 +68,9 @@ class Selection:
             .values("session")
             .annotate(count=Count("pk"))
         )
-        chosen = self.sessions.select_related(*related).prefetch_related(metrics).order_by("pk")
+        chosen = (
+            self.sessions.select_related(*related).prefetch_related(metrics, events).order_by("pk")
+        )
         chosen = chosen.annotate(late_strides=Coalesce(Subquery(late.values("count")), 0))
         for first in range(0, len(self.keys), SESSIONS_PAGE):
             yield from chosen.filter(pk__in=self.keys[first : first + SESSIONS_PAGE])

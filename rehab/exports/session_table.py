@@ -13,7 +13,8 @@ from rehab.exports.selection import Selection
 from rehab.exports.table import Column, Table, Type
 from rehab.people.field_policy import Covariate, covariates
 from rehab.people.models import Patient
-from rehab.sessions.log import MEASURE_UNIT
+from rehab.sessions.conditions import summarize_conditions
+from rehab.sessions.log import MEASURE_UNIT, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.option import AS_IS, Group, Option, OptionColumn
 from rehab.sessions.setup.options import exported_options
@@ -31,6 +32,13 @@ class SessionRow:
         self.day: date = session.began_at.date()
 
     @cached_property
+    def conditions(self) -> dict[str, float]:
+        """How the patient walked, by the kinds of remarks (`summarize_conditions`)."""
+        noted: Any = getattr(self.session, "walked_under", None)  # `Selection` reads them at once
+        events = self.session.events.order_by("pk") if noted is None else noted
+        return summarize_conditions(self.session, events)
+
+    @cached_property
     def metrics(self) -> dict[str, float]:
         """Its figures, by their slugs."""
         rows: Any = self.session.metrics.all()
@@ -44,6 +52,10 @@ def read_sessions(selection: Selection, session: TrainingSession) -> Iterator[Se
 
 def _metric_column(slug: str, label: str, unit: str) -> Column:
     return Column.number(slug, unit, f"{label} of the session.", lambda row: row.metrics.get(slug))
+
+
+def _condition_column(name: str, kind: Remark, unit: str, meaning: str) -> Column:
+    return Column.number(name, unit, meaning, lambda row: row.conditions.get(kind))
 
 
 def _option_column(option: Option, column: OptionColumn) -> Column:
@@ -79,6 +91,20 @@ CONDITIONS = tuple(
     column
     for column, (option, _column) in zip(SETUP, exported_options(), strict=True)
     if option.group is Group.WALKING and column.type is Type.NUMBER
+)
+# How the patient walked, weighted by the steps that each condition held for.
+WALKED = tuple(
+    _condition_column(name, kind, unit, meaning)
+    for name, kind, unit, meaning in (
+        ("mean_belt_speed", Remark.BELT_SPEED, "m/s", "Mean speed of the belt over the steps."),
+        ("mean_weight_support", Remark.WEIGHT_SUPPORT, "%", "Mean support over the steps."),
+        ("walking_aid", Remark.WALKING_AID, "ratio", "Share of the steps with a walking aid."),
+        ("orthosis", Remark.ORTHOSIS, "ratio", "Share of the steps with an orthosis."),
+        ("handrail", Remark.HANDRAIL, "ratio", "Share of the steps at the handrail."),
+        ("helping_hand", Remark.HELPING_HAND, "ratio", "Share with a therapist's hand."),
+        ("highest_exertion", Remark.BORG, "0 to 10", "Highest exertion noted, Borg CR10."),
+        ("highest_pain", Remark.PAIN, "0 to 10", "Highest pain noted, numeric rating scale."),
+    )
 )
 FIGURES = tuple(_metric_column(m.slug, m.label, m.unit or "ratio") for m in METRICS.values())
 
@@ -125,6 +151,7 @@ SESSIONS = Table(
             lambda row: row.session.protocol and row.session.protocol.name,
         ),
         *SETUP,
+        *WALKED,
         Column.number(
             "close_part",
             "ratio",

@@ -12,6 +12,7 @@ from rehab.exports.session_table import SESSIONS
 from rehab.exports.step_tables import FEEDBACK, STEPS
 from rehab.exports.table import Column, Table, Type
 from rehab.questionnaires.instrument import Instrument, Item
+from rehab.sessions.assessments import Assessment, assessments_with
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent
@@ -37,7 +38,11 @@ EVENTS = Table(
         Column.integer("after_number", "Number of the last step before it; 0 for none."),
         Column("kind", "What was done, noted, or done by the robot."),
         Column("old", "Value before, where something was changed.", type=Type.NUMBER),
-        Column("value", "Value after; of a remark its strength (Borg 0 to 10).", type=Type.NUMBER),
+        Column(
+            "value",
+            "Value after; of a remark: Borg, pain 0 to 10; belt m/s; support %; an aid 1 or 0.",
+            type=Type.NUMBER,
+        ),
         BY,
         Column(
             "data",
@@ -180,9 +185,39 @@ STUDY_VISITS = Table(
         Column("arm", "The arm of this visit; sealed (empty) until the study is closed."),
     ),
 )
+
+
+def read_assessments(selection: Selection, session: TrainingSession) -> Iterator[Assessment]:
+    """Yield the results of standard tests that go with a session."""
+    yield from assessments_with(selection.user, session)
+
+
+ASSESSMENTS = Table(
+    "assessments.csv",
+    _("results of standard tests, each with the session that it goes with"),
+    read_assessments,
+    (
+        Column.time("taken_at", "When it was taken.", "at"),
+        Column("test", "10mwt, 10mwt_fast, 6mwt, tug, 5sts, fac or berg.", "test"),
+        Column.number("result", "the test's unit", "The result.", "value"),
+        Column("unit", "Its unit; empty for points.", "definition.unit"),
+        Column("device", "What the patient walked with.", "device"),
+        Column("loinc", "Code in LOINC; empty where none fits.", "definition.loinc"),
+    ),
+)
 # Steps come before events, whose times count from the first step in motion data (research.bids).
 TABLES: tuple[Table, ...] = (
-    *(SESSIONS, STEPS, FEEDBACK, EVENTS, ANSWERS, CORRECTIONS, INCIDENTS, STUDY_VISITS),
+    *(
+        SESSIONS,
+        STEPS,
+        FEEDBACK,
+        EVENTS,
+        ANSWERS,
+        ASSESSMENTS,
+        CORRECTIONS,
+        INCIDENTS,
+        STUDY_VISITS,
+    ),
 )
 CODEBOOK = ("file", "column", "unit", "meaning", "type", "rules_version")
 

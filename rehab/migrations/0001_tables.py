@@ -114,6 +114,16 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
+                    "note_template",
+                    models.TextField(
+                        blank=True,
+                        help_text="What a session’s page offers to copy into your own record, with places such as {day}, {walked}, {hits}, {conditions}, {noted}, {tests}, {note}. Empty: GARRY’s text.",
+                        max_length=2000,
+                        validators=[rehab.people.models.clinics.validate_note_template],
+                        verbose_name="text of a session",
+                    ),
+                ),
+                (
                     "networks",
                     models.TextField(
                         blank=True,
@@ -1604,6 +1614,16 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
+                    "own_goal",
+                    models.CharField(
+                        blank=True,
+                        default="",
+                        help_text="“Walk to the bakery”. The patient reads it at the start and at the end.",
+                        max_length=80,
+                        verbose_name="goal in the patient’s words",
+                    ),
+                ),
+                (
                     "body_mass_kg",
                     models.FloatField(
                         blank=True,
@@ -2089,6 +2109,82 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
+            name="Assessment",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "test",
+                    models.CharField(
+                        choices=[
+                            ("10mwt", "10-meter walk, comfortable"),
+                            ("10mwt_fast", "10-meter walk, fast"),
+                            ("6mwt", "6-minute walk"),
+                            ("tug", "Timed Up and Go"),
+                            ("5sts", "Five times sit to stand"),
+                            ("fac", "Functional ambulation (FAC)"),
+                            ("berg", "Berg Balance Scale"),
+                        ],
+                        max_length=16,
+                        verbose_name="test",
+                    ),
+                ),
+                ("value", models.FloatField(verbose_name="result")),
+                ("device", models.CharField(blank=True, max_length=64, verbose_name="walked with")),
+                (
+                    "at",
+                    models.DateTimeField(default=django.utils.timezone.now, verbose_name="when"),
+                ),
+                (
+                    "struck_at",
+                    models.DateTimeField(editable=False, null=True, verbose_name="struck out"),
+                ),
+                (
+                    "by",
+                    models.ForeignKey(
+                        null=True,
+                        on_delete=django.db.models.deletion.SET_NULL,
+                        related_name="+",
+                        to=settings.AUTH_USER_MODEL,
+                        verbose_name="by",
+                    ),
+                ),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="assessments",
+                        to="rehab.clinic",
+                        verbose_name="clinic",
+                    ),
+                ),
+                (
+                    "patient",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="assessments",
+                        to="rehab.patient",
+                        verbose_name="patient",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "test result",
+                "verbose_name_plural": "test results",
+                "ordering": ["at", "pk"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
             name="Protocol",
             fields=[
                 (
@@ -2499,9 +2595,14 @@ class Migration(migrations.Migration):
                             ("fall_withdrawn", "it was no fall"),
                             ("fall_acknowledged", "fall seen by a therapist"),
                             ("stop_acknowledged", "robot’s stop seen by a therapist"),
-                            ("handrail", "handrail"),
                             ("verbal_cue", "verbal cue"),
-                            ("borg", "borg"),
+                            ("borg", "exertion"),
+                            ("belt_speed", "belt speed"),
+                            ("weight_support", "body-weight support"),
+                            ("walking_aid", "walking aid"),
+                            ("orthosis", "orthosis"),
+                            ("handrail", "handrail"),
+                            ("helping_hand", "therapist’s hand"),
                         ],
                         max_length=32,
                         verbose_name="kind",
@@ -4312,6 +4413,10 @@ class Migration(migrations.Migration):
         migrations.AddIndex(
             model_name="auditentry",
             index=models.Index(fields=["patient", "-at"], name="audit_by_patient_and_date"),
+        ),
+        migrations.AddIndex(
+            model_name="assessment",
+            index=models.Index(fields=["patient", "test", "at"], name="assessment_by_patient"),
         ),
         migrations.AddConstraint(
             model_name="protocol",

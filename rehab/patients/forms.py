@@ -25,20 +25,36 @@ class MonthField(forms.DateField):
     input_formats = ("%Y-%m", "%Y-%m-%d")
 
 
-class PatientForm(PatientFieldsForm):
+class _SpokenForm(PatientFieldsForm):
+    """A form with the patient's language: of a new patient the clinic's, unless one is chosen."""
+
+    def clean_language(self) -> str:
+        """Return the language; what was sent without one leaves it as it is."""
+        given: str = self.cleaned_data["language"]
+        return given or self.instance.language
+
+    def offer_language(self) -> None:
+        """Let the language be left out, and offer the clinic's to a new patient."""
+        self.fields["language"].required = False
+        if self.instance.is_new:
+            self.instance.language = self.initial["language"] = self.instance.clinic.language
+
+
+class PatientForm(_SpokenForm):
     """A patient of the PT's clinic, new or to be edited."""
 
     field_order = ("nickname", "code", "paretic_side")  # then as in the model
 
     class Meta:
         model = Patient
-        fields: ClassVar = details(Patient)
+        fields: ClassVar = [*details(Patient), "language"]
         field_classes: ClassVar = {"stroke_month": MonthField}
 
     def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
         super().__init__(*args, **options)
         self.instance.clinic = clinic_of(by)
         self._by, self._now = by, now
+        self.offer_language()
         self.fields["paretic_side"].required = True
         self.fields["nickname"].widget.attrs["autofocus"] = True
         if self.instance.is_new:
@@ -85,12 +101,22 @@ class PatientForm(PatientFieldsForm):
         return patient
 
 
-class ScreenForm(PatientFieldsForm):
+class ScreenForm(_SpokenForm):
     """How the patient's page looks and sounds for this patient."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.offer_language()
 
     class Meta:
         model = Patient
-        fields: ClassVar = ["screen_side", "screen_text", "screen_still", "screen_sounds"]
+        fields: ClassVar = [
+            "language",
+            "screen_side",
+            "screen_text",
+            "screen_still",
+            "screen_sounds",
+        ]
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
 
 

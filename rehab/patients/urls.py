@@ -2,10 +2,11 @@
 
 from django.urls import path
 
-from rehab.patients.pages import ending, family, first_steps, records, start, visits
+from rehab.patients.pages import caseload, ending, family, first_steps, records, start, visits
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
+    path("caseload/", caseload.show_caseload, name="caseload"),
     path("first-steps/", first_steps.first_steps, name="first-steps"),
     path("first-steps/state/", first_steps.first_steps_state, name="first-steps-state"),
     path("patients/new/", start.add_patient, name="new-patient"),
@@ -13,6 +14,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/", start.show_patient, name="patient"),
     path("patients/<int:patient_id>/details/", start.edit_patient, name="edit-patient"),
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
+    path("patients/<int:patient_id>/screen/check/", start.check_screen, name="check-screen"),
     path("sessions/<int:session_id>/ending/", ending.show_ending, name="ending"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),

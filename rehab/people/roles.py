@@ -59,6 +59,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Device": _OF_A_LEAD,
     "Pairing": {},
     "PinAttempts": {},
+    "Assessment": _VIEWED | dict.fromkeys(_CARERS, Right.EDIT),
     "Visit": dict.fromkeys(_CARERS, Right.ALL),
     "FamilyLink": _VIEWED_BY_CARERS,
     "MeasureDefinition": _VIEWED | dict.fromkeys((Role.HOST, Role.LEAD), Right.EDIT),

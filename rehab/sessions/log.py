@@ -17,6 +17,7 @@ from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import SessionScope, TrainingSession
+from rehab.sessions.setup.walking import BELT_M_S, SUPPORT_PERCENT
 from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS
 from rehab.training.summary.metrics import METRICS
@@ -161,7 +162,7 @@ class Remark(StrEnum):
     """
 
     REST = "rest"
-    PAIN = "pain"
+    PAIN = "pain"  # 0 to 10 in ``value``
     DIZZINESS = "dizziness"
     NEAR_FALL = "near_fall"
     FALL = "fall"
@@ -169,9 +170,15 @@ class Remark(StrEnum):
     FALL_WITHDRAWN = "fall_withdrawn"
     FALL_ACKNOWLEDGED = "fall_acknowledged"
     STOP_ACKNOWLEDGED = "stop_acknowledged"  # the robot's own
-    HANDRAIL = "handrail"
     VERBAL_CUE = "verbal_cue"
     BORG = "borg"  # felt exertion, Borg CR10: 0 to 10 in ``value``
+    # How the patient walks from here on (`conditions`), in ``value``; also by a treadmill itself.
+    BELT_SPEED = "belt_speed"  # [m/s]
+    WEIGHT_SUPPORT = "weight_support"  # [%]
+    WALKING_AID = "walking_aid"  # these four: 1 from here on, 0 no longer
+    ORTHOSIS = "orthosis"
+    HANDRAIL = "handrail"
+    HELPING_HAND = "helping_hand"  # the therapist's
 
 
 class FallSeverity(models.IntegerChoices):
@@ -185,9 +192,15 @@ class FallSeverity(models.IntegerChoices):
     MAJOR = 3, _("badly hurt")
 
 
+# What helps a patient to walk: on or off.
+ASSISTANCE = (Remark.WALKING_AID, Remark.ORTHOSIS, Remark.HANDRAIL, Remark.HELPING_HAND)
 # Remarks with a value: the lowest and highest.
-REMARK_RANGES = {
+REMARK_RANGES: dict[Remark, tuple[float, float]] = {
     Remark.BORG: (0, 10),  # CR10
+    Remark.PAIN: (0, 10),  # numeric rating scale
+    Remark.BELT_SPEED: BELT_M_S,
+    Remark.WEIGHT_SUPPORT: SUPPORT_PERCENT,
+    **dict.fromkeys(ASSISTANCE, (0, 1)),
     Remark.FALL_SEVERITY: (FallSeverity.NONE.value, FallSeverity.MAJOR.value),
 }
 
@@ -209,9 +222,14 @@ EVENTS = {
     Remark.FALL_WITHDRAWN: _("it was no fall"),
     Remark.FALL_ACKNOWLEDGED: _("fall seen by a therapist"),
     Remark.STOP_ACKNOWLEDGED: _("robot’s stop seen by a therapist"),
-    Remark.HANDRAIL: _("handrail"),
     Remark.VERBAL_CUE: _("verbal cue"),
-    Remark.BORG: _("borg"),
+    Remark.BORG: _("exertion"),
+    Remark.BELT_SPEED: _("belt speed"),
+    Remark.WEIGHT_SUPPORT: _("body-weight support"),
+    Remark.WALKING_AID: _("walking aid"),
+    Remark.ORTHOSIS: _("orthosis"),
+    Remark.HANDRAIL: _("handrail"),
+    Remark.HELPING_HAND: _("therapist’s hand"),
 }
 
 

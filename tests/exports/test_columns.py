@@ -63,6 +63,15 @@ WALKED: Any = Row(
     late_strides=21,
     walking=Row(device="<device>", belt_speed_m_s=0.7, weight_support_percent=23.0),
     metrics=Row(all=lambda: [Row(slug=slug, value=value) for slug, value in FIGURES.items()]),
+    belt_speed_m_s=0.7, weight_support_percent=23.0, last_number=100,
+    walked_under=[
+        Row(kind=kind, after_number=after, value=value)
+        for kind, after, value in (
+            ("belt_speed", 50, 0.9), ("weight_support", 50, 27.0), ("walking_aid", 10, 1),
+            ("orthosis", 25, 1), ("handrail", 35, 1), ("helping_hand", 45, 1), ("borg", 60, 6.0),
+            ("pain", 60, 4.0),
+        )
+    ],
     **SESSION,
 )  # fmt: skip
 ENROLLMENT = Row(
@@ -92,7 +101,9 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
             "goal_follows": "suggest", "close_part": 0.12, "imported": True, "source": "<source>",
             "age_band": "60-69", "months_since_stroke": 17, "severity": "mild",
             "paretic_side": "right", "device": "<device>", "belt_speed": 0.7,
-            "weight_support": 23.0,
+            "weight_support": 23.0, "mean_belt_speed": 0.8, "mean_weight_support": 25.0,
+            "walking_aid": 0.9, "orthosis": 0.75, "handrail": 0.65, "helping_hand": 0.55,
+            "highest_exertion": 6.0, "highest_pain": 4.0,
         },
     ),
     "steps.csv": (
@@ -110,6 +121,16 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
     "events.csv": (Row(**EVENT, who="<who>"), EVENT | {"by": "<who>"}),
     "corrections.csv": (Row(**CORRECTION, who="<who>"), CORRECTION | {"by": "<who>"}),
     "incidents.csv": (Row(**INCIDENT), INCIDENT),
+    "assessments.csv": (
+        Row(
+            **text("at", "test", "value", "device"),
+            definition=Row(unit="<unit>", loinc="<loinc>"),
+        ),
+        {
+            "taken_at": "<at>", "test": "<test>", "result": "<value>", "unit": "<unit>",
+            "device": "<device>", "loinc": "<loinc>",
+        },
+    ),
     "answers.csv": (
         AnswerRow(RESPONSE, INSTRUMENT, 71.5, 6, Row(text="How?", values=range(1, 10)), 4),
         {

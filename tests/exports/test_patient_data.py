@@ -80,7 +80,7 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
         *("README.txt", "patient.json", "consent.json", "codebook.csv"),
         *("visits.json", "family.json", "boards.json", "studies.json", "changes.json"),
         *("sessions.csv", "steps.csv", "events.csv", "corrections.csv", "incidents.csv"),
-        *("feedback.csv", "answers.csv", "study_visits.csv"),
+        *("feedback.csv", "answers.csv", "study_visits.csv", "assessments.csv", "tests.json"),
     }
     who = json.loads(files["patient.json"])
     assert (who["nickname"], who["code"]) == (world.patient.nickname, world.patient.code)
@@ -104,6 +104,7 @@ def test_the_file_says_what_is_in_it_in_the_language_of_whoever_asks(world):
 TOLD_IN = {
     "Consent": "consent.json",
     "Visit": "visits.json",
+    "Assessment": "tests.json",
     "FamilyLink": "family.json",
     "Leaderboard_group": "boards.json",
     "TrainingSession": "sessions.csv",

@@ -59,6 +59,11 @@ PAGES = {
     "replay": "/sessions/12/replay/?at=120",
     "help": "/help/#today",
     "patient": "/patients/2/",
+    "standard-tests": "/patients/2/tests/",
+    "six-minute-walk": "/patients/2/tests/6mwt/",
+    "caseload": "/caseload/",
+    "check-screen": "/patients/2/screen/check/",
+    "side-by-side": "/sessions/two/",
     "new-patient": "/patients/new/",
     "screen": "/patients/2/screen/",
     "pairing": "/tablet/",
@@ -169,7 +174,7 @@ for station, kind, name, seen in (
         created_at=timezone.now() - timedelta(days=1)
     )
     Device.everywhere.filter(name="Old tablet").update(revoked_at=timezone.now())
-for number, (kind, value) in enumerate([("borg", 3), ("rest", None), ("pain", None), ("borg", 5)]):
+for number, (kind, value) in enumerate([("borg", 3), ("rest", None), ("pain", 3), ("borg", 5)]):
     at = timezone.now() - timedelta(minutes=5 - number)
     SessionEvent.everywhere.create(
         session=last, kind=kind, value=value, after_number=90 * number, at=at

@@ -84,7 +84,7 @@ def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
     note(session, "robot_gesture", phase="ended")
     note(session, "robot_stop")
     words, at = read(world, session), f"{HERE:%H:%M}"
-    assert f"! Fall 2 ×: {at}, {at} Rest 1 ×: {at} Exertion (Borg): 4 ({at}), 7 ({at})" in words
+    assert f"! Fall 2 ×: {at}, {at} Rest 1 ×: {at} Exertion: 4 ({at}), 7 ({at})" in words
     assert "1 gesture, 2 of 3 decisions at or above its threshold, stopped once." in words
 
 

@@ -32,6 +32,7 @@ from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item
+from rehab.sessions.assessments import Assessment
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
@@ -391,6 +392,9 @@ def build_world(name: str) -> World:
             token_hash=f"family-{name}",
             created_at=NOW,
             expires_at=NOW,
+        ),
+        Assessment.everywhere.create(
+            clinic=clinic, patient=patient, test="tug", value=17.5, device=mark(name, Assessment)
         ),
         Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_OID, uuid5
 
-from rehab.exports.session_table import CONDITIONS, SessionRow
+from rehab.exports.session_table import CONDITIONS, WALKED, SessionRow
 from rehab.people.models import User
+from rehab.sessions.assessments import assessments_with
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
@@ -22,8 +23,18 @@ from rehab.training.changes import State
 from rehab.training.summary.metrics import METRICS
 
 SYSTEM = "urn:garry"
+LOINC = "http://loinc.org"
 UCUM = "http://unitsofmeasure.org"
-UCUM_CODES = {"": "1", "s": "s", "min": "min", "W/kg": "W/kg", "days": "d", "m/s": "m/s", "%": "%"}
+UCUM_CODES = {
+    "": "1",
+    "s": "s",
+    "m": "m",
+    "min": "min",
+    "W/kg": "W/kg",
+    "days": "d",
+    "m/s": "m/s",
+    "%": "%",
+}
 STATUS = {State.FINISHED: "finished", State.ABORTED: "cancelled"}
 
 
@@ -75,6 +86,18 @@ def make_bundle(user: User, session: TrainingSession, shift: timedelta) -> dict[
             **subject,
         }
         entries.append((_uuid("figure", session.pk, slug), observation))
+    for row in assessments_with(user, session):
+        test, code = row.definition, {"system": f"{SYSTEM}:test", "code": row.test}
+        loinc = [{"system": LOINC, "code": test.loinc}] if test.loinc else []
+        observation = {
+            "resourceType": "Observation",
+            "status": "final",
+            "code": {"coding": [*loinc, code | {"display": test.label}], "text": test.label},
+            "effectiveDateTime": _at(row.at + shift),
+            "valueQuantity": {"value": row.value, **_unit(test.unit)},
+            **subject,
+        }
+        entries.append((_uuid("test", row.pk), observation))
     answered = QuestionnaireResponse.objects.visible_to(user).filter(session=session)
     entries += [(_uuid("answers", row.pk), _answers(row, shift) | subject) for row in answered]
     return {
@@ -92,7 +115,7 @@ def _figures(user: User, session: TrainingSession) -> Iterator[tuple[str, str, s
         if metric is not None:
             yield slug, metric.label, metric.unit, value
     row = SessionRow(session, source="")
-    for column in CONDITIONS:
+    for column in (*CONDITIONS, *WALKED):
         if (value := column.get(row)) is not None:
             label = column.name.replace("_", " ").capitalize()
             yield column.name, label, column.unit, value

@@ -15,14 +15,17 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.patients.forms import PatientForm, ScreenForm
+from rehab.patients.screen_check import LETTERS, propose
 from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.consent.services import current_text
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.pages.screen_size import screen_of_browser
 from rehab.stations.builtin import first_station
 from rehab.stations.tablets import has_tablet
 from rehab.training.changes import OPEN_STATES
@@ -115,7 +118,8 @@ def add_patient(request: HttpRequest) -> HttpResponse:
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.save_or_report():
         return redirect("setup", patient_id=form.instance.pk)
-    return render(request, "patients/form.html", {"form": form})
+    context = {"form": form, "words": current_text(clinic_of(user)).text}
+    return render(request, "patients/form.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -134,12 +138,31 @@ def edit_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Set how the patient's page looks and sounds."""
+    """Set how the patient's page looks and sounds; ``seen``: as a check of the letters proposes."""
     patient = get_object_or_404(patients_by_last_visit(user_of(request)), pk=patient_id)
-    form = ScreenForm(request.POST or None, instance=patient)
+    seen = request.GET.get("seen", "")
+    is_checked = len(seen) == len(LETTERS) and set(seen) <= {"0", "1"}
+    initial = {}
+    if is_checked:
+        proposal = propose([one == "1" for one in seen])
+        initial["screen_text"] = proposal.text.value
+        if proposal.side is not None:
+            initial["screen_side"] = proposal.side.value
+    form = ScreenForm(request.POST or None, instance=patient, initial=initial)
     if request.method == "POST" and form.save_or_report():
         return redirect("patient", patient_id=patient.pk)
-    return render(request, "patients/screen_form.html", {"form": form, "patient": patient})
+    context = {"form": form, "patient": patient, "checked": is_checked, "count": seen.count("1")}
+    return render(request, "patients/screen_form.html", context | {"of": len(LETTERS)})
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_safe
+def check_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Show letters of three sizes on either side, on the screen that the patient will read."""
+    patient = get_object_or_404(patients_by_last_visit(user_of(request)), pk=patient_id)
+    letters = [each._asdict() for each in LETTERS]
+    context = {"patient": patient, "letters": letters, "screen": screen_of_browser(request)}
+    return render(request, "patients/screen_check.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)

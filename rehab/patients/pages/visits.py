@@ -11,6 +11,7 @@ from django.utils import timezone
 from django.utils.dateformat import format as format_date
 from django.utils.dateparse import parse_date, parse_time
 from django.utils.translation import gettext as _
+from django.utils.translation import ngettext
 from django.views.decorators.http import require_POST
 
 from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, plan_visit, suggested_time
@@ -20,6 +21,7 @@ from rehab.people.row_values import read_key
 from rehab.sessions.formatting import clinic_time
 
 MAX_AHEAD = timedelta(days=366)
+MAX_WEEKS = 26  # of visits that are planned at once
 
 
 class InvalidVisitDay(ValueError):
@@ -29,7 +31,7 @@ class InvalidVisitDay(ValueError):
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
 def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Plan a visit (``in``: days from today, or ``day`` and ``at``) or remove one (``remove``)."""
+    """Plan visits (``in``: days from today; or ``day``, ``at``, ``weeks``), or ``remove`` one."""
     user = user_of(request)
     patient = get_patient(user, patient_id)
     visits = Visit.objects.visible_to(user).filter(patient=patient)
@@ -44,14 +46,31 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
             at = suggested_time(user, patient, now) if int(days) else None
         else:
             day, at = _parse_day(given.get("day", ""), given.get("at", ""), now.date())
+        weeks = _parse_weeks(given.get("weeks", "1"))
     except InvalidVisitDay as problem:
         messages.error(request, str(problem))
     else:
-        visit = plan_visit(patient, day, at)
+        visit, *_later = [
+            plan_visit(patient, day + timedelta(weeks=week), at) for week in range(weeks)
+        ]
         when = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
-        names = {"name": patient.nickname, "when": when}
-        messages.success(request, _("%(name)s is expected on %(when)s.") % names)
+        names = {"name": patient.nickname, "when": when, "count": weeks}
+        message = ngettext(
+            "%(name)s is expected on %(when)s.",
+            "%(name)s is expected on %(when)s, and each week after it: %(count)s visits.",
+            weeks,
+        )
+        messages.success(request, message % names)
     return redirect("patient", patient_id=patient.pk)
+
+
+def _parse_weeks(given: str) -> int:
+    """Return for how many weeks a visit is planned. Raises InvalidVisitDay."""
+    if not (given.isascii() and given.isdecimal() and 1 <= int(given[:3]) <= MAX_WEEKS):
+        raise InvalidVisitDay(
+            _("Plan a visit for 1 to %(most)s weeks at once.") % {"most": MAX_WEEKS}
+        )
+    return int(given)
 
 
 def _parse_day(day: str, at: str, today: date) -> tuple[date, time | None]:

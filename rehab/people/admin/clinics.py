@@ -16,7 +16,7 @@ class ClinicAdmin(ScopedAdmin):
     search_fields = ("name",)
     fields = (
         *("name", "language", "time_zone", "boards_across", "second_factor_required"),
-        *("care_needs_consent", "research_needs_consent", "networks"),
+        *("care_needs_consent", "research_needs_consent", "networks", "note_template"),
         *("retention_months", "log_retention_months"),
     )
 

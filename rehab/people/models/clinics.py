@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import ClassVar
 from zoneinfo import available_timezones
 
@@ -29,6 +30,24 @@ def validate_time_zone(name: str) -> None:
         raise ValidationError(
             _("“%(name)s” is no time zone. Give a name such as Europe/Madrid."),
             params={"name": name},
+        )
+
+
+# What the text of a session may name (sessions/reports/text_note.py).
+NOTE_PLACEHOLDERS = (
+    *("day", "time", "name", "code", "own_goal", "walked", "strides", "hits", "score", "goal"),
+    *("type", "conditions", "noted", "tests", "note"),
+)
+PLACEHOLDER = re.compile(r"{(\w+)}")
+
+
+def validate_note_template(text: str) -> None:
+    """Refuse a place for something that no session has."""
+    unknown = [name for name in PLACEHOLDER.findall(text) if name not in NOTE_PLACEHOLDERS]
+    if unknown:
+        raise ValidationError(
+            _("{%(name)s} is unknown. Known are: %(known)s."),
+            params={"name": unknown[0], "known": " ".join(f"{{{n}}}" for n in NOTE_PLACEHOLDERS)},
         )
 
 
@@ -69,6 +88,16 @@ class Clinic(ScopedModel):
         _("care needs consent"),
         default=False,
         help_text=_("No session can be set up for a patient who has not agreed to care."),
+    )
+    note_template = models.TextField(
+        _("text of a session"),
+        blank=True,
+        max_length=2000,
+        validators=[validate_note_template],
+        help_text=_(
+            "What a session’s page offers to copy into your own record, with places such as {day}, "
+            "{walked}, {hits}, {conditions}, {noted}, {tests}, {note}. Empty: GARRY’s text."
+        ),
     )
     networks = models.TextField(
         _("the clinic's own networks"),

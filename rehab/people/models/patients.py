@@ -83,6 +83,13 @@ class Patient(ClinicModel):
     pseudonym = models.CharField(
         _("pseudonym"), max_length=16, unique=True, default=generate_pseudonym, editable=False
     )
+    own_goal = models.CharField(
+        _("goal in the patient’s words"),
+        max_length=80,
+        blank=True,
+        default="",
+        help_text=_("“Walk to the bakery”. The patient reads it at the start and at the end."),
+    )
     body_mass_kg = models.FloatField(
         _("body mass (kg)"),
         null=True,
@@ -160,6 +167,7 @@ class Patient(ClinicModel):
         {
             "nickname": _detail(erased, _("Erased")),
             "code": _detail(erased_by, rename_erased),
+            "own_goal": _detail(erased, ""),
             "pseudonym": erased_by(rename_erased, shown=True, research=True, history=True),
             "clinic": _setting("tells where, and nothing of whom"),
             "body_mass_kg": _detail(erased),

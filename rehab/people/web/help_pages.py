@@ -23,6 +23,8 @@ PAGES = {
     "the-robot": "incident rehab_composedgesture",
     "what-to-do-when-": "correct",
     "progress": "history take-home family-links",
+    "standard-tests": "assessments assess",
+    "caseload": "caseload",
     "insight": "insight",
     "pair-the-tablet": "pair",
     "first-steps": "first-steps",

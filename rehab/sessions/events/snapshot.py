@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.events.event import presence_for_patient
@@ -55,11 +55,13 @@ def snapshot(
     robot_stopped: bool,
     marks: Iterable[Message],
     alarms: OpenAlarms,
+    conditions: Mapping[str, float],
 ) -> Message:
     """Return all that a page of this audience shows, as of the last committed step.
 
     ``about`` says whose session it is; ``recent`` are the latest steps, oldest first; ``robot`` has
-    the robot's latest status and decision; ``marks`` are changes and remarks.
+    the robot's latest status and decision; ``marks`` are changes and remarks; ``conditions`` say
+    how the patient walks now.
     """
     plan, recent = fold.plan, list(recent)
     entries = (history_entry(audience, plan, step, fold.delivery.reported) for step in recent)
@@ -88,6 +90,7 @@ def snapshot(
             **describe_coaching(fold),
             "trained_side": plan.trained_side,
             "marks": list(marks),
+            "conditions": dict(conditions),
             **alarms.describe(),
             **describe_rates(fold.feedback),
             "obstacle": fold.obstacle,

@@ -19,6 +19,7 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.alarms import find_incidents
+from rehab.sessions.assessments import load_courses
 from rehab.sessions.formatting import (
     clinic_time,
     format_day,
@@ -104,6 +105,7 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         "totals": summarize_trend(included, trend, simulated=simulated),
         "corrected": sum(group["pk__count"] for group in groups if group["excluded"]),
         "marked": marked,
+        "courses": [course for course in load_courses(user, patient) if course.results],
         "trend": list(zip(chart["hits"]["days"], trend, strict=True)),
         "chart": chart,
     }

@@ -56,7 +56,7 @@ class ScreenSizeForm(forms.Form):
 def set_screen_size(request: HttpRequest) -> HttpResponse:
     """Set the size and distance of the screen that shows this page."""
     tablet = tablet_of(request)
-    known = _of_tablet(tablet) if tablet is not None else _of_cookie(request)
+    known = _of_tablet(tablet) if tablet is not None else screen_of_browser(request)
     form = ScreenSizeForm(request.POST or None, initial=known._asdict() if known else None)
     if request.method == "POST" and form.is_valid():
         screen = Screen(**form.cleaned_data)
@@ -87,7 +87,7 @@ def screen_of(request: HttpRequest, session: TrainingSession, *, mirror: bool) -
         tablets = Device.everywhere.filter(station=session.station_id, kind=Device.Kind.TABLET)
         tablet = tablets.filter(revoked_at=None).order_by("-last_seen_at").first()
         return _of_tablet(tablet) if tablet is not None else None
-    return _of_tablet(tablet) if tablet is not None else _of_cookie(request)
+    return _of_tablet(tablet) if tablet is not None else screen_of_browser(request)
 
 
 def _of_tablet(tablet: Device) -> Screen | None:
@@ -96,7 +96,8 @@ def _of_tablet(tablet: Device) -> Screen | None:
     return Screen(tablet.screen_px_per_mm, tablet.screen_distance_m)
 
 
-def _of_cookie(request: HttpRequest) -> Screen | None:
+def screen_of_browser(request: HttpRequest) -> Screen | None:
+    """Return the screen of a browser that is no paired tablet's; None where nobody measured it."""
     try:
         px_per_mm, distance_m = map(float, request.COOKIES.get(COOKIE, "").split(","))
     except ValueError:

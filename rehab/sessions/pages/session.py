@@ -23,6 +23,7 @@ from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import format_incidents, format_phases, format_summary
+from rehab.sessions.reports.text_note import write_text_note
 from rehab.training.changes import OPEN_STATES, State
 from robot.wire.incident import MOTION
 
@@ -40,6 +41,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     summary = format_summary(session.to_plan(), review)
     corrections = describe_corrections(session, user)
     notes = (entry.new for entry in corrections if entry.row.field == CorrectedField.NOTE)
+    note = next(notes, "")
     by_name = may_see_names(user.role)
     start = clinic_time(session.began_at, session.clinic)
     now = clinic_time(timezone.now(), session.clinic)
@@ -53,7 +55,8 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "open": State(session.state) in OPEN_STATES,
         "can_correct": by_name and can_correct(session),
         "corrections": corrections,
-        "note": next(notes, ""),
+        "note": note,
+        "text": write_text_note(user, session, review, note) if by_name else "",
         "review": review,
         "incidents": _list_incidents(user, session) if by_name else [],
         "figures": [

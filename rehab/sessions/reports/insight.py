@@ -10,6 +10,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime, timedelta
+from math import floor
 from urllib.parse import urlencode
 
 from django.db.models import QuerySet
@@ -19,8 +20,9 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
+from rehab.sessions.conditions import CONDITIONS, load_conditions, name_assistance
 from rehab.sessions.corrections import CorrectedField, SessionCorrection
-from rehab.sessions.formatting import clinic_time, format_number
+from rehab.sessions.formatting import NBSP, clinic_time, format_number
 from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.intervals import MeanInterval, mean_interval
@@ -42,6 +44,7 @@ class Walked:
     adverse: list[Noted] = field(default_factory=list)
     exertion: float | None = None  # the highest that was noted, Borg CR10
     note: str = ""
+    conditions: dict[str, float] = field(default_factory=dict)  # `summarize_conditions`
     band: str = ""  # the goals that its goal is compared with (`goal_bands`)
 
     @property
@@ -93,9 +96,10 @@ def load_walked(user: User, sessions: QuerySet[TrainingSession]) -> list[Walked]
         for row in rows
     }
     for key, noted in load_noted(user, walked).items():
-        walked[key].adverse = [one for one in noted if one.kind in ADVERSE]
-        borg = [one.value or 0.0 for one in noted if one.kind == Remark.BORG]
-        walked[key].exertion = max(borg, default=None)
+        walked[key].adverse = [one for one in noted if one.is_adverse]
+    for key, conditions in load_conditions(user, rows).items():
+        walked[key].conditions = conditions
+        walked[key].exertion = conditions.get(Remark.BORG)
     notes = SessionCorrection.objects.visible_to(user).filter(field=CorrectedField.NOTE)
     for correction in notes.filter(session__in=list(walked)).order_by("pk"):
         walked[correction.session_id].note = correction.new
@@ -126,6 +130,32 @@ def _describe_goals(walked: Sequence[Walked]) -> str:
     return f"{low if low == high else f'{low}–{high}'} {walked[0].session.measure.unit}"
 
 
+def _by_band(
+    label: str | Promise, kind: Remark, width: float, unit: str
+) -> tuple[str | Promise, Callable[[Walked], str], Callable[[Walked], str]]:
+    """Return how sessions are compared by a condition, in bands of equal width and 0 by itself."""
+
+    def find_band(one: Walked) -> int:
+        value = one.conditions.get(kind)
+        if not value:
+            return -1 if value is None else 0
+        return 1 + floor(round(value / width, 6))
+
+    def describe(one: Walked) -> str:
+        band = find_band(one)
+        if band <= 0:
+            return gettext("not noted") if band else f"0{NBSP}{unit}"
+        places = 0 if width >= 1 else 1
+        low, high = (format_number(width * end, places) for end in (band - 1, band))
+        return f"{low}–{high}{NBSP}{unit}"
+
+    return label, lambda one: f"{find_band(one):03d}", describe
+
+
+def _name_help(one: Walked) -> str:
+    return name_assistance(one.conditions) or gettext("without help, as far as noted")
+
+
 # What sessions may be compared by: the choice's label, the groups' sorting key, and their label.
 KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked], str]]] = {
     "week": (
@@ -139,6 +169,9 @@ KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked],
         lambda one: f"{one.session.patient.nickname} {one.session.patient_id}",
         lambda one: f"{one.session.patient.nickname} ({one.session.patient.code})",
     ),
+    "speed": _by_band(_("Belt speed"), Remark.BELT_SPEED, 0.2, "m/s"),
+    "support": _by_band(_("Body-weight support"), Remark.WEIGHT_SUPPORT, 10, "%"),
+    "help": (_("Help"), _name_help, _name_help),
 }
 
 
@@ -224,7 +257,7 @@ def to_table(walked: Sequence[Walked]) -> Iterator[list[object]]:
     yield [
         *("began", "code", "feedback_type", "measure", "unit", "goal", "hit_rate", "active_s"),
         *map(str, ADVERSE),
-        *("highest_borg", "note"),
+        *("highest_borg", *map(str, CONDITIONS), "highest_pain", "note"),
     ]
     for one in walked:
         session = one.session
@@ -234,5 +267,7 @@ def to_table(walked: Sequence[Walked]) -> Iterator[list[object]]:
             *(one.at, session.patient.code, valences, session.measure.slug, session.measure.unit),
             *(session.goal, one.hit_rate, session.active_s),
             *(counts[kind] for kind in ADVERSE),
-            *(one.exertion, one.note),
+            one.exertion,
+            *(one.conditions.get(kind) for kind in (*CONDITIONS, Remark.PAIN)),
+            one.note,
         ]

@@ -11,6 +11,7 @@ from django.utils.translation import gettext, ngettext
 
 from rehab.people.models import User
 from rehab.sessions.alarms import ACKNOWLEDGMENTS
+from rehab.sessions.conditions import format_noted
 from rehab.sessions.formatting import format_number
 from rehab.sessions.log import EVENTS, FallSeverity, Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
@@ -22,7 +23,7 @@ REMARKS = frozenset(Remark) - {*ABOUT_A_FALL, *ACKNOWLEDGMENTS.values()}
 
 @dataclass(slots=True, eq=False)
 class Noted:
-    """A remark: of exertion with its ``value`` (Borg CR10), of a fall with its ``severity``."""
+    """A remark: with its ``value`` where it has one, of a fall with its ``severity``."""
 
     kind: Remark
     at: datetime
@@ -30,9 +31,14 @@ class Noted:
     severity: FallSeverity | None = None
 
     @property
+    def is_adverse(self) -> bool:
+        """Whether something went wrong; a pain of 0 is none."""
+        return self.kind in ADVERSE and not (self.kind == Remark.PAIN and self.value == 0)
+
+    @property
     def words(self) -> str:
-        """What it was, and how badly the patient was hurt."""
-        label = str(EVENTS[self.kind])
+        """What it was, how strong, and how badly the patient was hurt."""
+        label = f"{EVENTS[self.kind]} {format_noted(self.kind, self.value)}".rstrip()
         return label if self.severity is None else f"{label}, {self.severity.label}"
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from rehab.people.models import User
 from rehab.sessions.alarms import OpenAlarms
+from rehab.sessions.conditions import planned_conditions
 from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
     LiveEvent,
@@ -89,6 +90,7 @@ def play_back(user: User, session: TrainingSession) -> Message:
             robot={},
             robot_stopped=False,
             marks=[],
+            conditions=planned_conditions(session),
             alarms=alarms,
         )
         for audience in AUDIENCES

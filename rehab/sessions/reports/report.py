@@ -11,6 +11,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
+from rehab.sessions.conditions import format_noted
 from rehab.sessions.formatting import (
     clinic_time,
     format_change,
@@ -115,20 +116,22 @@ def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:
 def _summarize_remarks(
     events: list[SessionEvent], session: TrainingSession
 ) -> list[dict[str, Any]]:
-    """Return each kind of remark with its times, adverse ones first; Borg with its values."""
+    """Return each kind of remark with its times and values, adverse ones first."""
     times: defaultdict[Remark, list[str]] = defaultdict(list)
+    with_value: set[Remark] = set()
     for one in read_noted(events):
         text = f"{clinic_time(one.at, session.clinic):%H:%M}"
-        if one.kind == Remark.BORG:
-            text = f"{format_number(one.value, 0)} ({text})"
+        if value := format_noted(one.kind, one.value):
+            with_value.add(one.kind)
+            text = f"{value} ({text})"
         elif one.severity is not None:
             text = f"{text} ({one.severity.label})"
         times[one.kind].append(text)
     order = sorted(times, key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind)))
     return [
         {
-            "name": _("Exertion (Borg)") if kind == Remark.BORG else capfirst(EVENTS[kind]),
-            "count": 0 if kind == Remark.BORG else len(times[kind]),
+            "name": capfirst(EVENTS[kind]),
+            "count": 0 if kind in with_value else len(times[kind]),
             "times": _join(times[kind]),
             "adverse": kind in ADVERSE,
         }

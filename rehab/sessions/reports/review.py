@@ -12,8 +12,9 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
+from rehab.sessions.conditions import format_noted
 from rehab.sessions.control_text import describe_change
-from rehab.sessions.formatting import clinic_time, format_number
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import FallSeverity, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
@@ -31,7 +32,6 @@ ROBOT_ACTIVITY = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)
 EVENT_LABELS = {
     RobotEntry.STOP: _("Robot stopped"),
     RobotEntry.ARM: _("Robot armed"),
-    Remark.BORG: _("Exertion (Borg)"),
 }
 
 
@@ -102,7 +102,7 @@ def describe_event(event: SessionEvent, plan: SessionPlan) -> str:
     if event.kind == Remark.FALL_SEVERITY:
         return str(FallSeverity(int(event.value or 0)).label).capitalize()
     label = str(EVENT_LABELS.get(event.kind) or event.get_kind_display().capitalize())  # type: ignore[call-overload]
-    return f"{label} {format_number(event.value, 0)}" if event.kind == Remark.BORG else label
+    return f"{label} {format_noted(event.kind, event.value)}".rstrip()
 
 
 def _valence_label(slug: Any) -> str:

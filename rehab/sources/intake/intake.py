@@ -29,9 +29,11 @@ from rehab.sources.intake.rows import (
 )
 from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.intake.tables import TablePlans
+from rehab.sources.intake.treadmill import NAMES, read_treadmill
 from rehab.sources.intake.wearables import Sided, WearablePipeline
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import Measurement, Side
+from robot.wire.limits import MAX_EXTRA
 
 REPEAT_S = 10.0  # before the same warning is shown again
 CURE_OF = {str(reason): text for reason, text in CURES.items()}
@@ -88,6 +90,7 @@ class Intake:
         self._problem: SourceError | None = None
         self._failed = asyncio.Event()
         self._number = 0
+        self._treadmill: dict[str, float] = {}  # what it last said of itself
         self._warned_s: dict[str, float] = {}
         self._reported_reasons: set[str] = set()
         self._doubts: tuple[str, ...] = ()  # why valid strides do not count
@@ -117,6 +120,8 @@ class Intake:
         """Add rows in the order in which they came."""
         samples: list[Mapping[str, Cell]] = []
         for row in rows:
+            if not NAMES.isdisjoint(row):
+                self.note_treadmill(read_treadmill(row))
             if VALUE in row:
                 self._add_stride(row)
             elif self._columns.keys() & row.keys() or self._wearables.names & row.keys():
@@ -124,7 +129,7 @@ class Intake:
                     self._add_samples(samples)
                     samples = []
                 samples.append(row)
-            else:
+            elif NAMES.isdisjoint(row):
                 names = ", ".join(list(row)[:4])
                 known = ", ".join([*self._columns, *self._wearables.names][:3])
                 self.reject_row(
@@ -133,6 +138,10 @@ class Intake:
                 )
         if samples:
             self._add_samples(samples)
+
+    def note_treadmill(self, said: Mapping[str, float]) -> None:
+        """Send what a treadmill says of itself with the strides from now on."""
+        self._treadmill |= said
 
     def reject_row(self, text: str) -> None:
         """Count a row that cannot be used, and report why, at most every ten seconds."""
@@ -172,6 +181,8 @@ class Intake:
         self._put(stride, is_timed=any(name in row for name in TIMES))
 
     def _put(self, stride: Measurement, *, is_timed: bool) -> None:
+        if self._treadmill and len(stride.extra) + len(self._treadmill) <= MAX_EXTRA:
+            stride = replace(stride, extra={**self._treadmill, **stride.extra})
         self._number += 1
         self.quality.record_stride(stride, is_timed=is_timed)
         for reason in stride.reasons:

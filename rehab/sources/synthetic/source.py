@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rehab.sources.client import Display, NextStride
+from rehab.sources.intake.treadmill import decode_treadmill, encode_treadmill
 from rehab.sources.reporting import Notify
 from rehab.sources.source import PlayedSource
 from rehab.sources.synthetic.measured import express, show_goal
@@ -21,6 +23,15 @@ if TYPE_CHECKING:
     from rehab.sources.synthetic.streaming import SignalWalker
 
 
+# The simulated treadmill: slowly at first, then as fast as the patient learns to go.
+FIRST_M_S, LAST_M_S, STEP_M_S, STEP_EVERY_S = 0.5, 0.9, 0.1, 60.0
+
+
+def find_speed(time_s: float) -> float:
+    """Return the speed [m/s] of the simulated treadmill's belt at a time [s]."""
+    return min(LAST_M_S, FIRST_M_S + STEP_M_S * math.floor(max(0.0, time_s) / STEP_EVERY_S))
+
+
 class SyntheticSource(PlayedSource):
     """A simulated patient. Every stride depends on the phase that the one before may have ended."""
 
@@ -30,6 +41,9 @@ class SyntheticSource(PlayedSource):
     def add_arguments(cls, parser: ArgumentParser) -> None:
         """Add the options of this source to a command line."""
         parser.add_argument("--seed", type=int, default=0, help="the same seed walks the same")
+        parser.add_argument(
+            "--treadmill", action="store_true", help="a simulated treadmill says its speed, too"
+        )
         parser.add_argument("--profile", choices=sorted(PROFILES), default="good")
         parser.add_argument(
             "--signals", action="store_true", help="measure the strides from simulated signals"
@@ -46,6 +60,7 @@ class SyntheticSource(PlayedSource):
         """Read the command line. Raises SourceError or GaitInputError."""
         self._profile = PROFILES[options.profile]
         self._seed: int = options.seed
+        self._has_treadmill: bool = options.treadmill
         self._side = Side(options.side) if options.side else None
         self._open_signals = make_opener(options, notify) if options.signals else None
         self._notify = notify
@@ -74,7 +89,11 @@ class SyntheticSource(PlayedSource):
             if left < 0:
                 return None
             stride = strider.next_stride(display.phase)
-            return express(stride, walker, measure) if strider is walker else stride
+            stride = express(stride, walker, measure) if strider is walker else stride
+            if self._has_treadmill:
+                said = decode_treadmill(encode_treadmill(find_speed(stride.time_s)))
+                stride = replace(stride, extra=dict(stride.extra) | said)
+            return stride
 
         return walk
 

@@ -125,7 +125,7 @@ def _of_session(session: TrainingSession, make: Callable[..., Occurrence]) -> It
             falls[-1] = value
         elif kind == Remark.FALL_WITHDRAWN and falls:
             falls.pop()
-        elif kind in watched:
+        elif kind in watched and not (kind == Remark.PAIN and value == 0):  # none was felt
             yield make(kind, value)
     yield from (make(Remark.FALL.value, severity) for severity in falls)
     if session.state == State.ABORTED:

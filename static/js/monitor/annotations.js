@@ -1,6 +1,6 @@
 // What was changed or noted, on the PT's chart: a badge for each kind, and a legend of those that are there.
 
-import { _, number } from "garry/shared/language";
+import { _, fill, number } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { remarkName, severityName } from "garry/shared/labels";
 
@@ -12,6 +12,8 @@ const FORMATS = {
   percent,
   choice: (value, choices) => choices[value] ?? value,
 };
+const ASSISTANCE = new Set(["walking_aid", "orthosis", "handrail", "helping_hand"]);
+const PLACES = { belt_speed: 2 };
 const REMARK_BADGE = "▲";
 
 export const badgeOf = ({ kind }) => MARKS[kind]?.badge ?? REMARK_BADGE;
@@ -24,7 +26,8 @@ export function describe({ kind, value }) {
   const mark = MARKS[kind];
   const name = mark?.label ?? remarkName(kind);
   if (value == null) return name;
-  const text = mark ? FORMATS[mark.format](value, mark.choices) : number(value);
+  if (ASSISTANCE.has(kind)) return value ? name : fill(_("without %(help)s"), { help: name });
+  const text = mark ? FORMATS[mark.format](value, mark.choices) : number(value, PLACES[kind] ?? 0);
   return text === "" ? name : `${name} ${text}`;
 }
 

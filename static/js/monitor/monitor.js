@@ -19,6 +19,7 @@ import { createPhase } from "garry/monitor/controls/phase";
 import { createRemarks } from "garry/monitor/controls/remarks";
 import { createRobotLevel } from "garry/monitor/controls/robot_level";
 import { createRunState } from "garry/monitor/controls/run_state";
+import { createWalking } from "garry/monitor/controls/walking";
 import { createLastStride } from "garry/monitor/last_stride";
 import { createReadiness } from "garry/monitor/readiness";
 import { RobotPanel } from "garry/monitor/robot";
@@ -107,6 +108,7 @@ const parts = [
   createGain(page),
   createRemarks(page),
   createNote(page),
+  createWalking(page),
   createFall(page),
   createStrideCharts(page),
   robot,

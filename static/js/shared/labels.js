@@ -25,9 +25,14 @@ const REMARKS = {
   fall_withdrawn: _("it was no fall"),
   fall_acknowledged: _("fall seen by a therapist"),
   stop_acknowledged: _("robot’s stop seen by a therapist"),
-  handrail: _("handrail"),
   verbal_cue: _("verbal cue"),
-  borg: _("Borg"),
+  borg: _("exertion"),
+  belt_speed: _("belt speed"),
+  weight_support: _("body-weight support"),
+  walking_aid: _("walking aid"),
+  orthosis: _("orthosis"),
+  handrail: _("handrail"),
+  helping_hand: _("therapist’s hand"),
 };
 const SEVERITIES = [_("not hurt"), _("slightly hurt"), _("moderately hurt"), _("badly hurt")];
 // Why a stride does not count (rehab/training/steps.py, rehab/gait/strides.py).

@@ -1,9 +1,12 @@
 // The words and the number keep the size that was promised: in degrees, as the patient sees them. What does not fit
 // beside them goes, in this order: the chart of strides, the emblem, the scene. Only where even words and number alone
-// are too large for the screen they become smaller; the page then says by how much (`data-short`).
+// are too large for the screen they become smaller; the page then says by how much (`data-short`). On a screen that
+// nobody measured no size is promised: the thermometer, which says most, stays there if that costs at most a quarter.
 
 const CHART = 1;
-const LEVELS = [0, CHART, 2, 3];
+const EMBLEM = 2;
+const LEVELS = [0, CHART, EMBLEM, 3];
+const WORTH = 0.75; // of the words' size: so much the thermometer may cost where no size is promised
 const LEAST = 0.1; // of the promised size
 const HALVINGS = 9; // of the search for what fits
 
@@ -62,12 +65,19 @@ export function createFitting(body, scene) {
     const shown = [...samples, words.textContent];
     const levels = isFeedback ? LEVELS.slice(column === "center" ? CHART : 0) : [0, CHART];
     let level;
+    let fits = LEAST;
     for (level of levels) {
       set(level, 1);
       if (!tooLarge(shown, number)) break;
+      if (level !== EMBLEM || body.dataset.pxPerMm) continue;
+      set(level, WORTH);
+      if (tooLarge(shown, number)) continue;
+      fits = WORTH;
+      break;
     }
+    set(level, 1);
     if (tooLarge(shown, number)) {
-      let [fits, not] = [LEAST, 1];
+      let not = 1;
       for (let i = 0; i < HALVINGS; i++) {
         const short = (fits + not) / 2;
         set(level, short);

@@ -14,7 +14,11 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "ready":
       return [
         fill(_("Hello, %(name)s."), { name }),
-        session.presence.source ? _("The sensor is ready.") : _("Waiting for the sensor."),
+        session.about?.own_goal
+          ? fill(_("Your goal: %(goal)s"), { goal: session.about.own_goal })
+          : session.presence.source
+            ? _("The sensor is ready.")
+            : _("Waiting for the sensor."),
       ];
     case "begin":
       return [_("Begin to walk."), _("The sensor is ready.")];

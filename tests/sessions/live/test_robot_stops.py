@@ -223,7 +223,7 @@ async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
 ASKED = [
     {"type": "change", "kind": "goal", "value": 3.5, "id": "x"},
     {"type": "change", "kind": "pause", "id": "x"},
-    {"type": "remark", "what": "pain", "id": "x"},
+    {"type": "remark", "what": "rest", "id": "x"},
 ]
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from rehab.people.models import User
 from rehab.sessions.alarms import OpenAlarms
+from rehab.sessions.conditions import CONDITIONS, planned_conditions
 from rehab.sessions.log import (
     ALARM_KINDS,
     Remark,
@@ -66,6 +67,7 @@ class SessionAggregate:
             self.fold.state = State.FINISHED  # imported, without a log
         self.marks: deque[dict[str, Any]] = deque(maxlen=MARKS)  # what a PT's chart points out
         self.alarms = OpenAlarms()
+        self.conditions = planned_conditions(session)  # how the patient walks now, by kind
 
     @classmethod
     def load(cls, session: TrainingSession) -> SessionAggregate:
@@ -76,6 +78,10 @@ class SessionAggregate:
         aggregate.add_marks(reversed(marked.order_by("-pk")[:MARKS]))
         alarms = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS)
         aggregate.alarms = OpenAlarms(alarms.order_by("pk"))
+        noted = SessionEvent.everywhere.filter(session=session, kind__in=CONDITIONS)
+        for kind, value in noted.order_by("pk").values_list("kind", "value"):
+            if value is not None:
+                aggregate.conditions[kind] = value
         return aggregate
 
     @classmethod
@@ -168,6 +174,8 @@ class SessionAggregate:
         )
         self._add_mark(event)
         self.alarms.apply(event)
+        if kind in CONDITIONS and value is not None:
+            self.conditions[kind.value] = value
         return event
 
     def summary(self, *, with_checkpoint: bool = False) -> Summary:

@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 
 from rehab.people.models import User
+from rehab.sessions.conditions import find_reported
 from rehab.sessions.events.change import source_message
 from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
@@ -79,6 +80,7 @@ class LiveSession:
             "session": session.pk,
             "nickname": session.patient.nickname,
             "language": session.patient.language,
+            "own_goal": session.patient.own_goal,
             "code": session.patient.code,
         }
         self._writer = writer
@@ -121,6 +123,9 @@ class LiveSession:
             fold, before, row.step, self.feed.audiences, received_at, live=not late
         )
         rows: list[Row] = [row]
+        for what, value in find_reported(self.aggregate.conditions, measurement.extra):
+            rows.append(self.aggregate.log_event(what, None, received_at, {}, value))
+            events.append(remark_event(fold, what.value, value))
         changed = before.changed_by_step(fold)
         if fold.following.moved:
             followed = RuleEntry.GOAL_FOLLOWED
@@ -271,6 +276,7 @@ class LiveSession:
                 robot_stopped=self.robot_orders.is_stopped,
                 marks=self._marks(),
                 alarms=self.aggregate.alarms,
+                conditions=self.aggregate.conditions,
             )
             shown["now"] = now.timestamp()
             subscriber = Subscriber(self.feed, audience, send, write)
@@ -294,4 +300,4 @@ def _ago_s(moment: datetime | None, now: datetime) -> float | None:
 
 
 def _for_patient(about: Message) -> Message:
-    return {name: about[name] for name in ("session", "nickname", "language")}
+    return {name: about[name] for name in ("session", "nickname", "language", "own_goal")}

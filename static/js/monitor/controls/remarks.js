@@ -1,4 +1,4 @@
-// What the PT notes with one tap, and the exertion (Borg), which is asked for.
+// What the PT notes with one tap; exertion and pain are asked for.
 
 import { _, fill } from "garry/shared/language";
 import { describe } from "garry/monitor/annotations";
@@ -6,11 +6,16 @@ import { openDialog } from "garry/monitor/controls/open_dialog";
 import { annotationOf } from "garry/monitor/state";
 
 export function createRemarks({ announce, onPress, remark }) {
-  const exertion = document.getElementById("exertion");
+  const rating = document.getElementById("rating");
+  const questions = [...rating.querySelectorAll("[data-rating]")];
 
-  onPress("[data-remark]", ({ dataset }) => {
-    if (dataset.remark === "borg") openDialog(exertion, (felt) => felt && remark("borg", Number(felt)));
-    else remark(dataset.remark);
+  onPress("[data-remark]", ({ dataset: { remark: what } }) => {
+    if (questions.every(({ dataset }) => dataset.rating !== what)) {
+      remark(what);
+      return;
+    }
+    for (const each of questions) each.hidden = each.dataset.rating !== what;
+    openDialog(rating, (felt) => felt && remark(what, Number(felt)));
   });
 
   return {

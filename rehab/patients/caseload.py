@@ -1,0 +1,161 @@
+"""The patients of a clinic at a glance: who comes, who is stuck, who improves, who is due."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date, datetime, timedelta
+from enum import StrEnum
+
+from django.utils.functional import Promise
+from django.utils.translation import gettext_lazy as _
+
+from rehab.patients.visits import Visit
+from rehab.people.models import Patient, User
+from rehab.sessions.formatting import clinic_time, format_number
+from rehab.sessions.models import TrainingSession
+
+LOOKED_BACK = timedelta(weeks=26)
+COMING = timedelta(weeks=4)
+COMPARED = 3  # the newest sessions
+UNMOVED = 0.02  # up to which change of the goal it has not moved
+IMPROVED = 0.05  # from which change of the goal on a patient has improved
+OVERDUE = timedelta(days=7)  # without a session and without a planned visit
+
+
+class Flag(StrEnum):
+    """What a therapist has to think of."""
+
+    DUE = "due"
+    STUCK = "stuck"
+    IMPROVING = "improving"
+    NEW = "new"
+
+
+FLAGS: dict[str, str | Promise] = {
+    Flag.DUE: _("due"),
+    Flag.STUCK: _("stuck"),
+    Flag.IMPROVING: _("improving"),
+    Flag.NEW: _("new"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A session that counts: its day, its goal at the end, and which way that measure is better."""
+
+    day: date
+    goal: float | None
+    measure: int
+    unit: str
+    higher_is_better: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A patient of the list.
+
+    ``walks``: the newest sessions, the newest first; ``recent``: how many of the last four weeks;
+    ``missed``: the last planned day on which the patient did not walk, if none was walked since.
+    """
+
+    patient: Patient
+    walks: Sequence[Walk]
+    recent: int
+    next_visit: Visit | None
+    missed: date | None
+    flags: tuple[Flag, ...]
+
+    @property
+    def goals(self) -> str:
+        """How the goal went over the newest sessions of the present measure, as text."""
+        goals = [walk.goal for walk in same_measure(self.walks) if walk.goal is not None]
+        if not goals:
+            return ""
+        shown = [format_number(goal) for goal in reversed(goals)]
+        kept = [goal for place, goal in enumerate(shown) if not place or shown[place - 1] != goal]
+        return f"{' → '.join(kept)} {self.walks[0].unit}"
+
+
+def same_measure(walks: Sequence[Walk]) -> list[Walk]:
+    """Return the newest walks that train what the newest one trains, as many as are compared."""
+    newest = walks[:COMPARED]
+    return [walk for walk in newest if walk.measure == newest[0].measure]
+
+
+def judge(
+    walks: Sequence[Walk], next_day: date | None, missed: date | None, today: date
+) -> tuple[Flag, ...]:
+    """Return the flags of a patient.
+
+    Parameters
+    ----------
+    walks
+        The newest sessions, the newest first.
+    next_day, missed
+        The next planned visit; a planned day that passed without a walk on it or since.
+    today
+        By the clinic's clock.
+    """
+    flags = []
+    is_away = not walks or walks[0].day <= today - OVERDUE
+    if missed is not None or (next_day is None and is_away):
+        flags.append(Flag.DUE)
+    compared = same_measure(walks)
+    goals = [walk.goal for walk in compared if walk.goal]
+    if not walks:
+        flags.append(Flag.NEW)
+    if len(goals) == COMPARED:
+        change = goals[0] / goals[-1] if compared[0].higher_is_better else goals[-1] / goals[0]
+        if change <= 1 + UNMOVED:
+            flags.append(Flag.STUCK)
+        elif change >= 1 + IMPROVED:
+            flags.append(Flag.IMPROVING)
+    return tuple(flags)
+
+
+def load_caseload(user: User, now: datetime) -> list[Case]:
+    """Return the patients whose program goes on: those due first, then by their last session.
+
+    ``now`` is in the clinic's time zone. A simulated patient is none.
+    """
+    today = now.date()
+    patients = Patient.objects.visible_to(user).filter(ended_at=None, simulated=False)
+    sessions = TrainingSession.objects.visible_to(user).filter(
+        patient__in=patients, excluded=False, active_s__gt=0, created_at__gte=now - LOOKED_BACK
+    )
+    walks: defaultdict[int, list[Walk]] = defaultdict(list)
+    for one in sessions.select_related("measure", "clinic").defer("plan").order_by("-created_at"):
+        measure = one.measure
+        day = clinic_time(one.began_at, one.clinic).date()
+        walks[one.patient_id].append(
+            Walk(day, one.goal, measure.pk, measure.unit, measure.higher_is_better)
+        )
+    visits: defaultdict[int, list[Visit]] = defaultdict(list)
+    planned = Visit.objects.visible_to(user).filter(day__gte=today - COMING)
+    for visit in planned.order_by("day", "at"):
+        visits[visit.patient_id].append(visit)
+    cases = [_to_case(each, walks[each.pk], visits[each.pk], today) for each in patients]
+    return sorted(
+        cases,
+        key=lambda case: (
+            Flag.DUE not in case.flags,
+            case.walks[0].day if case.walks else date.min,
+            case.patient.nickname,
+        ),
+    )
+
+
+def _to_case(patient: Patient, walks: Sequence[Walk], visits: Sequence[Visit], today: date) -> Case:
+    last = walks[0].day if walks else date.min
+    coming = next((visit for visit in visits if visit.day >= today), None)
+    missed = next((v.day for v in reversed(visits) if last < v.day < today), None)
+    return Case(
+        patient,
+        walks,
+        sum(walk.day > today - COMING for walk in walks),
+        coming,
+        missed,
+        judge(walks, coming.day if coming else None, missed, today),
+    )

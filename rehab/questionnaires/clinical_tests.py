@@ -1,0 +1,248 @@
+"""Standard tests of walking and balance: what each measures, how it is done, what is usual.
+
+One definition for the clinic's pages, exports and studies. Wordings are GARRY's own; where norms
+and least changes are from: docs/reference/questionnaires.md#walking-tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import isfinite
+
+from rehab.training.measures import InvalidSetting
+from robot.marking import gettext_noop
+
+LAP_TEST_S = 360.0  # six minutes
+
+
+class Way(StrEnum):
+    """How a test is taken: with a stopwatch, over a timed distance, by laps, or as a score."""
+
+    STOPWATCH = "stopwatch"
+    SPEED = "speed"
+    LAPS = "laps"
+    SCORE = "score"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClinicalTest:
+    """A standard test.
+
+    Attributes
+    ----------
+    slug, label, unit, places
+        For programs and for people; of its result ("" for points), with so many decimals.
+    least, most
+        Results that can be.
+    higher_is_better
+        Whether a higher result is the better one.
+    way
+        How it is taken.
+    steps
+        What to do, a sentence each.
+    norms
+        From an age [years] on, the lowest and highest mean of healthy men and women.
+    least_change
+        From which change on it is more than chance, or matters to patients; None: unknown.
+    levels
+        The words of each score, from 0; empty where a score is a sum.
+    loinc
+        Its code; "" where LOINC has none that fits.
+    """
+
+    slug: str
+    label: str
+    unit: str
+    places: int
+    least: float
+    most: float
+    higher_is_better: bool
+    way: Way
+    steps: Sequence[str]
+    norms: Sequence[tuple[int, float, float]] = ()
+    least_change: float | None = None
+    levels: Sequence[str] = ()
+    loinc: str = ""
+
+    def check(self, value: float) -> None:
+        """Raise InvalidSetting for a result that this test does not have."""
+        whole = self.way is not Way.SCORE or (isfinite(value) and value == int(value))
+        if not (whole and self.least <= value <= self.most):
+            raise InvalidSetting(
+                "Results of this test lie between {least:g} and {most:g} {unit}. Check what was "
+                "measured.",
+                least=self.least,
+                most=self.most,
+                unit=self.unit,
+            )
+
+    def find_norm(self, age: int | None) -> tuple[float, float] | None:
+        """Return the usual range at an age [years]; None where none is known."""
+        if age is None:
+            return None
+        fitting = [(low, high) for start, low, high in self.norms if start <= age]
+        return fitting[-1] if fitting else None
+
+    def judge(self, before: float, now: float) -> int:
+        """Return 1 for a change that counts to the better, -1 to the worse, 0 for none."""
+        change = now - before if self.higher_is_better else before - now
+        enough = 0.0 if self.least_change is None else self.least_change
+        # Results are rounded: 0.16 m/s, measured as 0.78 and 0.94, are a change of 0.16.
+        if abs(change) < enough - 10 ** -(self.places + 3) or change == 0:
+            return 0
+        return 1 if change > 0 else -1
+
+
+WALK_SPEED = (
+    gettext_noop("Mark ten meters, and two more before and behind them."),
+    gettext_noop("Start the time when the first foot crosses the first mark."),
+    gettext_noop("Stop it when the first foot crosses the last mark."),
+    gettext_noop("Walking aid and orthosis as usual; walk beside, never ahead."),
+)
+# Bohannon & Williams Andrews 2011; Steffen 2002; Bohannon 2006.
+CLINICAL_TESTS: dict[str, ClinicalTest] = {
+    test.slug: test
+    for test in (
+        ClinicalTest(
+            slug="10mwt",
+            label=gettext_noop("10-meter walk, comfortable"),
+            unit="m/s",
+            places=2,
+            least=0.01,
+            most=4.0,
+            higher_is_better=True,
+            way=Way.SPEED,
+            steps=(*WALK_SPEED, gettext_noop("Say: “Walk at your own comfortable speed.”")),
+            norms=(
+                (20, 1.34, 1.36),
+                (30, 1.34, 1.43),
+                (40, 1.39, 1.43),
+                (50, 1.31, 1.43),
+                (60, 1.24, 1.34),
+                (70, 1.13, 1.26),
+                (80, 0.94, 0.97),
+            ),
+            least_change=0.16,
+        ),
+        ClinicalTest(
+            slug="10mwt_fast",
+            label=gettext_noop("10-meter walk, fast"),
+            unit="m/s",
+            places=2,
+            least=0.01,
+            most=6.0,
+            higher_is_better=True,
+            way=Way.SPEED,
+            steps=(*WALK_SPEED, gettext_noop("Say: “Walk as fast as you safely can.”")),
+        ),
+        ClinicalTest(
+            slug="6mwt",
+            label=gettext_noop("6-minute walk"),
+            unit="m",
+            places=0,
+            least=0,
+            most=1200,
+            higher_is_better=True,
+            way=Way.LAPS,
+            steps=(
+                gettext_noop(
+                    "A straight walkway, 30 meters if there is one, with a cone at each end."
+                ),
+                gettext_noop(
+                    "The patient walks as far as possible and may rest; the time runs on."
+                ),
+                gettext_noop("Tap a lap at each turn. Say each minute how much time is left."),
+                gettext_noop("At six minutes measure the meters since the last turn."),
+            ),
+            norms=((60, 538, 572), (70, 471, 527), (80, 392, 417)),
+            least_change=34.4,
+            loinc="64098-7",
+        ),
+        ClinicalTest(
+            slug="tug",
+            label=gettext_noop("Timed Up and Go"),
+            unit="s",
+            places=1,
+            least=2,
+            most=600,
+            higher_is_better=False,
+            way=Way.STOPWATCH,
+            steps=(
+                gettext_noop("A chair with arms, about 46 cm high; a mark three meters ahead."),
+                gettext_noop(
+                    "Start at “go”: stand up, walk to the mark, turn, walk back, sit down."
+                ),
+                gettext_noop(
+                    "Stop when the back touches the chair. One trial before does not count."
+                ),
+            ),
+            norms=((60, 8.1, 8.1), (70, 9.2, 9.2), (80, 11.3, 11.3)),
+            least_change=2.9,
+            loinc="89423-8",
+        ),
+        ClinicalTest(
+            slug="5sts",
+            label=gettext_noop("Five times sit to stand"),
+            unit="s",
+            places=1,
+            least=2,
+            most=300,
+            higher_is_better=False,
+            way=Way.STOPWATCH,
+            steps=(
+                gettext_noop("A chair about 43 cm high, its back against the wall; arms crossed."),
+                gettext_noop(
+                    "Start at “go”: stand up fully and sit down, five times, as fast as is safe."
+                ),
+                gettext_noop("Stop when the fifth stand is complete."),
+            ),
+            norms=((60, 11.4, 11.4), (70, 12.6, 12.6), (80, 14.8, 14.8)),
+        ),
+        ClinicalTest(
+            slug="fac",
+            label=gettext_noop("Functional ambulation (FAC)"),
+            unit="",
+            places=0,
+            least=0,
+            most=5,
+            higher_is_better=True,
+            way=Way.SCORE,
+            steps=(
+                gettext_noop(
+                    "How much help of a person the patient needs to walk; aids are allowed."
+                ),
+            ),
+            least_change=1,
+            levels=(
+                gettext_noop("Cannot walk, or needs two people"),
+                gettext_noop("Needs one person all the time, who carries weight"),
+                gettext_noop("Needs one person’s touch now and then, for balance"),
+                gettext_noop("Needs somebody beside, without touch"),
+                gettext_noop("Walks alone on level ground"),
+                gettext_noop("Walks alone everywhere, also on stairs"),
+            ),
+        ),
+        ClinicalTest(
+            slug="berg",
+            label="Berg Balance Scale",
+            unit="",
+            places=0,
+            least=0,
+            most=56,
+            higher_is_better=True,
+            way=Way.SCORE,
+            steps=(gettext_noop("Use the clinic’s own form, and enter its total."),),
+            norms=((60, 55, 55), (70, 53, 54), (80, 50, 53)),
+            least_change=5,
+        ),
+    )
+}
+
+
+def to_speed(meters: float, seconds: float) -> float:
+    """Return a speed [m/s]. Raises InvalidSetting for times and distances that are none."""
+    if not (isfinite(meters) and isfinite(seconds) and meters > 0 and seconds > 0):
+        raise InvalidSetting("Give the distance in meters and the time in seconds.")
+    return meters / seconds

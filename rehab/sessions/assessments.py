@@ -1,0 +1,174 @@
+"""Results of standard tests (`questionnaires.clinical_tests`) of a patient, and their course."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import ClassVar
+
+from django.db import models
+from django.utils import timezone
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.consent.models import PatientScope
+from rehab.people.field_policy import personal_fields, retained
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.scope import ClinicModel
+from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
+from rehab.sessions.formatting import MISSING, clinic_time, format_number
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
+
+SPARK = (120, 32)  # the drawing of a course, in its own units
+
+
+class Assessment(ClinicModel):
+    """A result of a standard test. A wrong one is struck out, and stays stored."""
+
+    scope = PatientScope(clinic="clinic", tells_condition=False)
+
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="assessments", verbose_name=_("clinic")
+    )
+    patient = models.ForeignKey(
+        Patient, on_delete=models.PROTECT, related_name="assessments", verbose_name=_("patient")
+    )
+    test = models.CharField(
+        _("test"),
+        max_length=16,
+        choices=[(test.slug, _(test.label)) for test in CLINICAL_TESTS.values()],
+    )
+    value = models.FloatField(_("result"))
+    device = models.CharField(_("walked with"), max_length=MAX_DEVICE_LETTERS, blank=True)
+    at = models.DateTimeField(_("when"), default=timezone.now)
+    by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+    )
+    struck_at = models.DateTimeField(_("struck out"), null=True, editable=False)
+
+    personal = personal_fields(
+        {
+            "clinic patient test value device at struck_at": retained(
+                "a measurement under a pseudonym", shown=True, research=True
+            ),
+            "by": retained("staff", shown=True, research=False),
+        }
+    )
+
+    class Meta(ClinicModel.Meta):
+        verbose_name = _("test result")
+        verbose_name_plural = _("test results")
+        ordering: ClassVar = ["at", "pk"]
+        indexes: ClassVar = [
+            models.Index(fields=["patient", "test", "at"], name="assessment_by_patient")
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.get_test_display()}: {format_result(self.definition, self.value)}"
+
+    @property
+    def definition(self) -> ClinicalTest:
+        """What it is a result of."""
+        return CLINICAL_TESTS[self.test]
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A test of one patient with its results, oldest first; without those struck out."""
+
+    test: ClinicalTest
+    results: Sequence[Assessment]
+    norm: tuple[float, float] | None
+
+    @property
+    def last(self) -> Assessment | None:
+        """The newest result."""
+        return self.results[-1] if self.results else None
+
+    @property
+    def verdict(self) -> int:
+        """Whether the newest result differs from the first: 1 better, -1 worse, 0 no change."""
+        if len(self.results) < 2:
+            return 0
+        return self.test.judge(self.results[0].value, self.results[-1].value)
+
+    @property
+    def summary(self) -> str:
+        """The newest result with its unit, and the first one if there was one before."""
+        if self.last is None:
+            return MISSING
+        text = format_result(self.test, self.last.value)
+        if len(self.results) < 2:
+            return text
+        return gettext("%(now)s, at first %(first)s") % {
+            "now": text,
+            "first": format_result(self.test, self.results[0].value),
+        }
+
+    @property
+    def usual(self) -> str:
+        """The usual range at the patient's age as text; empty where none is known."""
+        if self.norm is None:
+            return ""
+        low, high = (format_number(end, self.test.places) for end in self.norm)
+        return f"{low if low == high else f'{low}–{high}'} {self.test.unit}".rstrip()
+
+    @property
+    def spark(self) -> str:
+        """The points of its line in a drawing of the size `SPARK`, better results higher."""
+        values = [one.value for one in self.results]
+        low, high = min(values, default=0.0), max(values, default=0.0)
+        span = (high - low) or 1.0
+        width, height = SPARK
+        points = []
+        for place, value in enumerate(values):
+            share = (value - low) / span if high > low else 0.5
+            share = share if self.test.higher_is_better else 1 - share
+            x = 4 + place * (width - 8) / max(1, len(values) - 1)
+            points.append(f"{x:.1f},{4 + (1 - share) * (height - 8):.1f}")
+        return " ".join(points)
+
+
+def format_result(test: ClinicalTest, value: float) -> str:
+    """Return a result as text with its unit; of a score the most that it can be."""
+    number = format_number(value, test.places)
+    return f"{number} {test.unit}" if test.unit else f"{number} / {format_number(test.most, 0)}"
+
+
+def load_courses(user: User, patient: Patient) -> list[Course]:
+    """Return every test with a patient's results, in the order of the registry."""
+    found: defaultdict[str, list[Assessment]] = defaultdict(list)
+    rows = Assessment.objects.visible_to(user).filter(patient=patient, struck_at=None)
+    for row in rows.order_by("at", "pk"):
+        found[row.test].append(row)
+    age = patient.birth_year and clinic_time(timezone.now(), patient.clinic).year - (
+        patient.birth_year
+    )
+    return [Course(test, found[slug], test.find_norm(age)) for slug, test in CLINICAL_TESTS.items()]
+
+
+def assessments_with(user: User, session: TrainingSession) -> models.QuerySet[Assessment]:
+    """Return the results that go with a session: from its day on, until the next session's day.
+
+    So each result of a patient goes with one session; those before the first one go with it.
+    """
+    sessions = TrainingSession.objects.visible_to(user).filter(patient=session.patient_id)
+    others = sessions.exclude(pk=session.pk)
+    rows = Assessment.objects.visible_to(user).filter(patient=session.patient_id, struck_at=None)
+    if others.filter(created_at__lte=session.created_at).exists():
+        rows = rows.filter(at__gte=_day_of(session))
+    later = others.filter(created_at__gt=session.created_at).order_by("created_at").first()
+    if later is not None:
+        rows = rows.filter(at__lt=_day_of(later))
+    return rows.order_by("at", "pk")
+
+
+def _day_of(session: TrainingSession) -> object:
+    """Return the midnight before a session, by the clinic's clock."""
+    began = clinic_time(session.created_at, session.clinic)
+    return began - timedelta(
+        hours=began.hour, minutes=began.minute, seconds=began.second, microseconds=began.microsecond
+    )

@@ -1,0 +1,72 @@
+"""The caseload: who is due, stuck, improving or new."""
+
+from __future__ import annotations
+
+from datetime import date, timedelta
+
+import pytest
+
+from rehab.patients.caseload import Walk, judge, load_caseload
+from rehab.patients.visits import Visit, plan_visit
+from rehab.people.roles import Role
+from rehab.sessions.formatting import clinic_time
+from rehab.sessions.models import TrainingSession
+from tests.support.walks import HIT, walk
+from tests.support.world import NOW, build_world, client_of
+
+TODAY = date(2026, 11, 21)
+
+
+def walks(*goals, days_ago=1, higher=True, measure=1):
+    return [
+        Walk(TODAY - timedelta(days=days_ago + place), goal, measure, "W/kg", higher)
+        for place, goal in enumerate(goals)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("newest_first", "next_day", "missed", "flags"),
+    [
+        ([], TODAY, None, ["new"]),
+        ([], None, None, ["due", "new"]),
+        (walks(4.0, 4.0, 4.0), None, None, ["stuck"]),
+        (walks(3.8, 3.9, 4.0), None, None, ["stuck"]),  # it went down
+        (walks(4.1, 4.0, 4.0), None, None, []),
+        (walks(4.2, 4.1, 4.0), None, None, ["improving"]),
+        (walks(4.0, 4.0), None, None, []),  # too few to say
+        (walks(None, 4.0, 4.0), None, None, []),
+        (walks(0.9, 1.0, 1.1, higher=False), None, None, ["improving"]),
+        (walks(4.0, 4.0) + walks(4.0, measure=2), None, None, []),
+        (walks(4.2, 4.1, 4.0, days_ago=7), None, None, ["due", "improving"]),
+        (walks(4.2, 4.1, 4.0, days_ago=7), TODAY, None, ["improving"]),
+        (walks(4.2, 4.1, 4.0, days_ago=3), TODAY, TODAY - timedelta(1), ["due", "improving"]),
+    ],
+)
+def test_flags(newest_first, next_day, missed, flags):
+    assert list(judge(newest_first, next_day, missed, TODAY)) == flags
+
+
+@pytest.mark.django_db
+def test_the_page_lists_patients_of_this_clinic_alone(world):
+    other = build_world("cobalt")
+    TrainingSession.everywhere.filter(patient=world.patient).update(
+        simulated=False, active_s=60, created_at=NOW - timedelta(9), started_at=None
+    )
+    Visit.everywhere.all().delete()
+    now = clinic_time(NOW, world.clinic)
+    plan_visit(world.patient, now.date() - timedelta(2), None)
+    (case,) = [
+        case for case in load_caseload(world.people[Role.PT], now) if case.patient == world.patient
+    ]
+    assert case.missed == now.date() - timedelta(2)
+    page = client_of(world).get("/caseload/?only=due").content.decode()
+    assert world.patient.nickname in page
+    assert "did not come" in page
+    assert other.patient.nickname not in page
+    walk(world.patient, "positive", [HIT, HIT])
+    TrainingSession.everywhere.filter(patient=world.patient).update(simulated=False, active_s=60)
+    (case,) = [
+        case for case in load_caseload(world.people[Role.PT], now) if case.patient == world.patient
+    ]
+    assert case.missed is None
+    assert client_of(world).get("/caseload/?only=nonsense").status_code == 200

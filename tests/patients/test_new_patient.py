@@ -1,0 +1,30 @@
+"""New patient: the words are shown before they are agreed to, and the language is the clinic's."""
+
+from __future__ import annotations
+
+import pytest
+
+from rehab.people.consent.services import current_text
+from rehab.people.models import Clinic, Patient
+from tests.support.world import client_of
+
+pytestmark = pytest.mark.django_db
+
+
+def test_the_words_are_shown_before_they_are_agreed_to(world):
+    page = client_of(world).get("/patients/new/").content.decode()
+    words = current_text(world.clinic).text.split("\n")[0]
+    assert page.index(words[:40]) < page.index('name="agrees"')
+
+
+@pytest.mark.parametrize(("chosen", "stored"), [({}, "de"), ({"language": "fr"}, "fr")])
+def test_a_new_patient_reads_the_clinics_language_or_the_chosen_one(world, chosen, stored):
+    Clinic.everywhere.filter(pk=world.clinic.pk).update(language="de")
+    data = {"nickname": "Mia", "code": "M-1", "paretic_side": "left"} | chosen
+    client = client_of(world)
+    client.post("/patients/new/", data)
+    patient = Patient.everywhere.get(code="M-1")
+    assert patient.language == stored
+    client.post(f"/patients/{patient.pk}/details/", data | {"language": ""})
+    patient.refresh_from_db()
+    assert patient.language == stored

@@ -1,0 +1,140 @@
+"""Standard tests on their pages: taken, listed with their course, struck out, exported once."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+
+from rehab.exports.research.fhir import make_bundle
+from rehab.people.roles import Role
+from rehab.sessions.assessments import Assessment, assessments_with, load_courses
+from tests.support.walks import HIT, make_session, walk
+from tests.support.world import NOW, build_world, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world(world):
+    Assessment.everywhere.all().delete()
+    return world
+
+
+def take(world, slug, **data):
+    return client_of(world).post(f"/patients/{world.patient.pk}/tests/{slug}/", data, follow=True)
+
+
+@pytest.mark.parametrize(
+    ("slug", "data", "value"),
+    [
+        ("10mwt", {"meters": "10", "measured": "12,5"}, 0.8),  # with a comma, as many write
+        ("10mwt", {"meters": "6", "measured": "7.5"}, 0.8),
+        ("6mwt", {"measured": "231"}, 231),
+        ("tug", {"measured": "17.3", "device": "cane"}, 17.3),
+        ("fac", {"measured": "3"}, 3),
+        ("berg", {"measured": "41"}, 41),
+    ],
+)
+def test_a_result_is_stored_as_measured(world, slug, data, value):
+    page = take(world, slug, **data)
+    assert page.redirect_chain[-1][0] == f"/patients/{world.patient.pk}/tests/"
+    (row,) = Assessment.everywhere.all()
+    assert row.test == slug
+    assert row.value == pytest.approx(value)
+    assert (row.device, row.by) == (data.get("device", ""), world.people[Role.PT])
+
+
+@pytest.mark.parametrize(
+    ("slug", "data", "cure"),
+    [
+        ("10mwt", {"meters": "10", "measured": "0.6"}, "Check what was measured"),  # 17 m/s
+        ("10mwt", {"meters": "", "measured": "9"}, "required"),
+        ("tug", {"measured": "0.4"}, "Give 2 to 600 s."),
+        ("tug", {"measured": "fast"}, "Enter a number"),
+        ("fac", {"measured": "7"}, "valid choice"),
+        ("berg", {"measured": "40.5"}, "Check what was measured"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_the_cure(world, slug, data, cure):
+    page = take(world, slug, **data)
+    assert page.status_code == 200
+    assert cure in page.content.decode()
+    assert not Assessment.everywhere.exists()
+
+
+def test_a_course_leaves_out_what_was_struck_out(world):
+    for seconds in ("31", "99", "28"):
+        take(world, "tug", measured=seconds)
+    wrong = Assessment.everywhere.get(value=99)
+    client = client_of(world)
+    client.post(f"/patients/{world.patient.pk}/tests/strike-out/", {"result": wrong.pk})
+    (course,) = [c for c in load_courses(world.people[Role.PT], world.patient) if c.results]
+    assert (course.summary, course.verdict) == ("28.0 s, at first 31.0 s", 1)
+    assert course.spark == "4.0,28.0 116.0,4.0"
+    wrong.refresh_from_db()
+    assert wrong.struck_at is not None
+    for address in ("sessions", "tests"):
+        page = client.get(f"/patients/{world.patient.pk}/{address}/").content.decode()
+        assert "28.0 s, at first 31.0 s" in page
+    assert client.get(f"/patients/{world.patient.pk}/tests/joy/").status_code == 404
+
+
+def test_another_clinic_neither_sees_nor_strikes_out(world):
+    take(world, "tug", measured="31")
+    row, other = Assessment.everywhere.get(), build_world("cobalt")
+    stranger = client_of(other)
+    address = f"/patients/{world.patient.pk}/tests/"
+    assert stranger.get(address).status_code == 404
+    assert stranger.post(f"{address}tug/", {"measured": "9"}).status_code == 404
+    assert stranger.post(f"{address}strike-out/", {"result": row.pk}).status_code == 404
+    own = f"/patients/{other.patient.pk}/tests/strike-out/"
+    assert stranger.post(own, {"result": row.pk}).status_code == 302
+    row.refresh_from_db()
+    assert row.struck_at is None
+    assert client_of(world, Role.RESEARCHER).get(address).status_code == 403
+
+
+def test_each_result_goes_with_one_session(world):
+    type(world.session).everywhere.filter(patient=world.patient).update(
+        created_at=NOW - timedelta(days=20)
+    )
+    first = world.session
+    first.refresh_from_db()
+    later = make_session(world.patient)
+    type(later).everywhere.filter(pk=later.pk).update(created_at=NOW - timedelta(days=5))
+    later.refresh_from_db()
+    for days_ago in (30, 20, 12, 5, 0):
+        Assessment.everywhere.create(
+            clinic=world.clinic,
+            patient=world.patient,
+            test="6mwt",
+            value=200 + days_ago,
+            at=NOW - timedelta(days=days_ago, hours=1),
+        )
+    values = [
+        [row.value for row in assessments_with(world.people[Role.PT], session)]
+        for session in (first, later)
+    ]
+    assert values == [[230, 220, 212], [205, 200]]
+
+
+def test_fhir_has_it_with_its_loinc_code(world):
+    session = walk(world.patient, "positive", [HIT, HIT])
+    for test, value in (("6mwt", 231), ("berg", 41)):
+        Assessment.everywhere.create(
+            clinic=world.clinic, patient=world.patient, test=test, value=value, at=NOW
+        )
+    bundle = make_bundle(world.people[Role.PT], session, timedelta())
+    found = {
+        code["code"]: entry["resource"]
+        for entry in bundle["entry"]
+        for code in entry["resource"].get("code", {}).get("coding", ())
+    }
+    assert found["64098-7"]["valueQuantity"] == {
+        "value": 231,
+        "unit": "m",
+        "system": "http://unitsofmeasure.org",
+        "code": "m",
+    }
+    assert [code["system"] for code in found["berg"]["code"]["coding"]] == ["urn:garry:test"]
