@@ -78,6 +78,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "SessionMetric": _VIEWED,
     "RobotIncident": _VIEWED,
     "ClinicOwner": {},
+    "ClinicMove": {},
+    "SessionSeal": {},
     "SessionCorrection": _VIEWED | dict.fromkeys(_CARERS, Right.VIEW | Right.ADD),
     # Changed by their pages alone, which know how far a study is.
     "Study": _VIEWED,
@@ -88,6 +90,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Allocation": _VIEWED,
     "StudyVisit": _VIEWED,
     "StudyEvent": _VIEWED_BY_CARERS,
+    "Screening": _VIEWED_BY_CARERS,
+    "AdverseEvent": _VIEWED_BY_CARERS,
     "PowerRun": dict.fromkeys((Role.LEAD, Role.RESEARCHER), Right.VIEW),
     "Leaderboard": _SHARED,
     "BoardChange": {},

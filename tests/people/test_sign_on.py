@@ -34,7 +34,7 @@ def hospital(settings, monkeypatch):
 
 @pytest.fixture
 def linked(world) -> User:
-    user = world.people[Role.PT]
+    user: User = world.people[Role.PT]
     user.subject = "4711"
     user.save()
     return user

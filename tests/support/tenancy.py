@@ -32,7 +32,7 @@ from tests.support.world import Actor, World, all_actors, scoped_models
 
 # What a role reads in the pages of its own clinic, by the marks of tests/support/world.py.
 # Researchers see no patient; a host sees clinics and accounts and nothing else.
-HOST_SEES = {"Clinic", "User"}
+HOST_SEES = {"Clinic", "SignOnGroup", "User"}
 
 MARK = re.compile("zq[a-z]+?qz")  # of tests/support/world.py
 
@@ -165,6 +165,10 @@ def fill(
                 type_id = ContentType.objects.get_for_model(kind).pk
                 kwargs = {"content_type_id": type_id, "object_id": row.pk}
                 yield Route(name, reverse(name, kwargs=kwargs), world.name, kind)
+        elif wanted == {"slug", "patient_id"}:  # of a clinical test
+            for slug in ("10mwt", "fac"):
+                kwargs = {"slug": slug, "patient_id": world.patient.pk}
+                yield Route(name, reverse(name, kwargs=kwargs), world.name, Patient)
         elif len(wanted) == 1 and (parameter := min(wanted)) in KEYS:
             target, by = KEYS[parameter]
             for row in world.rows_of(target):
