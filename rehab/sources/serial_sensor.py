@@ -28,7 +28,7 @@ RETRY_S = 1.0
 READ_S = 0.05
 WRAP_US = 2**32
 MAX_FRAME = 1024  # bytes
-_FRAME = re.compile(rb"\$([HD]),([^*$]*)\*([0-9A-Fa-f]{2})\s*")
+_FRAME = re.compile(rb"\$([HDT]),([^*$]*)\*([0-9A-Fa-f]{2})\s*")
 
 
 class Port(Protocol):
@@ -47,10 +47,10 @@ class SensorFrameReader:
 
     def __init__(self) -> None:
         self.damaged = 0
+        self.times: list[tuple[int, float]] = []  # answers to questions for the sensor's time
         self._partial = b""
         self._names: list[str] = []
         self._last_us: int | None = None
-        self._turns = 0
 
     def read(self, data: bytes) -> list[Mapping[str, Cell]]:
         """Return the rows of all frames that these bytes complete.
@@ -81,6 +81,10 @@ class SensorFrameReader:
         if frame[1] == b"H":
             self._names = cells
             return None
+        if frame[1] == b"T" and len(cells) == 2 and all(one.isdecimal() for one in cells):
+            # Only samples move the count: an answer may overtake them.
+            self.times.append((int(cells[0]), unwrap_us(int(cells[1]), self._last_us) / 1e6))
+            return None
         if not self._names:
             return None
         if len(cells) != len(self._names) + 1 or not cells[0].isdecimal():
@@ -89,15 +93,17 @@ class SensorFrameReader:
             numbers = [float(cell) if cell else None for cell in cells[1:]]
         except ValueError:
             raise BadRow("numbers") from None
-        time_s = self._unwrap(int(cells[0]) % WRAP_US) / 1e6
-        return {"time_s": time_s} | dict(zip(self._names, numbers, strict=True))
+        self._last_us = unwrap_us(int(cells[0]), self._last_us)
+        return {"time_s": self._last_us / 1e6} | dict(zip(self._names, numbers, strict=True))
 
-    def _unwrap(self, now_us: int) -> int:
-        """Return microseconds that go on where the device's counter wraps around."""
-        if self._last_us is not None and self._last_us - now_us > WRAP_US // 2:
-            self._turns += 1
-        self._last_us = now_us
-        return self._turns * WRAP_US + now_us
+
+def unwrap_us(counted_us: int, last_us: int | None) -> int:
+    """Return microseconds that go on where a counter of 32 bits wraps around, next to the last."""
+    counted_us %= WRAP_US
+    if last_us is None:
+        return counted_us
+    ahead_us = (counted_us - last_us) % WRAP_US
+    return last_us + (ahead_us - WRAP_US if ahead_us > WRAP_US // 2 else ahead_us)
 
 
 def compute_checksum(data: bytes) -> int:

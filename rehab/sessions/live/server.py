@@ -17,6 +17,7 @@ from twisted.internet import defer, reactor
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.encryption import encrypt
 from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
@@ -72,6 +73,7 @@ class LiveServer(Server):  # type: ignore[misc]
         }
         super().__init__(*args, **options)
         self._on_ready = on_ready
+        self._tasks: list[asyncio.Task[None]] = []
 
     def run(self) -> None:
         """Serve until stopped."""
@@ -100,13 +102,17 @@ class LiveServer(Server):  # type: ignore[misc]
         loop.call_soon(lambda: self._hold(loop.create_task(self._start())))
 
     def _hold(self, task: asyncio.Task[None]) -> None:
-        self._starting = task  # tasks without a reference may be collected
+        self._tasks.append(task)  # those without a reference may be collected
 
     async def _start(self) -> None:
         process.tune_interpreter()
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
+        if not settings.HOSTED:
+            has_begun = asyncio.Event()
+            self._hold(asyncio.create_task(encrypt(self.http_factory, has_begun)))
+            await has_begun.wait()
         if self._on_ready is not None:
             self._on_ready()
 
@@ -124,7 +130,7 @@ class LiveServer(Server):  # type: ignore[misc]
         except Exception:
             log.exception("The server did not drain cleanly")
         tasks = [details.get("application_instance") for details in self.connections.values()]
-        open_tasks = [task for task in tasks if task is not None and not task.done()]
+        open_tasks = [task for task in (*tasks, *self._tasks) if task and not task.done()]
         await end_tasks(open_tasks)
 
     async def _until_closed(self) -> None:

@@ -21,7 +21,9 @@ from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
+from rehab.stations.https.certificate import secure_host
 from rehab.stations.models import Device, Station
+from rehab.stations.pages.https import certificate_square
 from rehab.training.measures import WORN
 from rehab.training.steps import Side
 
@@ -39,7 +41,9 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     first_station(clinic_of(user))
     stations = Station.objects.visible_to(user)
+    host = secure_host()
     context: dict[str, Any] = {"stations": stations, "legs": LEGS.items(), "places": PLACES.items()}
+    context["is_secure"] = host is not None or request.is_secure()
     if request.method == "POST":
         station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
         place, side = request.POST.get("place"), request.POST.get("side")
@@ -58,10 +62,10 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
             device.save()
             record_security_change(Act.TOKEN, request, device, now)
             # Behind the # nothing of it reaches a server's log.
-            address = request.build_absolute_uri(reverse("sensor"))
-            address += f"#token={token}&place={place}&side={side}"
+            here = f"https://{host}" if host else f"{request.scheme}://{request.get_host()}"
+            address = f"{here}{reverse('sensor')}#token={token}&place={place}&side={side}"
             drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
-            context |= {"device": device, "qr": drawing, "is_secure": request.is_secure()}
+            context |= {"device": device, "qr": drawing, **certificate_square()}
     return render(request, "stations/phone.html", context)
 
 
