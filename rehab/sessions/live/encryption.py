@@ -14,10 +14,9 @@ from django.conf import settings
 from django.utils import timezone
 from OpenSSL import SSL
 from twisted.internet.error import CannotListenError
-from twisted.internet.interfaces import IOpenSSLContextFactory
 from twisted.internet.protocol import Factory, Protocol
+from twisted.internet.ssl import ContextFactory
 from twisted.protocols.tls import TLSMemoryBIOFactory
-from zope.interface import implementer
 
 from rehab.stations.https.certificate import (
     CertificateFiles,
@@ -56,8 +55,7 @@ def make_context(files: CertificateFiles) -> SSL.Context:
     return context
 
 
-@implementer(IOpenSSLContextFactory)
-class _CurrentContext:
+class _CurrentContext(ContextFactory):
     """Reads the certificate again once its files have changed, as after a renewal."""
 
     def __init__(self, files: CertificateFiles) -> None:
@@ -78,17 +76,18 @@ class _CurrentContext:
         return self._context
 
 
-class _FirstByte(Protocol):  # type: ignore[misc]
+class _FirstByte(Protocol):
     """Hands a connection over to TLS or to plain http, by its first byte."""
 
-    def __init__(self, plain: Factory, encrypted: TLSMemoryBIOFactory) -> None:
+    transport: Any
+
+    def __init__(self, plain: Any, encrypted: Any) -> None:
         self._plain, self._encrypted = plain, encrypted
+        self._timeout: Any = None
 
     def connectionMade(self) -> None:  # noqa: N802
         """Wait for the first byte, not forever."""
-        from twisted.internet import reactor
-
-        self._timeout = reactor.callLater(FIRST_BYTE_S, self.transport.abortConnection)
+        self._timeout = get_reactor().callLater(FIRST_BYTE_S, self.transport.abortConnection)
 
     def dataReceived(self, data: bytes) -> None:  # noqa: N802
         """Hand the connection over."""
@@ -105,21 +104,26 @@ class _FirstByte(Protocol):  # type: ignore[misc]
             self._timeout.cancel()
 
 
-class _EitherFactory(Factory):  # type: ignore[misc]
-    def __init__(self, plain: Factory, context: _CurrentContext) -> None:
+class _EitherFactory(Factory[_FirstByte]):
+    def __init__(self, plain: Any, context: Any) -> None:
         self._plain, self._encrypted = plain, TLSMemoryBIOFactory(context, False, plain)
 
     def buildProtocol(self, addr: Any) -> _FirstByte:  # noqa: N802
         return _FirstByte(self._plain, self._encrypted)
 
 
-async def encrypt(pages: Factory, has_begun: asyncio.Event) -> None:
+def get_reactor() -> Any:
+    """Return the reactor that runs; imported earlier, it would be one that is not asyncio's."""
+    from twisted.internet import reactor
+
+    return reactor
+
+
+async def encrypt(pages: Any, has_begun: asyncio.Event) -> None:
     """Serve pages by https once there is a certificate, and renew that in time.
 
     ``has_begun`` is set after the first attempt.
     """
-    from twisted.internet import reactor  # at import it would choose one that is not asyncio's
-
     is_listening, problem = False, ""
     while True:
         try:
@@ -128,7 +132,7 @@ async def encrypt(pages: Factory, has_begun: asyncio.Event) -> None:
             if files is not None and not is_listening:
                 context = _CurrentContext(files)
                 answer_to_names()
-                reactor.listenTCP(
+                get_reactor().listenTCP(
                     settings.HTTPS_PORT, _EitherFactory(pages, context), interface=EVERYWHERE
                 )
                 is_listening = True

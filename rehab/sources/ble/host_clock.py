@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 DRIFT = 50e-6  # between two quartz clocks at most
-SLEW = 200e-6  # seconds a second: faster, strides would be longer or shorter than they are
+SLEW = 1e-3  # seconds a second: faster, strides would be longer or shorter than they are
 STEP_S = 0.5  # from which it is another clock, as after a restart
 
 

@@ -10,7 +10,7 @@ import math
 import struct
 
 from rehab.sources.ble.adapter import AXES, Adapter, Row
-from rehab.sources.serial_sensor import unwrap_us
+from rehab.sources.intake.sensor_frames import unwrap_us
 
 _SAMPLE = struct.Struct("<I6f")
 _DEGREE = math.pi / 180

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rehab.sources.ble.adapter import Adapter, Row
-from rehab.sources.serial_sensor import SensorFrameReader
+from rehab.sources.intake.sensor_frames import SensorFrameReader
 
 
 class NordicUart(Adapter):

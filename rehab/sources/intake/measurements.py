@@ -55,6 +55,7 @@ def from_wearable(
         "foot_strike_deg": _to_degrees(stride.foot_strike_rad),
         "push_off_deg_s": _to_degrees(stride.push_off_rad_s),
         "shank_lean_deg": _to_degrees(stride.shank_lean_rad),
+        "sensor_rate_hz": stride.rate_hz,
     }
     return Measurement(
         number=number,

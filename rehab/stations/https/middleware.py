@@ -33,7 +33,7 @@ class EncryptionMiddleware:
             return HttpResponse(f"Use {address}: this server encrypts.\n", status=403)
         response = self.get_response(request)
         if request.is_secure():
-            for cookie in response.cookies.values():  # type: ignore[attr-defined]
+            for cookie in response.cookies.values():
                 cookie["secure"] = True
         return response
 
