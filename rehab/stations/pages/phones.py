@@ -18,7 +18,7 @@ from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import clinic_of, for_roles, public, user_of
 from rehab.people.audit.audit_log import Act, record_security_change
-from rehab.people.models import LANGUAGES
+from rehab.people.models import LANGUAGES, Clinic
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
@@ -69,7 +69,7 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
             record_security_change(Act.TOKEN, request, device, now)
             # Behind the # nothing of it reaches a server's log.
             here = f"https://{host}" if host else f"{request.scheme}://{request.get_host()}"
-            page = f"{reverse('sensor')}?language={clinic_of(user).language}"
+            page = sensor_path(clinic_of(user))
             worn = f"#token={token}&place={place}&side={side}"
             drawing = segno.make(f"{here}{page}{worn}", micro=False).svg_inline(
                 omitsize=True, border=2
@@ -77,6 +77,11 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
             context["trial"] = f"{page}&trial{worn}"
             context |= {"device": device, "qr": drawing, **certificate_square()}
     return render(request, "stations/phone.html", context)
+
+
+def sensor_path(clinic: Clinic) -> str:
+    """Return the path of a phone's page in a clinic's language."""
+    return f"{reverse('sensor')}?language={clinic.language}"
 
 
 @public
