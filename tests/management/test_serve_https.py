@@ -82,7 +82,7 @@ def test_sources_walk_by_wss(encrypting):
     (walk,) = make_walks(server, {})
     url = f"wss://{address}/ws/source/"
     headers = {"Authorization": f"Bearer {walk.source}"}
-    page = f"wss://{address}/ws/sessions/{walk.session}/"
+    page = f"wss://{address}/ws/session/{walk.session}/monitor/"
     cookie = {"Cookie": f"sessionid={walk.cookie}"}
     with connect(url, ssl=trust, additional_headers=headers, proxy=None) as socket:
         feet = Feet(socket, {})
@@ -90,7 +90,13 @@ def test_sources_walk_by_wss(encrypting):
         with connect(
             page, ssl=trust, additional_headers=cookie, origin=f"https://{address}", proxy=None
         ) as pages:
-            assert json.loads(pages.recv(timeout=10))["type"]
+            assert json.loads(pages.recv(timeout=10))["type"] == "snapshot"
+            pages.send(json.dumps({"type": "change", "kind": "start", "value": None, "id": "a"}))
+            feet.hear("start")
+            feet.walk(*[1.1] * 40)  # in one frame, and as many events come back
+            heard = ""
+            while '"number":40' not in heard.replace(" ", ""):
+                heard = str(pages.recv(timeout=10))
 
 
 def test_a_browser_measures_movement_there(encrypting):

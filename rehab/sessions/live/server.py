@@ -14,6 +14,7 @@ from daphne import http_protocol
 from daphne.server import Server
 from django.conf import settings
 from twisted.internet import defer, reactor
+from twisted.protocols.tls import TLSMemoryBIOProtocol
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
@@ -84,6 +85,8 @@ class LiveServer(Server):  # type: ignore[misc]
         """Start the application of a connection; return the queue of what it receives."""
         if not isinstance(protocol, DirectProtocol):
             return super().create_application(protocol, scope)
+        if isinstance(protocol.transport, TLSMemoryBIOProtocol):
+            scope["scheme"] = "wss"  # daphne leaves it out
         queue = InboundQueue(protocol.transport)
         scope.setdefault("asgi", {"version": "3.0"})
         scope["extensions"] = {WRITE_NOW: protocol.send_text, READ_NOW: protocol.read_now}

@@ -163,7 +163,9 @@ class BleSource(LiveSource):
         now_s, damaged = self._monotonic(), adapter.damaged
         rows = adapter.read(data, now_s)
         for _ in range(adapter.damaged - damaged):
-            intake.reject_row(f"A packet of {sensor.name} was damaged. Bring the computer nearer.")
+            intake.reject_row(
+                f"A packet of {sensor.name} was damaged. Use a computer nearer to it."
+            )
         for number, sensor_s in adapter.read_times():
             asked_s = self._asked.pop((id(adapter), number), None)
             if asked_s is not None:

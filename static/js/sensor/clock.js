@@ -7,7 +7,7 @@ export class ServerClock {
 
   // We asked at `asked_s`, the server's clock said `server_s`, the answer came at `now_s`.
   answer(asked_s, server_s, now_s) {
-    const error_s = (now_s - asked_s) / 2;
+    const error_s = Math.max(0.0001, (now_s - asked_s) / 2); // clocks of browsers are as coarse as that
     if (error_s > this.error_s(now_s)) return;
     this.#best = { offset_s: (asked_s + now_s) / 2 - server_s, error_s, at_s: now_s };
   }

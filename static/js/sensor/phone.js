@@ -185,7 +185,7 @@ async function begin() {
     tick();
     keepAwake();
   });
-  await keepAwake();
+  keepAwake();
   watchBattery();
   step("check");
 }
@@ -214,7 +214,9 @@ if (!isTrial && (!window.isSecureContext || !("DeviceMotionEvent" in window))) {
   show("where", fill(_("%(side)s %(place)s"), { side: SIDES[side], place: PLACES[place] }));
   show("strap", STRAPS[place]);
   step("strap");
-  document.querySelector("[data-begin]").addEventListener("click", begin);
+  const start = document.querySelector("[data-begin]");
+  start.addEventListener("click", begin);
+  start.disabled = false; // earlier, a tap would be lost
   document.querySelector("[data-lock]").addEventListener("click", lock);
   document.querySelector("[data-save]").addEventListener("click", () => recent.save(`${side} ${place}.csv`));
   holdToLeave(document.querySelector("[data-leave]"));

@@ -28,7 +28,7 @@ export class Sender {
   #isWelcome = false; // in a session
   #heard_ms = 0; // when the server last said something, or was first asked
   #pause_ms = FIRST_PAUSE_MS;
-  #about = {};
+  #about = { trouble: "" };
   #side;
   #isCompanion = false; // on the leg that is not trained: its contacts alone are sent
   #onState;
