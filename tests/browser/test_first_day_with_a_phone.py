@@ -70,7 +70,8 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     with pt.expect_popup() as opened:
         tap(pt, "text=Open the phone’s page", "the phone's page")
     phone = opened.value
-    phone.set_viewport_size(dict(zip(("width", "height"), SIZES["phone"], strict=True)))
+    phone.set_viewport_size({"width": SIZES["phone"][0], "height": SIZES["phone"][1]})
+    phone.wait_for_selector("[data-begin]:enabled")
     picture(phone, "phone-strap")
     tap(phone, "[data-begin]", "begin")
     expect(phone.locator("[data-check=still]")).to_have_class("done")

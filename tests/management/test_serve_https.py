@@ -11,6 +11,7 @@ import urllib.request
 from collections.abc import Iterator
 from http.cookiejar import CookieJar
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlencode
 
 import pytest
@@ -82,13 +83,14 @@ def test_sources_walk_by_wss(encrypting):
     (walk,) = make_walks(server, {})
     url = f"wss://{address}/ws/source/"
     headers = {"Authorization": f"Bearer {walk.source}"}
+    origin: Any = f"https://{address}"
     page = f"wss://{address}/ws/session/{walk.session}/monitor/"
     cookie = {"Cookie": f"sessionid={walk.cookie}"}
     with connect(url, ssl=trust, additional_headers=headers, proxy=None) as socket:
         feet = Feet(socket, {})
         assert feet.number == 0
         with connect(
-            page, ssl=trust, additional_headers=cookie, origin=f"https://{address}", proxy=None
+            page, ssl=trust, additional_headers=cookie, origin=origin, proxy=None
         ) as pages:
             assert json.loads(pages.recv(timeout=10))["type"] == "snapshot"
             pages.send(json.dumps({"type": "change", "kind": "start", "value": None, "id": "a"}))

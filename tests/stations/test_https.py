@@ -7,6 +7,7 @@ import stat
 import subprocess
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from cryptography import x509
@@ -112,7 +113,7 @@ def test_a_phone_gets_it_by_http(client: Client, lead: Client, clinic_folder):
     assert client.get("/certificate/garry.crt").status_code == 404
     assert "no certificate yet" in client.get("/certificate/").content.decode()
     lead.post("/https/")
-    away = {"REMOTE_ADDR": "192.168.1.50"}
+    away: Any = {"REMOTE_ADDR": "192.168.1.50"}
     page = client.get("/certificate/", **away).content.decode()
     assert "Certificate Trust Settings" in page
     file = client.get("/certificate/garry.crt", **away)
@@ -123,7 +124,7 @@ def test_a_phone_gets_it_by_http(client: Client, lead: Client, clinic_folder):
 
 @pytest.mark.django_db
 def test_http_leads_others_to_https(client: Client, lead: Client, clinic_folder):
-    away = {"REMOTE_ADDR": "192.168.1.50"}
+    away: Any = {"REMOTE_ADDR": "192.168.1.50"}
     assert client.get("/sign-in/", **away).status_code == 200
     lead.post("/https/")
     moved = client.get("/sign-in/?next=/start/", **away)
