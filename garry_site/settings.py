@@ -11,6 +11,7 @@ from zoneinfo import available_timezones
 
 from csp.constants import NONCE, NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
+from platformdirs import user_data_path
 
 from garry_site import environment
 from garry_site.data_folder import close_data_folder, read_secret_key
@@ -19,13 +20,22 @@ from garry_site.environment import flag, number, string_list, text
 
 os.umask(0o077)
 BASE_DIR = Path(__file__).resolve().parent.parent
+# An installed package has the pages' files inside and the data in the user's own folder (setup.py).
+IS_INSTALLED = (BASE_DIR / "garry_site" / "files").is_dir()
+FILES_DIR = BASE_DIR / "garry_site" / "files" if IS_INSTALLED else BASE_DIR
 VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are read
 
 # --- where and how it runs ----------------------------------------------------------------------
 
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
-DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
+DATA_DIR = Path(
+    text(
+        "GARRY_DATA_DIR",
+        str(user_data_path("garry", appauthor=False) if IS_INSTALLED else BASE_DIR / "var"),
+        "folder of database and secrets",
+    )
+)
 BACKUP_KEYS = string_list(
     "GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)"
 )
@@ -108,7 +118,7 @@ ASGI_APPLICATION = "garry_site.asgi.application"
 TEMPLATES = [
     {
         "BACKEND": "django.template.backends.django.DjangoTemplates",
-        "DIRS": [BASE_DIR / "templates"],
+        "DIRS": [FILES_DIR / "templates"],
         "APP_DIRS": True,
         "OPTIONS": {
             "context_processors": [
@@ -188,7 +198,7 @@ LANGUAGES = [
     ("de", "Deutsch (Entwurf)"),
     ("fr", "Français (ébauche)"),
 ]
-LOCALE_PATHS = [BASE_DIR / "locale"]
+LOCALE_PATHS = [FILES_DIR / "locale"]
 USE_TZ = True
 TIME_ZONE = text("GARRY_TIME_ZONE", "UTC", "time zone of dates in admin and reports")
 if TIME_ZONE not in available_timezones():
@@ -198,19 +208,19 @@ if TIME_ZONE not in available_timezones():
 STATIC_URL = "static/"
 STATIC_ROOT = DATA_DIR / "static"
 BROWSER_LIBRARIES = {  # browser libraries come from node_modules and are never committed
-    "uplot": BASE_DIR / "node_modules" / "uplot" / "dist",
-    "canvas-confetti": BASE_DIR / "node_modules" / "canvas-confetti" / "dist",
-    "atkinson": BASE_DIR
+    "uplot": FILES_DIR / "node_modules" / "uplot" / "dist",
+    "canvas-confetti": FILES_DIR / "node_modules" / "canvas-confetti" / "dist",
+    "atkinson": FILES_DIR
     / "node_modules"
     / "@fontsource-variable"
     / "atkinson-hyperlegible-next"
     / "files",
 }
 STATICFILES_DIRS = [
-    BASE_DIR / "static",
+    FILES_DIR / "static",
     *(
         (name, folder)
-        for name, folder in [("docs", BASE_DIR / "docs" / "images")]
+        for name, folder in [("docs", FILES_DIR / "docs" / "images")]
         if folder.is_dir()
     ),
     *((name, folder) for name, folder in BROWSER_LIBRARIES.items() if folder.is_dir()),

@@ -136,7 +136,7 @@ def check_mutated(folder, count, seed):
 
 @pytest.mark.timeout(600)
 def test_files_that_are_damaged(tmp_path):
-    check_mutated(tmp_path, 200, 1)
+    check_mutated(tmp_path, 60, 1)
 
 
 @pytest.mark.long

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Iterator
 from datetime import date, datetime, time
 from pathlib import Path
@@ -186,11 +187,12 @@ def research_data(world: World) -> Iterator[tuple[str, str]]:
 
 
 def found_in(planted: dict[str, str], places: Iterator[tuple[str, str]]) -> set[str]:
+    """Return which secrets are in which places; a year within a digest's digits is none."""
     return {
         f"{field} in {place}"
         for place, text in places
         for field, secret in planted.items()
-        if secret in text
+        if secret in text and re.search(rf"(?<![0-9a-f]){re.escape(secret)}(?![0-9a-f])", text)
     }
 
 

@@ -47,7 +47,7 @@ def find_part(name: str) -> str:
 
 def using_guide() -> str:
     """Return docs/using.md as HTML; "" on a server without it."""
-    file = Path(settings.BASE_DIR, "docs", "using.md")
+    file = Path(settings.FILES_DIR, "docs", "using.md")
     return render_guide(file.read_text("utf-8")) if file.is_file() else ""
 
 

@@ -6,7 +6,6 @@ import sys
 from typing import Any
 
 from django import forms
-from django.conf import settings
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -120,7 +119,7 @@ def begin(run: PowerRun) -> None:
     if live is None or run.is_done:
         return
     PowerRun.everywhere.filter(pk=run.pk).update(worked_at=timezone.now(), trouble="")
-    command = [sys.executable, str(settings.BASE_DIR / "manage.py"), "studypower"]
+    command = [sys.executable, "-m", "garry_site", "studypower"]
     live.loop.call_soon_threadsafe(_start, live, run.pk, command)
 
 
