@@ -10,7 +10,6 @@ from django.http import HttpRequest, HttpResponse, HttpResponseBase, HttpRespons
 from django.http.request import split_domain_port
 from django.urls import reverse
 
-from rehab.people.networks import client_address
 from rehab.stations.https.certificate import is_encrypting
 
 
@@ -43,4 +42,7 @@ class EncryptionMiddleware:
             return False
         if request.path.startswith(reverse("certificate")):  # who opens it has no certificate yet
             return False
-        return not ip_address(client_address(request)).is_loopback
+        try:
+            return not ip_address(request.META.get("REMOTE_ADDR", "")).is_loopback
+        except ValueError:  # a socket of the machine itself
+            return False

@@ -95,7 +95,8 @@ class LiveSession:
     @property
     def is_idle(self) -> bool:
         """Whether nothing needs it in memory."""
-        return not (self.feed.subscribers or self.source or self.robot or self.uncommitted)
+        devices = self.source or self.companion or self.robot
+        return not (self.feed.subscribers or devices or self.uncommitted)
 
     @property
     def is_running(self) -> bool:
