@@ -28,7 +28,7 @@ AUTHORITY_LIFETIME = timedelta(days=3650)
 LIFETIME = timedelta(days=397)
 RENEWED_BEFORE = timedelta(days=90)
 CLOCKS_DIFFER = timedelta(days=1)  # a phone's clock may be late
-# Private networks (RFC 1918, 3927, 4193, 4291), this machine, and names that no registry sells.
+# Private networks (RFC 1918, 3927, 4193, 4291), this machine, and names that are never sold.
 NETWORKS = (
     *("10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16", "127.0.0.0/8"),
     *("fc00::/7", "fe80::/10", "::1/128"),

@@ -47,10 +47,16 @@ def set_up_https(request: HttpRequest) -> HttpResponse:
         "is_encrypting": is_encrypting() or request.is_secure(),
         "may_make": may_make,
         "address": network_address(),
-        "secure_host": secure_host(),
+        "secure_address": secure_address(),
         **certificate_square(),
     }
     return render(request, "stations/https.html", context)
+
+
+def secure_address() -> str:
+    """Return the address of this server by https; empty without a certificate."""
+    host = secure_host()
+    return f"https://{host}" if host else ""
 
 
 def certificate_square() -> dict[str, str]:
@@ -71,7 +77,7 @@ def certificate_square() -> dict[str, str]:
 @require_safe
 def show_certificate(request: HttpRequest) -> HttpResponse:
     """Show how a phone or tablet comes to trust this server: read before it does."""
-    context = {"secure_host": secure_host(), **certificate_square()}
+    context = {"secure_address": secure_address(), **certificate_square()}
     return render(request, "stations/certificate.html", context)
 
 
