@@ -59,7 +59,7 @@ help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
 run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
-	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin}
+	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin} $(ARGS)
 
 test: test-main test-postgres ## Run the tests of a change (ARGS='-k goal' picks some)
 

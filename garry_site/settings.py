@@ -48,6 +48,17 @@ ALLOWED_HOSTS = string_list(
     "names that browsers reach the server by",
 )
 
+# Phones measure movement on pages by https alone. Without files of a real name a clinic makes its
+# own authority (rehab.stations.https); a hosted server's proxy encrypts.
+CERTIFICATE = text("GARRY_CERTIFICATE", "", "file of this server's certificate for https, PEM")
+CERTIFICATE_KEY = text("GARRY_CERTIFICATE_KEY", CERTIFICATE, "file of its key, PEM")
+HTTPS_PORT = number("GARRY_HTTPS_PORT", 8443, "port of https", low=1, high=65535)
+if missing := [one for one in (CERTIFICATE, CERTIFICATE_KEY) if one and not Path(one).is_file()]:
+    raise ImproperlyConfigured(
+        f"{missing[0]} is no file. Give GARRY_CERTIFICATE and GARRY_CERTIFICATE_KEY PEM files, or "
+        "unset both for a certificate of the clinic's own."
+    )
+
 SECRET_KEY_LENGTH = 50  # as Django's own check asks for
 if HOSTED and DEBUG:
     raise ImproperlyConfigured("A hosted server must not show debug pages. Unset GARRY_DEBUG.")
@@ -85,6 +96,7 @@ INSTALLED_APPS = [
 MIDDLEWARE = [
     "garry_site.logs.RequestIdMiddleware",
     "garry_site.tracing.TracingMiddleware",
+    "rehab.stations.https.middleware.EncryptionMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
     *(["whitenoise.middleware.WhiteNoiseMiddleware"] if HOSTED else []),

@@ -12,6 +12,7 @@ from django.core import checks
 from django.core.checks import CheckMessage, Error, Tags, register
 
 from rehab.people.field_policy import find_undeclared
+from rehab.stations.https.certificate import is_encrypting
 
 # Variables of tests, of robots and of sources, which may run on the same machine.
 OF_OTHERS = ("GARRY_TEST_", "GARRY_ROBOT_", "GARRY_ROS_URL", "GARRY_SERVER", "GARRY_TOKEN")
@@ -30,12 +31,12 @@ def check_hosting(**_: Any) -> list[CheckMessage]:
     """Check names, and that a hosted server has PostgreSQL."""
     found: list[CheckMessage] = []
     if not settings.HOSTED:
-        if not _is_loopback(settings.HOST):
+        if not _is_loopback(settings.HOST) and not is_encrypting():
             found.append(
                 checks.Warning(
                     f"The server listens on {settings.HOST} without TLS: passwords and patients' "
                     "data can be read on the network between.",
-                    hint="Put a proxy with TLS before it and set GARRY_HOSTED=1, or use "
+                    hint="Serve by `manage.py serve --https`, or use "
                     "GARRY_HOST in a network of the clinic's own that nobody else can enter.",
                     id="garry.W011",
                 )

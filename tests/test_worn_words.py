@@ -22,7 +22,9 @@ DENIAL = re.compile(
 PLACES = [
     "rehab/gait/wearables",
     "rehab/sources/intake/wearables.py",
-    "templates/sensor",
+    "rehab/sources/ble",
+    "templates/stations/sensor.html",
+    "templates/patients/phone_trial.html",
     "static/js/sensor",
 ]
 

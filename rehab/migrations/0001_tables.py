@@ -640,6 +640,16 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
+                    "side",
+                    models.CharField(blank=True, editable=False, max_length=8, verbose_name="leg"),
+                ),
+                (
+                    "place",
+                    models.CharField(
+                        blank=True, editable=False, max_length=8, verbose_name="place"
+                    ),
+                ),
+                (
                     "successor_hash",
                     models.CharField(blank=True, db_index=True, editable=False, max_length=64),
                 ),

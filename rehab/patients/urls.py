@@ -2,7 +2,16 @@
 
 from django.urls import path
 
-from rehab.patients.pages import caseload, ending, family, first_steps, records, start, visits
+from rehab.patients.pages import (
+    caseload,
+    ending,
+    family,
+    first_steps,
+    phone_trial,
+    records,
+    start,
+    visits,
+)
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
@@ -10,6 +19,7 @@ urlpatterns = [
     path("first-steps/", first_steps.first_steps, name="first-steps"),
     path("first-steps/state/", first_steps.first_steps_state, name="first-steps-state"),
     path("patients/new/", start.add_patient, name="new-patient"),
+    path("first-steps/phone/", phone_trial.try_phone, name="try-phone"),
     path("patients/demo/", start.add_demo, name="demo"),
     path("patients/<int:patient_id>/", start.show_patient, name="patient"),
     path("patients/<int:patient_id>/details/", start.edit_patient, name="edit-patient"),

@@ -125,7 +125,12 @@ STEP_COLUMNS = (
     StepColumn("reasons", "Why it is not valid."),
     StepColumn("phase", "Number of its phase in the session, from 0.", is_channel=True),
     StepColumn("rules_version", "Version of the rules that judged the step."),
-    StepColumn("extra", "What else the source measured of it, by name."),
+    StepColumn(
+        "extra",
+        "What else the source measured of it, by name. wearable_foot, wearable_shank: by a sensor "
+        "worn there, with the version of its algorithm; sensor_rate_hz: its samples a second; "
+        "clock_error_ms: how well its clock is known.",
+    ),
 )
 
 

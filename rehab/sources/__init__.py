@@ -20,6 +20,7 @@ SOURCES: dict[str, tuple[str, str]] = {
     "rows": ("rehab.sources.rows", "lines of CSV or JSON from D-Flow, Nexus or any script"),
     "matlab": ("rehab.sources.matlab", "the original GARRY MATLAB server"),
     "serial_sensor": ("rehab.sources.serial_sensor", "a sensor on a serial port, as an Arduino"),
+    "ble": ("rehab.sources.ble.source", "sensors on feet or shanks by Bluetooth"),
     "lsl": ("rehab.sources.lsl", "streams of the Lab Streaming Layer"),
 }
 

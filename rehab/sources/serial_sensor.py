@@ -13,22 +13,19 @@ sample now. With a name ``value`` each frame is a stride.
 from __future__ import annotations
 
 import asyncio
-import re
 import threading
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from rehab.sources.intake import BadRow, Cell, Intake, IntakeSettings, add_signal_arguments
+from rehab.sources.intake import Cell, Intake, IntakeSettings, add_signal_arguments
+from rehab.sources.intake.sensor_frames import SensorFrameReader
 from rehab.sources.reporting import Notify, SourceError
 from rehab.sources.source import LiveSource
 
 BAUD = 921_600
 RETRY_S = 1.0
 READ_S = 0.05
-WRAP_US = 2**32
-MAX_FRAME = 1024  # bytes
-_FRAME = re.compile(rb"\$([HD]),([^*$]*)\*([0-9A-Fa-f]{2})\s*")
 
 
 class Port(Protocol):
@@ -40,72 +37,6 @@ class Port(Protocol):
     def read(self, size: int = 1, /) -> bytes: ...
 
     def close(self) -> None: ...
-
-
-class SensorFrameReader:
-    """Reads frames from bytes that may begin, break off and be damaged anywhere."""
-
-    def __init__(self) -> None:
-        self.damaged = 0
-        self._partial = b""
-        self._names: list[str] = []
-        self._last_us: int | None = None
-        self._turns = 0
-
-    def read(self, data: bytes) -> list[Mapping[str, Cell]]:
-        """Return the rows of all frames that these bytes complete.
-
-        Damaged frames are counted and skipped: their samples are missing, and strides that need
-        them have a reason. Frames before the first names are skipped silently.
-        """
-        *lines, self._partial = (self._partial + data).split(b"\n")
-        if len(self._partial) > MAX_FRAME:
-            self._partial = b""
-            self.damaged += 1
-        rows = []
-        for line in lines:
-            try:
-                row = self._read_frame(line)
-            except BadRow:
-                self.damaged += 1
-            else:
-                if row is not None:
-                    rows.append(row)
-        return rows
-
-    def _read_frame(self, line: bytes) -> Mapping[str, Cell] | None:
-        frame = _FRAME.fullmatch(line)
-        if frame is None or compute_checksum(line[1 : frame.start(3) - 1]) != int(frame[3], 16):
-            raise BadRow("damaged")
-        cells = frame[2].decode("ascii", "replace").split(",")
-        if frame[1] == b"H":
-            self._names = cells
-            return None
-        if not self._names:
-            return None
-        if len(cells) != len(self._names) + 1 or not cells[0].isdecimal():
-            raise BadRow("cells")
-        try:
-            numbers = [float(cell) if cell else None for cell in cells[1:]]
-        except ValueError:
-            raise BadRow("numbers") from None
-        time_s = self._unwrap(int(cells[0]) % WRAP_US) / 1e6
-        return {"time_s": time_s} | dict(zip(self._names, numbers, strict=True))
-
-    def _unwrap(self, now_us: int) -> int:
-        """Return microseconds that go on where the device's counter wraps around."""
-        if self._last_us is not None and self._last_us - now_us > WRAP_US // 2:
-            self._turns += 1
-        self._last_us = now_us
-        return self._turns * WRAP_US + now_us
-
-
-def compute_checksum(data: bytes) -> int:
-    """Return the exclusive or of all bytes."""
-    result = 0
-    for byte in data:
-        result ^= byte
-    return result
 
 
 class SerialSensorSource(LiveSource):

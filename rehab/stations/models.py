@@ -64,6 +64,9 @@ class Device(TokenModel):
     builtin = models.BooleanField(
         _("built in"), default=False, editable=False, help_text=_("The server runs it itself.")
     )
+    # Of a sensor that is worn: on which leg, and where; "" of any other.
+    side = models.CharField(_("leg"), max_length=8, blank=True, editable=False)
+    place = models.CharField(_("place"), max_length=8, blank=True, editable=False)
     # What it gets in place of its token, and what it had before (``tokens``).
     successor_hash = models.CharField(max_length=64, blank=True, editable=False, db_index=True)
     retired_hash = models.CharField(max_length=64, blank=True, editable=False, db_index=True)

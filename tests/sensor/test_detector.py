@@ -31,6 +31,7 @@ def compare(place: str, samples: Samples) -> int:
         assert theirs["reasons"] == [str(one) for one in own.reasons]
         for name in ("initial_contact_s", "terminal_contact_s", "stride_s", "stance_s"):
             assert theirs[name] == pytest.approx(getattr(own, name), abs=ALIKE_S), name
+        assert theirs["rate_hz"] == pytest.approx(own.rate_hz)
         for name in ("foot_strike_rad", "push_off_rad_s", "shank_lean_rad"):
             assert theirs[name] == pytest.approx(getattr(own, name), abs=1e-4), name
     return len(ours)

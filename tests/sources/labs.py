@@ -11,8 +11,10 @@ from websockets.asyncio.server import serve
 
 from rehab.sources import load_source
 from rehab.sources.arguments import make_parser
-from rehab.sources.serial_sensor import compute_checksum
+from rehab.sources.ble.nordic_uart import NordicUart
+from rehab.sources.intake.sensor_frames import compute_checksum
 from rehab.training.steps import Measurement
+from tests.sources.fake_bleak import FakeBleak, FakeSensor
 from tests.sources.fake_lsl import FakeLsl
 
 SETTINGS = ["--token", "t"]
@@ -257,9 +259,42 @@ class LslLab(Lab):
         self.outlet.push(["rubbish", 0.7], step_s=0.0)
 
 
+class BleLab(Lab):
+    name = "ble"
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.sensor = FakeSensor("GARRY-1", NordicUart.notifies, NordicUart._writes)
+        self.clock_us = 2**32 - 3_000_000
+
+    def arguments(self):
+        return ["--sensor", "left.foot=GARRY-1"]
+
+    def build(self, source, options):
+        return source(options, self.said.append, FakeBleak(self.sensor))
+
+    async def _wait(self):
+        async with asyncio.timeout(5):
+            while not self.sensor.is_read:  # noqa: ASYNC110
+                await asyncio.sleep(0.002)
+
+    async def send(self, source, values):
+        await self._wait()
+        self.sensor.send(frame("H", "value", "stance_s"))
+        for value in values:
+            self.clock_us = (self.clock_us + 1_100_000) % 2**32
+            self.sensor.send(frame("D", self.clock_us, value, 0.7))
+
+    async def garble(self, source):
+        await self._wait()
+        good = frame("D", self.clock_us, 3.3, 0.7)
+        for bad in (good[3:], good[:9] + b"\n", good.replace(b"3.3", b"9.3"), b"\xff\x00\n"):
+            self.sensor.send(bad)
+
+
 LABS = (
     *(RecordingLab, SignalRecordingLab, SyntheticLab, SyntheticSignalsLab),
-    *(RowsLab, MatlabLab, SerialLab, LslLab),
+    *(RowsLab, MatlabLab, SerialLab, LslLab, BleLab),
 )
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rehab.sources.serial_sensor import SensorFrameReader, compute_checksum
+from rehab.sources.intake.sensor_frames import SensorFrameReader, compute_checksum
 from tests.sources.labs import frame
 
 NAMES = b"$H,left_force_n,left_angle_rad*4D\n"

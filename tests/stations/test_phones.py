@@ -9,6 +9,9 @@ from django.test import Client
 from django.utils import timezone
 
 from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.roles import Role
+from rehab.sessions.forms.initial import initial_choices
+from rehab.sessions.forms.session import SessionForm
 from rehab.stations.models import Device
 from rehab.stations.pages.phones import LIFETIME
 from tests.support.world import World
@@ -28,6 +31,7 @@ def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     assert "without https" not in pt.post("/phones/pair/", wish, secure=True).content.decode()
     device = Device.everywhere.filter(station=station).order_by("pk")[0]
     assert (device.kind, device.name) == ("source", "Phone, left shin")
+    assert (device.place, device.side) == ("shank", "left")
     assert timedelta(0) < device.token_expires_at - timezone.now() <= LIFETIME
     assert device.has_expired(timezone.now() + LIFETIME)
     assert AuditEntry.everywhere.filter(act=Act.TOKEN, about__contains=device.name).exists()
@@ -45,3 +49,30 @@ def test_the_page_of_a_phone_is_for_whoever_scans(client: Client):
     page = client.get("/sensor/").content.decode()
     assert "garry/sensor/detector" in page
     assert "no-referrer" in page
+    assert '<html lang="de"' in client.get("/sensor/?language=de").content.decode()
+    assert client.get("/sensor/?language=xx").status_code == 200
+
+
+def test_setup_offers_what_the_paired_sensors_measure(pt: Client, world: World):
+    station, patient = world.add_station(), world.add_patient()
+    setup = f"/patients/{patient.pk}/new/"
+    assert "ankle push-off power A2" in pt.get(setup).content.decode()
+    for side in ("left", "right"):
+        pt.post("/phones/pair/", {"station": station.pk, "place": "shank", "side": side})
+        page = pt.get(setup).content.decode()
+        assert "shank lean" in page
+        assert "ankle push-off power A2" not in page
+        assert "foot strike angle" not in page
+        assert ("difference of step times" in page) is (side == "right")
+    chosen = SessionForm(
+        initial=initial_choices(patient, world.people[Role.PT]),
+        patient=patient,
+        by=world.people[Role.PT],
+    )
+    assert chosen.chosen_measure.slug == "shank_stance"
+
+
+def test_a_trial_walks_a_simulated_leg(client: Client):
+    walk = client.get("/sensor/trial.json").json()
+    assert len(walk["walk"]) == 72  # a stride
+    assert [len(row) for row in walk["stand"]] == [7] * 300

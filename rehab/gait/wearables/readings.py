@@ -83,6 +83,7 @@ class Reading:
             stride_s=swing.end_s - begin_s,
             stance_s=leaves_s + terminal_s - begin_s - initial_s,
             reasons=self._find_doubts(begin_s, swing),
+            rate_hz=1 / history.find_mean_step(begin_s, swing.end_s),
             foot_strike_rad=history.find_foot_strike(begin_s, leaves_s, sign)
             if self._place is Place.FOOT
             else None,

@@ -50,6 +50,8 @@ class WearableStride:
         Its times [s].
     reasons
         Why it does not count.
+    rate_hz
+        Samples a second within it.
     foot_strike_rad
         How far the toes were up at initial contact, of a foot that is flat in stance.
     push_off_rad_s
@@ -64,6 +66,7 @@ class WearableStride:
     stride_s: float
     stance_s: float
     reasons: tuple[Doubt, ...] = ()
+    rate_hz: float = 0.0
     foot_strike_rad: float | None = None
     push_off_rad_s: float | None = None
     shank_lean_rad: float | None = None

@@ -15,6 +15,7 @@ from channels.routing import get_default_application
 from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 from django.db import connection
+from django.utils import timezone
 
 from rehab.management.processes import Processes
 from rehab.people.sign_in.first_start import (
@@ -28,6 +29,12 @@ from rehab.sessions.live.pulse import notify
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.supervisor import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token
+from rehab.stations.https.certificate import (
+    find_certificate,
+    is_encrypting,
+    make_own,
+    secure_host,
+)
 from rehab.stations.models import Device
 from robot.bases import BASES
 
@@ -41,6 +48,11 @@ class Command(BaseCommand):
         """Add the options."""
         parser.add_argument("--host", default=settings.HOST)
         parser.add_argument("--port", type=int, default=settings.PORT)
+        parser.add_argument(
+            "--https",
+            action="store_true",
+            help="make a certificate of the clinic's own where there is none, for phones",
+        )
         parser.add_argument(
             "--processes",
             type=int,
@@ -68,6 +80,7 @@ class Command(BaseCommand):
         *args: Any,
         host: str,
         port: int,
+        https: bool,
         processes: int | None,
         child: list[str],
         robot: str,
@@ -90,6 +103,8 @@ class Command(BaseCommand):
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
         check_port(host, port)
         prepare_database()
+        if https or is_encrypting():
+            prepare_https(make=https)
         lease = take_lease(host, port) if settings.HOSTED else None
         self._print_address(local_address(host, port))
         token = robot_token() if robot != "none" else None
@@ -115,12 +130,31 @@ class Command(BaseCommand):
 
     def _print_address(self, address: str) -> None:
         self.stdout.write(f"GARRY serves at {address}/")
+        if secure := secure_host():
+            self.stdout.write(f"Phones and tablets: https://{secure}/")
         password = None if settings.HOSTED else first_password()
         if password:
             self.stdout.write(
                 f"Sign in at {address}/start/ as {FIRST_USERNAME!r} with the password {password}"
             )
         self.stdout.flush()
+
+
+def prepare_https(*, make: bool) -> None:
+    """Check port and certificate of https; make one of the clinic's own. Raises CommandError."""
+    from rehab.sessions.live.encryption import BadCertificate, make_context
+
+    if settings.HOSTED:
+        raise CommandError("A hosted server's proxy encrypts (docs/hosting.md). Leave out --https.")
+    check_port("0.0.0.0", settings.HTTPS_PORT)  # noqa: S104
+    if make and not is_encrypting():
+        make_own(timezone.now())
+    files = find_certificate()
+    try:
+        if files is not None:
+            make_context(files)
+    except BadCertificate as problem:
+        raise CommandError(str(problem)) from None
 
 
 def run_server(host: str, port: int, on_ready: Callable[[], None]) -> None:

@@ -45,6 +45,7 @@ def first_steps(request: HttpRequest) -> HttpResponse:
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
     }
     if slug == "tablet":
+        first_station(clinic_of(user))  # who skips the step before has one all the same
         context |= tablet_address(request) | {"stations": Station.objects.visible_to(user)}
     acted = _act(request, slug, context)
     return acted or render(request, "patients/first_steps.html", context)

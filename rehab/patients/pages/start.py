@@ -169,6 +169,11 @@ def check_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_POST
 def add_demo(request: HttpRequest) -> HttpResponse:
     """Add a simulated patient, for people who want to try GARRY."""
+    return redirect("patient", patient_id=add_demo_patient(request).pk)
+
+
+def add_demo_patient(request: HttpRequest) -> Patient:
+    """Return the clinic's simulated patient; say so where a real one has that code."""
     user = user_of(request)
     patient, _created = Patient.objects.visible_to(user).get_or_create(
         clinic=clinic_of(user),
@@ -178,4 +183,4 @@ def add_demo(request: HttpRequest) -> HttpResponse:
     if not patient.simulated:
         message = _("%(nickname)s has the code %(code)s. Give that patient another code first.")
         messages.error(request, message % {"nickname": patient.nickname, "code": patient.code})
-    return redirect("patient", patient_id=patient.pk)
+    return patient

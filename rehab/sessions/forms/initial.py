@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from django.db.models import QuerySet
+from django.utils import timezone
 
 from rehab.people.models import Patient, User
 from rehab.sessions.formatting import format_source
@@ -14,10 +15,11 @@ from rehab.sessions.setup.gestures import choices_from_cue
 from rehab.sessions.setup.options import OPTIONS
 from rehab.sessions.setup.protocol_outline import protocol_minutes
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.sensors import measurable
 from rehab.sessions.setup.sources import LIVE, source_choices
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES
-from rehab.training.measures import A2
+from rehab.training.measures import A2, MEASURES
 from rehab.training.steps import Side
 
 TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
@@ -45,12 +47,15 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
         protocols = Protocol.objects.visible_to(by)
         protocol = protocols.filter(name=name, clinic=None).first() or protocols.first()
         source = "synthetic demo" if patient.simulated else LIVE
+        station = _first_free_station(stations)
+        measure = _fitting_measure(usual_measure(by), station, source, by)
         return offered | {
-            "measure": usual_measure(by),
+            "measure": measure,
+            "goal_value": measure.to_rule().offered_goal,
             "goal_by": "value" if patient.simulated else "percent",
             "minutes": protocol_minutes(protocol) or offered["minutes"],
             "protocol": protocol,
-            "station": _first_free_station(stations),
+            "station": station,
             "source": source,
             "source_words": format_source(sources[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
@@ -60,15 +65,18 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
     if last.source_args and not patient.simulated:
         source = LIVE  # after a trial with a simulator, a person's next session is live again
     above, below = choices_from_cue(plan.valence.cue, last.valence, patient, by)
-    goal = plan.measure.offered_goal if last.goal is None else last.goal
+    station = last.station or _first_free_station(stations)
+    measure = _fitting_measure(last.measure, station, source, by)
+    rule = measure.to_rule()
+    goal = rule.offered_goal if last.goal is None or measure != last.measure else last.goal
     changes = _read_last_changes(last, by)
     chosen = {o.name: o.read(plan, last.walking, changes) for o in OPTIONS.values()}
     return chosen | {
-        "measure": last.measure,
-        "goal_value": round(goal, plan.measure.goal_places),
+        "measure": measure,
+        "goal_value": round(goal, rule.goal_places),
         "goal_percent": chosen["goal_percent"] or offered["goal_percent"],
         "protocol": last.protocol,
-        "station": last.station or _first_free_station(stations),
+        "station": station,
         "source": source,
         "source_words": format_source(sources[source]),
         "trained_side": last.trained_side,
@@ -84,6 +92,17 @@ def _read_last_changes(session: TrainingSession, by: User) -> dict[str, Any]:
         kind__in=[option.control.value for option in OPTIONS.values() if option.control],
     )
     return {row.kind: row.data.get("value", row.value) for row in changes.order_by("pk")}
+
+
+def _fitting_measure(
+    wanted: MeasureDefinition, station: Station | None, source: str, by: User
+) -> MeasureDefinition:
+    """Return a measure, or one that a station's sensors have where it is not among these."""
+    slugs = measurable(station, timezone.now()) if source == LIVE else None
+    if slugs is None or wanted.slug in slugs:
+        return wanted
+    known = {row.slug: row for row in MeasureDefinition.objects.visible_to(by).filter(clinic=None)}
+    return next((known[slug] for slug in MEASURES if slug in slugs and slug in known), wanted)
 
 
 def usual_measure(by: User) -> MeasureDefinition:

@@ -7,6 +7,7 @@ from typing import Any
 from django import forms
 from django.conf import settings
 from django.core.exceptions import ValidationError
+from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
@@ -23,7 +24,8 @@ from rehab.sessions.setup.gestures import cue_from_choices
 from rehab.sessions.setup.option import OptionForm
 from rehab.sessions.setup.options import OPTIONS, build_parts
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
-from rehab.sessions.setup.sources import SIMULATED, build_source_args, source_choices
+from rehab.sessions.setup.sensors import measurable
+from rehab.sessions.setup.sources import LIVE, SIMULATED, build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
@@ -65,6 +67,15 @@ class SessionForm(OptionForm):
         fields: dict[str, Any] = self.fields
         for name, model in ROW_FIELDS.items():
             fields[name].queryset = model.objects.visible_to(by)
+        slugs = self._measurable(self.chosen_station, self["source"].value())
+        if slugs is not None:
+            widget = fields["measure"].widget
+            widget.choices = [one for one in widget.choices if one[0].instance.slug in slugs]
+
+    @staticmethod
+    def _measurable(station: Station | None, source: str) -> frozenset[str] | None:
+        """Return the slugs of the measures that live sensors there have; None where any may be."""
+        return measurable(station, timezone.now()) if source == LIVE else None
 
     @property
     def chosen_measure(self) -> rules.Measure:
@@ -130,6 +141,10 @@ class SessionForm(OptionForm):
                 measure.to_rule().check_goal(goal)
             except InvalidSetting as problem:
                 self.add_error("goal_value", format_refusal(problem))
+        slugs = self._measurable(data.get("station"), data.get("source", ""))
+        if slugs is not None and measure.slug not in slugs:
+            message = _("The sensors that are paired here do not measure this. Choose another.")
+            self.add_error("measure", message)
         if measure.slug != A2.slug and data.get("source", "").startswith(SIMULATED):
             message = _("Simulated patients walk with A2 only. Choose another source, or A2.")
             self.add_error("source", message)

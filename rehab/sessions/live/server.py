@@ -15,10 +15,12 @@ from daphne import http_protocol
 from daphne.server import Server
 from django.conf import settings
 from twisted.internet import defer, reactor
+from twisted.protocols.tls import TLSMemoryBIOProtocol
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import lease
+from rehab.sessions.live.encryption import encrypt
 from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.pulse import keep_pulse
@@ -75,6 +77,7 @@ class LiveServer(Server):  # type: ignore[misc]
         }
         super().__init__(*args, **options)
         self._on_ready = on_ready
+        self._tasks: list[asyncio.Task[None]] = []
 
     def run(self) -> None:
         """Serve until stopped."""
@@ -85,6 +88,8 @@ class LiveServer(Server):  # type: ignore[misc]
         """Start the application of a connection; return the queue of what it receives."""
         if not isinstance(protocol, DirectProtocol):
             return super().create_application(protocol, scope)
+        if isinstance(protocol.transport, TLSMemoryBIOProtocol):
+            scope["scheme"] = "wss"  # daphne leaves it out
         queue = InboundQueue(protocol.transport)
         scope.setdefault("asgi", {"version": "3.0"})
         scope["extensions"] = {WRITE_NOW: protocol.send_text, READ_NOW: protocol.read_now}
@@ -106,14 +111,21 @@ class LiveServer(Server):  # type: ignore[misc]
         faulthandler.enable()  # a supervisor ends a server that hangs by SIGABRT
         own = lease.held()
         pulse = loop.create_task(keep_pulse(None if own is None else own.show_pulse))
-        # Tasks without a reference may be collected. The pulse goes on while the server drains.
-        self._tasks = [pulse, loop.create_task(self._start())]
+        self._hold(pulse)  # it goes on while the server drains
+        self._hold(loop.create_task(self._start()))
+
+    def _hold(self, task: asyncio.Task[None]) -> None:
+        self._tasks.append(task)  # those without a reference may be collected
 
     async def _start(self) -> None:
         process.tune_interpreter()
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
+        if not settings.HOSTED:
+            has_begun = asyncio.Event()
+            self._hold(asyncio.create_task(encrypt(self.http_factory, has_begun)))
+            await has_begun.wait()
         if self._on_ready is not None:
             self._on_ready()
 
@@ -131,7 +143,7 @@ class LiveServer(Server):  # type: ignore[misc]
         except Exception:
             log.exception("The server did not drain cleanly")
         tasks = [details.get("application_instance") for details in self.connections.values()]
-        open_tasks = [task for task in tasks if task is not None and not task.done()]
+        open_tasks = [task for task in (*tasks, *self._tasks) if task and not task.done()]
         await end_tasks(open_tasks)
 
     async def _until_closed(self) -> None:

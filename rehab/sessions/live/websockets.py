@@ -14,6 +14,7 @@ from typing import Any
 from autobahn.twisted import websocket as twisted_websocket
 from autobahn.websocket import protocol as websocket_protocol
 from daphne.ws_protocol import WebSocketFactory, WebSocketProtocol
+from twisted.protocols.tls import TLSMemoryBIOProtocol
 
 from rehab.sessions.live.protocol.frames import (
     MAX_WAITING_BYTES,
@@ -108,7 +109,9 @@ class DirectProtocol(WebSocketProtocol):  # type: ignore[misc]
     def sendData(self, data: bytes, sync: bool = False, chopsize: int | None = None) -> None:  # noqa: N802
         """Send bytes; what the kernel does not accept now takes the usual way."""
         out = self.transport
-        idle = not (sync or chopsize or self.send_queue or out.dataBuffer or out._tempDataLen)  # noqa: SLF001
+        # Encrypted, the bytes of the connection below are not ours to write.
+        idle = not (sync or chopsize or self.send_queue or isinstance(out, TLSMemoryBIOProtocol))
+        idle = idle and not (out.dataBuffer or out._tempDataLen)  # noqa: SLF001
         if idle and out.connected and not out.disconnecting:
             sent = out.writeSomeData(data)
             if isinstance(sent, int) and sent > 0:

@@ -33,6 +33,7 @@ from rehab.sessions.reports.summary import (
 )
 from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
+from rehab.training.measures import WORN
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import SENT_VALUE
 
@@ -41,7 +42,7 @@ MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 6
 # A line of the page of paper has room for so many.
 MAX_EXTRAS = 8
 # Moments and marks of single strides, of which a mean says nothing.
-WITHOUT_MEAN = ("initial_contact_s", SENT_VALUE)
+WITHOUT_MEAN = ("initial_contact_s", SENT_VALUE, *WORN.values())
 
 
 def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
@@ -186,6 +187,13 @@ def mean_extras(user: User, session: TrainingSession) -> list[str]:
         for name, _count in counts.most_common()
         if name not in WITHOUT_MEAN and not name.startswith("flag_")
     ]
-    return [
+    places = {"foot": _("foot"), "shank": _("shin")}
+    worn = [
+        _("sensor on the %(place)s, algorithm %(version)g, %(count)s strides")
+        % {"place": places[place], "version": sums[name] / counts[name], "count": counts[name]}
+        for place, name in WORN.items()
+        if counts[name]
+    ]
+    return worn + [
         f"{name} {format_significant(sums[name] / counts[name])}" for name in names[:MAX_EXTRAS]
     ]

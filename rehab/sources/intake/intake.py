@@ -116,6 +116,10 @@ class Intake:
         """Set the rate of the samples [Hz] that their sender declares; the command line's wins."""
         self._rate_hz = self._rate_hz or rate_hz
 
+    def set_clock_error(self, side: Side, place: str, error_s: float) -> None:
+        """Set how far a worn sensor's times may be off those of others [s]."""
+        self._wearables.clock_errors_s[side, place] = error_s
+
     def add_rows(self, rows: Iterable[Mapping[str, Cell]]) -> None:
         """Add rows in the order in which they came."""
         samples: list[Mapping[str, Cell]] = []

@@ -39,14 +39,13 @@ def from_wearable(
 ) -> Measurement:
     """Return a stride by a worn sensor as a measurement: figures of its own, without an A2.
 
-    Measures train one of them by their channel. It ends with the initial contact after it.
+    Measures train one of them by their channel. It ends with the initial contact after it:
+    its contacts follow from ``stride_s`` and ``stance_s``.
     """
     place = stride.place
     stance_percent = 100 * stride.stance_share
     extra = {
         WORN[place]: VERSION,
-        "initial_contact_s": stride.initial_contact_s,
-        "terminal_contact_s": stride.terminal_contact_s,
         "stride_s": stride.stride_s,
         "stance_s": stride.stance_s,
         "cadence_min": stride.cadence_min,
@@ -56,6 +55,7 @@ def from_wearable(
         "foot_strike_deg": _to_degrees(stride.foot_strike_rad),
         "push_off_deg_s": _to_degrees(stride.push_off_rad_s),
         "shank_lean_deg": _to_degrees(stride.shank_lean_rad),
+        "sensor_rate_hz": stride.rate_hz,
     }
     return Measurement(
         number=number,

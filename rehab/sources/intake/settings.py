@@ -110,16 +110,21 @@ class IntakeSettings:
 def _read_wearable(text: str) -> Wearable:
     """Return what a text such as ``left.foot=gyro_z*0.01745`` says. Raises SourceError."""
     where, _, names = text.partition("=")
-    side, _, place = where.partition(".")
+    place = read_place(where)
     columns = names.split(",")
-    is_known = side in SIDES and place in ("foot", "shank")
-    if not is_known or not all(columns) or len(columns) not in (1, 3, 6):
+    if place is None or not all(columns) or len(columns) not in (1, 3, 6):
         raise SourceError(
             f"'{text}' maps no worn sensor. Write SIDE.PLACE=COLUMNS with SIDE left or right, "
             "PLACE foot or shank, and one rate of rotation, three, or three accelerations and "
             "three rates: left.foot=gyro_z*0.01745, left.shank=ax,ay,az,gx,gy,gz"
         )
-    return Wearable(Side(side), place, tuple(read_column(one) for one in columns))
+    return Wearable(*place, tuple(read_column(one) for one in columns))
+
+
+def read_place(text: str) -> tuple[Side, str] | None:
+    """Return the leg and place that a text such as ``left.foot`` names; None for any other."""
+    side, _, place = text.partition(".")
+    return (Side(side), place) if side in SIDES and place in ("foot", "shank") else None
 
 
 def add_signal_arguments(parser: ArgumentParser) -> None:

@@ -21,6 +21,7 @@ FIRST_SAMPLES = 100  # by which rate and units are checked
 RATE_MAX_RAD_S = 35.0  # 2000 °/s, at which common sensors end
 ACCELERATION_M_S2 = (7.0, 13.0)  # of half the samples of a walk
 CONTACTS = 200  # of a leg that are known: as many as may wait for its sensor's sign
+CLOCKS_AGREE_S = 0.010  # from which on contacts of two sensors are compared
 LIFT = {
     "foot": "lift the toes of that foot once",
     "shank": "swing that lower leg forward and back once",
@@ -44,6 +45,9 @@ class WearablePipeline:
         self._contacts: dict[tuple[Side, str], deque[float]] = {
             (one.side, one.place): deque(maxlen=CONTACTS) for one in wearables
         }
+        # How well each sensor's times agree with the others' [s]: all are of one device, if nothing
+        # else is set.
+        self.clock_errors_s: dict[tuple[Side, str], float] = {}
 
     @property
     def names(self) -> set[str]:
@@ -84,6 +88,9 @@ class WearablePipeline:
     def _find_asymmetry(self, wearable: Wearable, stride: WearableStride) -> float | None:
         """Return by how much the two steps of a stride differ, in percent of the stride."""
         other = next(side for side in Side if side is not wearable.side)
+        places = [(side, wearable.place) for side in Side]
+        if sum(self.clock_errors_s.get(one, 0.0) for one in places) > CLOCKS_AGREE_S:
+            return None
         contacts = self._contacts.get((other, wearable.place), ())
         inside = [at for at in contacts if stride.initial_contact_s < at < stride.end_s]
         if len(inside) != 1:

@@ -24,6 +24,7 @@ from rehab.people.sign_in.devices import describe_browser
 from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import NotTrusted
+from rehab.stations.https.certificate import secure_host
 from rehab.stations.models import Station
 from rehab.stations.pairing import PairingRefused, approve_pairing, find_by_code
 from rehab.stations.pins import PinRefused, check_pin
@@ -77,10 +78,11 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
 
 def tablet_address(request: HttpRequest) -> dict[str, str]:
     """Return the address that a tablet opens, and its drawing to scan; empty without one."""
-    host = reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
+    secure = secure_host()
+    host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
     if host is None:
         return {"address": "", "qr": ""}
-    address = f"{request.scheme}://{host}{reverse('tablet')}"
+    address = f"{'https' if secure else request.scheme}://{host}{reverse('tablet')}"
     drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
     return {"address": address, "qr": drawing}
 

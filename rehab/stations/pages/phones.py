@@ -5,11 +5,12 @@ from __future__ import annotations
 from datetime import timedelta
 from typing import Any
 
+import numpy as np
 import segno
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
 from django.urls import reverse
-from django.utils import timezone
+from django.utils import timezone, translation
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.cache import never_cache
@@ -17,15 +18,20 @@ from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import clinic_of, for_roles, public, user_of
 from rehab.people.audit.audit_log import Act, record_security_change
+from rehab.people.models import LANGUAGES, Clinic
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
+from rehab.sources.synthetic.leg import STRIDE_S, Floats, stand, walk_foot
 from rehab.stations.builtin import first_station
+from rehab.stations.https.certificate import secure_host
 from rehab.stations.models import Device, Station
+from rehab.stations.pages.https import certificate_square
 from rehab.training.measures import WORN
 from rehab.training.steps import Side
 
 LIFETIME = timedelta(hours=12)  # of a phone's token: a day in the clinic
+STANDS_S, RATE_HZ = 5.0, 60.0  # of the simulated leg
 LEGS = {Side.LEFT: gettext_lazy("left"), Side.RIGHT: gettext_lazy("right")}
 PLACES = {"shank": gettext_lazy("shin"), "foot": gettext_lazy("foot")}
 
@@ -39,7 +45,9 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     first_station(clinic_of(user))
     stations = Station.objects.visible_to(user)
+    host = secure_host()
     context: dict[str, Any] = {"stations": stations, "legs": LEGS.items(), "places": PLACES.items()}
+    context["is_secure"] = host is not None or request.is_secure()
     if request.method == "POST":
         station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
         place, side = request.POST.get("place"), request.POST.get("side")
@@ -52,21 +60,56 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
                 station=station,
                 kind=Device.Kind.SOURCE,
                 name=_("Phone, %(leg)s %(place)s") % where,
+                side=side,
+                place=place,
             )
             token = device.new_token()
             device.token_expires_at = now + LIFETIME
             device.save()
             record_security_change(Act.TOKEN, request, device, now)
             # Behind the # nothing of it reaches a server's log.
-            address = request.build_absolute_uri(reverse("sensor"))
-            address += f"#token={token}&place={place}&side={side}"
-            drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
-            context |= {"device": device, "qr": drawing, "is_secure": request.is_secure()}
+            here = f"https://{host}" if host else f"{request.scheme}://{request.get_host()}"
+            page = sensor_path(clinic_of(user))
+            worn = f"#token={token}&place={place}&side={side}"
+            drawing = segno.make(f"{here}{page}{worn}", micro=False).svg_inline(
+                omitsize=True, border=2
+            )
+            context["trial"] = f"{page}&trial{worn}"
+            context |= {"device": device, "qr": drawing, **certificate_square()}
     return render(request, "stations/phone.html", context)
+
+
+def sensor_path(clinic: Clinic) -> str:
+    """Return the path of a phone's page in a clinic's language."""
+    return f"{reverse('sensor')}?language={clinic.language}"
 
 
 @public
 @require_safe
 def show_sensor(request: HttpRequest) -> HttpResponse:
     """Show the page of a phone that is worn; what it may do is in the address that it scanned."""
+    if (language := request.GET.get("language")) in dict(LANGUAGES):
+        translation.activate(language)  # the station's: nobody is signed in
     return render(request, "stations/sensor.html")
+
+
+@public
+@require_safe
+def trial_walk(request: HttpRequest) -> JsonResponse:
+    """Return a simulated leg as a phone would measure it: it stands, then walks one stride."""
+    standing_s = np.arange(0, STANDS_S, 1 / RATE_HZ)
+    rate, acceleration = stand(standing_s)
+    t_s, rates, accelerations = walk_foot(2 * STRIDE_S, RATE_HZ)
+    one = slice(len(t_s) // 2)
+    return JsonResponse(
+        {
+            "stand": _as_rows(standing_s, rate, acceleration),
+            "walk": _as_rows(t_s[one], rates[one], accelerations[one]),
+        }
+    )
+
+
+def _as_rows(t_s: Floats, rate: Floats, acceleration: Floats) -> list[list[float]]:
+    """Return rows of time [s], acceleration [m/s²] and rate of rotation [°/s]."""
+    rows: list[list[float]] = np.column_stack((t_s, acceleration, np.degrees(rate))).tolist()
+    return rows

@@ -18,9 +18,36 @@ const TROUBLES = {
   slow: _("the phone measures too slowly: charge it, turn off power saving"),
   gap: _("the phone missed samples"),
   moved: _("the sensor has moved: is the strap tight?"),
+  elsewhere: _("it sits otherwise than last time: strap it on as before, or take a new baseline"),
   battery: _("the phone’s battery is low"),
   doubt: _("unsure how it is worn: stand still, lift the toes (shin: swing the leg forward) once"),
 };
+
+// Within which two phones' clocks have to agree for their steps to be compared (static/js/sensor/symmetry.js).
+const AGREE_S = 0.01;
+
+// A phone's clock: how far it is ahead of the server's, and how well that is known.
+function describeClock(clock) {
+  if (!clock) return "";
+  const [ahead, error] = clock.map((seconds) => Math.round(1000 * seconds));
+  return fill(_("clock %(ahead)s ± %(error)s ms"), { ahead: ahead > 0 ? `+${ahead}` : ahead, error });
+}
+
+// The phone on the leg that is not trained, and whether its steps can be compared.
+function describeCompanion({ companion, companion_trouble: trouble, companion_clock: other, source_clock: own }) {
+  if (!companion) return "";
+  if (trouble) return fill(_("other leg: %(trouble)s"), { trouble: TROUBLES[trouble] });
+  const isKnown = own && other && own[1] + other[1] <= AGREE_S;
+  const words = [_("other leg: connected"), describeClock(other)];
+  if (!isKnown) words.push(_("no symmetry: the phones’ clocks do not agree within 10 ms"));
+  return words.filter(Boolean).join(", ");
+}
+
+function describeAllSources(presence, strides, silent_s, isRunning) {
+  const [sign, words] = describeSource(presence.source, strides, silent_s, isRunning, presence.source_trouble);
+  const others = [describeClock(presence.source_clock), describeCompanion(presence)].filter(Boolean);
+  return [presence.companion_trouble && sign === "✓" ? "!" : sign, [words, ...others].join(" · ")];
+}
 
 function describeSource(isThere, strides, silent_s, isRunning, trouble) {
   if (!isThere) {
@@ -53,13 +80,7 @@ export function createConnections({ state, show, socket, robot }) {
     const strides = state.strides.slice(-LAST);
     const { text, isLow } = robot.connection;
     return {
-      source: describeSource(
-        presence.source,
-        strides,
-        state.strideAgo_s,
-        sessionState === "running",
-        presence.source_trouble,
-      ),
+      source: describeAllSources(presence, strides, state.strideAgo_s, sessionState === "running"),
       tablets: describeTablets(presence.tablets, state.tabletAgo_s, state.isTabletHeard),
       robot: presence.robot ? [isLow ? "!" : "✓", text] : ["–", _("none")],
     };

@@ -4,6 +4,12 @@ import { _, fill, number } from "garry/shared/language";
 import { percent, signed } from "garry/shared/format";
 import { clockCures, phaseName, reasonName } from "garry/shared/labels";
 
+// By which sensor a stride was measured (rehab/training/measures.py).
+const WORN = {
+  wearable_foot: _("sensor on the foot, algorithm %(version)s"),
+  wearable_shank: _("sensor on the shin, algorithm %(version)s"),
+};
+
 export function createLastStride({ state, show }) {
   const dot = document.querySelector(".verdict .dot");
 
@@ -30,6 +36,7 @@ export function createLastStride({ state, show }) {
   }
 
   function describeExtra([name, value]) {
+    if (name in WORN) return fill(WORN[name], { version: value });
     return `${name} ${number(+value.toPrecision(3), null)}`;
   }
 

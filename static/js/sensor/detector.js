@@ -51,6 +51,11 @@ export class WearableDetector {
     return !this.#best && Math.max(...this.#readings.map((one) => one.total)) >= STRIDES_ASKED;
   }
 
+  // The vertical in the sensor's frame when the leg last stood still; null before.
+  get upright() {
+    return this.#standing.upright;
+  }
+
   get axisShare() {
     return this.#axis.share;
   }

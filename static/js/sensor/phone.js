@@ -6,8 +6,12 @@ import { _, fill } from "garry/shared/language";
 import { WearableDetector } from "garry/sensor/detector";
 import { Journal } from "garry/sensor/journal";
 import { Motion } from "garry/sensor/motion";
+import { LastPlace } from "garry/sensor/place";
+import { RecentSamples } from "garry/sensor/recent";
 import { Sender } from "garry/sensor/sender";
 import { toStep } from "garry/sensor/stride";
+import { Symmetry } from "garry/sensor/symmetry";
+import { walkInstead } from "garry/sensor/trial";
 
 const HOLD_MS = 2_000;
 const TICK_MS = 500;
@@ -17,6 +21,7 @@ const LIFT_RAD_S = 1;
 const STRIDES_CHECKED = 3; // five steps of both legs
 const SHARE = 0.6; // of all rotation about one axis, below which a phone sits crooked
 const LOW_BATTERY = 0.2;
+const HARMLESS = ["", "battery", "elsewhere"]; // strides count all the same
 
 const PLACES = { foot: _("foot"), shank: _("shin") };
 const SIDES = { left: _("left"), right: _("right") };
@@ -26,6 +31,7 @@ const STRAPS = {
 };
 const LINKS = {
   connected: _("connected"),
+  "other leg": _("connected, for the steps’ symmetry: the other leg is trained"),
   lost: _("no network: strides are kept and sent later"),
   "no session": _("waiting for a session"),
   unauthorized: _("This square is no longer valid. Show a new one on the therapist’s page."),
@@ -36,13 +42,18 @@ const LINKS = {
 // The token is kept for a reload of this page, and leaves the address.
 const scanned = location.hash.slice(1) || sessionStorage.getItem("sensor") || "";
 const { token, place, side } = Object.fromEntries(new URLSearchParams(scanned));
-history.replaceState(null, "", location.pathname);
+const isTrial = new URLSearchParams(location.search).has("trial");
+history.replaceState(null, "", location.pathname + location.search);
 window.addEventListener("hashchange", () => location.reload()); // another square was scanned
 
 const body = document.body;
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
 const detector = new WearableDetector(place === "foot" ? "foot" : "shank");
 const motion = new Motion();
+const symmetry = new Symmetry();
+const recent = new RecentSamples();
+const lastPlace = new LastPlace(place, side);
+let elsewhere_deg = 0; // by how much it sits otherwise than last time
 let sender;
 let link = "no session";
 let count = 0;
@@ -71,13 +82,15 @@ function findTrouble() {
   if (heard_s !== null && now_s() - heard_s > 1) return "gap";
   if (detector.isInDoubt) return "doubt";
   if (movedUntil_s > now_s()) return "moved";
-  return motion.trouble(now_s()) || (battery < LOW_BATTERY ? "battery" : "");
+  const minor = battery < LOW_BATTERY ? "battery" : elsewhere_deg ? "elsewhere" : "";
+  return motion.trouble(now_s()) || minor;
 }
 
 function take(event) {
   const sample = motion.read(event);
   if (!sample) return;
   const { time_s, rate, acceleration } = sample;
+  recent.add(sample);
   const step_s = heard_s === null ? 0 : time_s - heard_s;
   heard_s = time_s;
   const speed = Math.hypot(...rate);
@@ -88,15 +101,22 @@ function take(event) {
     if (stride.reasons.includes("sensor_moved")) movedUntil_s = time_s + 5;
     const trouble = findTrouble();
     // What the therapist sees in amber does not count either.
-    if (trouble && trouble !== "battery" && !stride.reasons.length) stride.reasons.push(`sensor_${trouble}`);
-    sender?.put(toStep(stride, place, side));
+    if (!HARMLESS.includes(trouble) && !stride.reasons.length) stride.reasons.push(`sensor_${trouble}`);
+    sender?.put(toStep(stride, place, side, describeClock(stride)));
   }
+}
+
+// How well this phone's clock is known, and with a phone on the other leg how unequal the steps are.
+function describeClock(stride) {
+  const error_s = sender ? sender.clock.error_s(now_s()) : Infinity;
+  if (!Number.isFinite(error_s)) return {};
+  return { clock_error_ms: 1000 * error_s, step_asymmetry_percent: symmetry.find(stride, sender.clock, now_s()) };
 }
 
 let said = null;
 function tick() {
   const trouble = findTrouble();
-  if (trouble !== said) sender?.say((said = trouble));
+  if (trouble !== said) sender?.say({ trouble: (said = trouble), rate_hz: motion.rate_hz });
   if (body.dataset.step === "check") drawCheck();
   show("strides", String(count));
   const rate = motion.rate_hz === null ? "–" : Math.round(motion.rate_hz);
@@ -112,12 +132,21 @@ function drawCheck() {
     item.classList.toggle("done", isDone[item.dataset.check]);
     item.classList.toggle("now", item.dataset.check === next);
   }
+  if (!hasWalked && detector.upright) elsewhere_deg = lastPlace.compare(detector.upright);
   const isCrooked = hasWalked && detector.axisShare < SHARE;
   const verdict = slots.get("verdict");
-  verdict.dataset.sign = isCrooked || detector.isInDoubt ? "amber" : hasWalked ? "green" : "";
+  const isAmber = isCrooked || detector.isInDoubt || elsewhere_deg;
+  verdict.dataset.sign = isAmber ? "amber" : hasWalked ? "green" : "";
   if (detector.isInDoubt)
     show("verdict", _("Stand still, lift the toes (shin: swing the leg forward) once, stand still."));
   else if (isCrooked) show("verdict", _("It sits crooked or turns: tighten the strap, and walk again."));
+  else if (elsewhere_deg)
+    show(
+      "verdict",
+      fill(_("It sits %(angle)s° otherwise than last time. Strap it on as before, or take a new baseline."), {
+        angle: elsewhere_deg,
+      }),
+    );
   else show("verdict", hasWalked ? _("Good.") : "");
 }
 
@@ -136,25 +165,27 @@ async function watchBattery() {
 
 async function begin() {
   // iOS asks the person, and only after a tap.
-  if (typeof DeviceMotionEvent.requestPermission === "function") {
+  if (!isTrial && typeof DeviceMotionEvent.requestPermission === "function") {
     const answer = await DeviceMotionEvent.requestPermission().catch(() => "denied");
     if (answer !== "granted") {
       refuse(_("Movement is not allowed. Reload this page, and allow it when the phone asks."));
       return;
     }
   }
-  sender = new Sender(body.dataset.socket, token, await Journal.open(), (state, message) => {
+  sender = new Sender(body.dataset.socket, token, side, await Journal.open(), (state, message) => {
     link = state;
     if (["unauthorized", "replaced", "refused"].includes(state)) refuse(message ?? LINKS[state]);
   });
+  sender.onContact = (contact) => symmetry.note(contact);
   await sender.open();
-  window.addEventListener("devicemotion", take);
+  if (isTrial) walkInstead(body.dataset.trial, take);
+  else window.addEventListener("devicemotion", take);
   setInterval(tick, TICK_MS);
   document.addEventListener("visibilitychange", () => {
     tick();
     keepAwake();
   });
-  await keepAwake();
+  keepAwake();
   watchBattery();
   step("check");
 }
@@ -166,10 +197,15 @@ function holdToLeave(button) {
   for (const name of ["pointerup", "pointerleave", "pointercancel"]) button.addEventListener(name, release);
 }
 
-if (!window.isSecureContext || !("DeviceMotionEvent" in window)) {
-  refuse(
-    _("Phones measure movement only on pages that came by https. Open GARRY by its https address, and pair again."),
-  );
+function lock() {
+  if (detector.upright) lastPlace.keep(detector.upright);
+  elsewhere_deg = 0;
+  step("locked");
+}
+
+if (!isTrial && (!window.isSecureContext || !("DeviceMotionEvent" in window))) {
+  refuse(_("Phones measure movement only on pages that came by https."));
+  document.querySelector("[data-cure]").hidden = false;
 } else if (!token || !(place in PLACES) || !(side in SIDES)) {
   refuse(_("Scan the square on the therapist’s page: “A phone as a sensor”."));
 } else {
@@ -178,7 +214,10 @@ if (!window.isSecureContext || !("DeviceMotionEvent" in window)) {
   show("where", fill(_("%(side)s %(place)s"), { side: SIDES[side], place: PLACES[place] }));
   show("strap", STRAPS[place]);
   step("strap");
-  document.querySelector("[data-begin]").addEventListener("click", begin);
-  document.querySelector("[data-lock]").addEventListener("click", () => step("locked"));
+  const start = document.querySelector("[data-begin]");
+  start.addEventListener("click", begin);
+  start.disabled = false; // earlier, a tap would be lost
+  document.querySelector("[data-lock]").addEventListener("click", lock);
+  document.querySelector("[data-save]").addEventListener("click", () => recent.save(`${side} ${place}.csv`));
   holdToLeave(document.querySelector("[data-leave]"));
 }

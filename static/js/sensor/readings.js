@@ -86,6 +86,7 @@ export class Reading {
       stance_s,
       end_s: begin_s + initial_s + stride_s,
       reasons: this.#findDoubts(begin_s, swing),
+      rate_hz: 1 / history.findMeanStep(begin_s, swing.end_s),
       foot_strike_rad: isFoot ? history.findFootStrike(begin_s, leaves_s, sign) : null,
       push_off_rad_s: isFoot ? history.findPushOff(begin_s, leaves_s, sign) : null,
       shank_lean_rad: !isFoot && upright ? history.findLean(leaves_s + terminal_s, upright, scale(left, sign)) : null,

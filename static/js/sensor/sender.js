@@ -1,14 +1,20 @@
 // Sends strides by the protocol of sources (docs/protocol.md): numbered, stored until acknowledged, sent again.
 
+import { ServerClock } from "garry/sensor/clock";
+
 const FIRST_PAUSE_MS = 500;
 const LONGEST_PAUSE_MS = 5_000;
 const ANSWER_MS = 8_000; // after which a connection that owes an answer is dead
+const FIRST_QUESTIONS = 8; // for the server's time
+const QUESTION_MS = [250, 15_000]; // between the first ones, and later
 const MOST = 80; // steps that are not acknowledged; so many fill half of the largest frame
 const FINAL = new Map([
   [4001, "unauthorized"],
   [4009, "replaced"],
   [4400, "refused"],
 ]);
+
+const now_s = () => (performance.timeOrigin + performance.now()) / 1000;
 
 export class Sender {
   #path;
@@ -22,13 +28,20 @@ export class Sender {
   #isWelcome = false; // in a session
   #heard_ms = 0; // when the server last said something, or was first asked
   #pause_ms = FIRST_PAUSE_MS;
-  #trouble = "";
+  #about = { trouble: "" };
+  #side;
+  #isCompanion = false; // on the leg that is not trained: its contacts alone are sent
   #onState;
+  #questions = 0; // over this connection:
+  #asked = null;
+  clock = new ServerClock();
+  onContact = () => {}; // of the other leg's phone
   state = "ready"; // of the session
 
-  // `onState(state, message)`: "connected", "lost", "no session", or why it ends: a value of FINAL.
-  constructor(path, token, journal, onState) {
+  // `onState(state, message)`: "connected", "other leg", "lost", "no session", or why it ends: a value of FINAL.
+  constructor(path, token, side, journal, onState) {
     this.#path = path;
+    this.#side = side;
     this.#token = token;
     this.#journal = journal;
     this.#onState = onState;
@@ -46,8 +59,19 @@ export class Sender {
     setInterval(() => this.#watch(), 1_000);
   }
 
+  // Send when this leg met the floor, for the phone on the leg that is trained.
+  #sendContact({ end_s }) {
+    const error_s = this.clock.error_s(now_s());
+    if (!this.#isWelcome || this.state !== "running" || !Number.isFinite(error_s)) return;
+    this.#send({ type: "contact", at_s: this.clock.toServer(end_s), error_s });
+  }
+
   // Number a stride and store it, while a session takes strides. Returns whether it did.
   async put(stride) {
+    if (this.#isCompanion) {
+      if (!stride.reasons.length) this.#sendContact({ end_s: stride.time_s });
+      return false;
+    }
     if (this.#run?.session == null || !["running", "paused"].includes(this.state)) return false;
     this.#run.last += 1;
     const numbered = { number: this.#run.last, ...stride };
@@ -58,9 +82,19 @@ export class Sender {
     return true;
   }
 
-  say(trouble) {
-    this.#trouble = trouble;
-    if (this.#isWelcome) this.#send({ type: "sensor", trouble });
+  // `about`: { trouble, rate_hz }.
+  say(about) {
+    this.#about = about;
+    const error_s = this.clock.error_s(now_s());
+    const clock = Number.isFinite(error_s) ? { clock_offset_s: this.clock.offset_s, clock_error_s: error_s } : {};
+    if (this.#isWelcome) this.#send({ type: "sensor", ...about, ...clock });
+  }
+
+  #askTime(socket) {
+    if (socket !== this.#socket) return;
+    this.#send({ type: "clock", asked_s: now_s() });
+    this.#questions += 1;
+    setTimeout(() => this.#askTime(socket), QUESTION_MS[Number(this.#questions >= FIRST_QUESTIONS)]);
   }
 
   #connect() {
@@ -70,8 +104,7 @@ export class Sender {
     this.#heard_ms = performance.now();
     own.onopen = () => {
       const { run, last } = this.#run;
-      const clock_s = (performance.timeOrigin + performance.now()) / 1000;
-      this.#send({ type: "hello", version: 1, token: this.#token, run, last, clock_s });
+      this.#send({ type: "hello", version: 1, token: this.#token, run, last, clock_s: now_s(), side: this.#side });
     };
     own.onmessage = ({ data }) => {
       this.#heard_ms = performance.now();
@@ -106,6 +139,13 @@ export class Sender {
       case "welcome":
         await this.#join(message);
         break;
+      case "clock":
+        this.clock.answer(message.asked_s, message.at_s, now_s());
+        if (this.#questions === FIRST_QUESTIONS || this.#questions % 4 === 0) this.say(this.#about);
+        break;
+      case "contact":
+        this.onContact(message);
+        break;
       case "ack":
         this.#waiting = this.#waiting.filter(({ number }) => number > message.number);
         await this.#journal.acknowledge(message.number);
@@ -127,12 +167,24 @@ export class Sender {
     }
   }
 
-  async #join({ session, state, next }) {
+  async #join({ session, state, next, is_companion: companion }) {
     this.#pause_ms = FIRST_PAUSE_MS;
     this.#isAnswered = true;
     this.state = state;
     if (session === null) {
       this.#onState("no session");
+      return;
+    }
+    if (this.#asked !== this.#socket) {
+      this.#asked = this.#socket;
+      this.#questions = 0;
+      this.#askTime(this.#asked);
+    }
+    this.#isCompanion = Boolean(companion);
+    if (this.#isCompanion) {
+      this.#isWelcome = true;
+      this.#onState("other leg");
+      this.say(this.#about);
       return;
     }
     if (this.#run.session !== session) {
@@ -147,7 +199,7 @@ export class Sender {
     this.#sent = next - 1;
     this.#isWelcome = true;
     this.#onState("connected");
-    this.say(this.#trouble);
+    this.say(this.#about);
     this.#flush();
   }
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
+
 from asgiref.sync import sync_to_async
 
 from rehab.sessions.log import Step
 from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.stations.models import Device
 from rehab.training.goals import GoalRule
-from tests.support.callers import a_step, numbers
+from tests.support.callers import SourceCaller, a_step, numbers
 
 STRIDE = {"wearable_foot": 1, "foot_strike_deg": 21.5, "push_off_deg_s": 380.0, "stride_s": 1.2}
 
@@ -52,3 +55,43 @@ async def test_the_therapist_sees_what_is_wrong_with_a_sensor(place, sourced):
     assert all("source_trouble" not in event["presence"] for event in told)
     await source.say({"type": "sensor", "trouble": "tired"})
     assert (await source.sent_away())[0] == 4400
+
+
+async def test_a_phone_asks_for_the_time(place, sourced):
+    _, source = await sourced(place)
+    before_s = time.monotonic()
+    times = []
+    for asked_s in (12.5, 12.6):
+        await source.say({"type": "clock", "asked_s": asked_s})
+        answer = await source.hear("clock")
+        assert answer["asked_s"] == asked_s
+        times.append(answer["at_s"])
+    assert abs(times[0] - time.time()) < 60
+    assert 0 <= times[1] - times[0] <= time.monotonic() - before_s
+
+
+async def test_a_sensor_on_the_other_leg_brings_contacts_alone(place, sourced):
+    """Both are there at once; what it measures is no step, and reaches the trained leg's sensor."""
+    session, source = await sourced(place)
+    monitor = await place.monitor(session).open()
+    device = await Device.everywhere.aget(pk=place.devices["source"].pk)
+    device.pk, device.name = None, "Phone, right shin"
+    token = device.new_token()
+    await device.asave(force_insert=True)
+    other = SourceCaller(token)
+    await other.dial()
+    assert (await other.hello(side="right"))["is_companion"]
+    await other.say(
+        {"type": "sensor", "trouble": "", "clock_offset_s": 0.2, "clock_error_s": 0.003}
+    )
+    seen = await monitor.until(
+        lambda e: e["kind"] == "presence" and e["presence"]["companion_clock"]
+    )
+    assert seen["presence"]["companion_clock"] == [0.2, 0.003]
+    assert seen["presence"]["source"]
+    await other.say({"type": "contact", "at_s": 1000.5, "error_s": 0.003})
+    assert (await source.hear("contact"))["at_s"] == 1000.5
+    await source.walk(4.0)
+    await other.say(a_step(1, None, extra={"wearable_shank": 1}))
+    assert (await other.sent_away())[1]["code"] == "other_leg"
+    assert await numbers(session) == [1]

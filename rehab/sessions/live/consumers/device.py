@@ -34,7 +34,7 @@ class DeviceSocket(Socket):
     """
 
     kind: ClassVar[Device.Kind]
-    slot: ClassVar[str]
+    slot: str
     device: Device | None = None
     hello_received = False
     rotates = False  # it can store another token, and none is being given
@@ -141,7 +141,8 @@ class DeviceSocket(Socket):
     async def _attach(self, session_id: int) -> None:
         # Settled: nothing may come between taking the slot and the welcome.
         live = await self.runtime.settled_session(session_id)
-        other: ConnectedDevice | None = getattr(live, self.slot)
+        slot = self.choose_slot(live)
+        other: ConnectedDevice | None = getattr(live, slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:
                 raise CloseSocket(
@@ -152,10 +153,14 @@ class DeviceSocket(Socket):
                 )
             other.evict(CloseCode.REPLACED, "replaced", "The same device connected again.")
         self._leave_session()
-        self.live = live
+        self.live, self.slot = live, slot
         setattr(live, self.slot, self)
         live.announce_presence(timezone.now())
         await self.on_attach(live)
+
+    def choose_slot(self, live: LiveSession) -> str:
+        """Return which attribute of the session it takes."""
+        return self.slot
 
     def evict(self, code: int, error: str, message: str) -> None:
         """Close soon, with an error."""

@@ -13,10 +13,11 @@ from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.protocol.backlog import is_duplicate
 from rehab.sessions.live.protocol.messages import (
     Hello,
-    SensorTrouble,
+    read_clock,
+    read_contact,
     read_hello,
     read_plain,
-    read_trouble,
+    read_sensor,
 )
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.live.session.lateness import Lateness
@@ -31,6 +32,7 @@ from robot.wire.frames import BadFrame
 from robot.wire.limits import MAX_STEPS
 
 STEPPING = {State.RUNNING, State.PAUSED}  # states that take steps
+OUR_CLOCK_S = time.time() - time.monotonic()  # Unix time, which steps of the wall clock leave alone
 PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0)
 
 
@@ -40,6 +42,7 @@ class SourceConsumer(DeviceSocket):
     kind = Device.Kind.SOURCE
     slot = "source"
     lateness: Lateness
+    side: Side | None = None  # of a worn sensor
     plain_s: float | None = None  # plain text's time when our clock shows 0
 
     async def on_frame(self, text: str | None) -> None:
@@ -52,7 +55,7 @@ class SourceConsumer(DeviceSocket):
     def handle_now(self, text: str) -> bool:
         """Record the next step, as most frames bring it; all else takes its turn."""
         live = self.live
-        if live is None or not self.hello_received or not live.gate.is_open:
+        if live is None or not self.hello_received or not live.gate.is_open or self._is_companion:
             return False
         step = read_single_step(text)
         if step is None or step.number != live.next_number:
@@ -78,18 +81,41 @@ class SourceConsumer(DeviceSocket):
             await self._handle_hello(read_hello(message))
         elif kind in ("step", "steps"):
             await self._handle_steps(read_steps(message))
+        elif kind == "clock":
+            asked_s, now_s = read_clock(message), OUR_CLOCK_S + time.monotonic()
+            await self.send_message({"type": "clock", "asked_s": asked_s, "at_s": now_s})
         elif kind == "sensor":
-            self._note_trouble(read_trouble(message))
+            self._note_sensor(message)
+        elif kind == "contact":
+            contact = read_contact(message)
+            if self._is_companion and self.live is not None and self.live.source is not None:
+                answer = {"type": "contact", "at_s": contact.at_s, "error_s": contact.error_s}
+                self.live.source.outbox.queue(answer)
         elif kind is not None or "token" not in message:
-            raise BadFrame('A source sends "hello", "step", "steps" and "sensor".')
+            raise BadFrame('A source sends "hello", "step", "steps", "sensor", "clock", "contact".')
 
-    def _note_trouble(self, trouble: SensorTrouble) -> None:
-        live = self.live
-        if live is not None and live.source_trouble != trouble:
-            live.source_trouble = trouble.value
-            live.announce_presence(timezone.now())
+    @property
+    def _is_companion(self) -> bool:
+        """Whether it is worn on the leg that is not trained, and brings contacts alone."""
+        return self.slot == "companion"
+
+    def choose_slot(self, live: LiveSession) -> str:
+        """Return "companion" for a sensor on the leg that is not trained."""
+        is_other = self.side is not None and self.side != live.aggregate.fold.plan.trained_side
+        return "companion" if is_other else "source"
+
+    def _note_sensor(self, message: Message) -> None:
+        state, live = read_sensor(message), self.live
+        if live is None:
+            return
+        if self._is_companion:
+            live.companion_state = state
+        else:
+            live.source_state = state
+        live.announce_presence(timezone.now())
 
     async def _handle_hello(self, hello: Hello) -> None:
+        self.side = hello.side
         self.lateness = Lateness(
             hello.run,
             time.monotonic(),
@@ -101,12 +127,16 @@ class SourceConsumer(DeviceSocket):
 
     async def on_attach(self, live: LiveSession) -> None:
         """Send the session's state and the number of the next step."""
+        fold = live.aggregate.fold
+        if self._is_companion:
+            state = {"state": fold.state.value, "next": 1, "is_companion": True}
+            await self.send_message({"type": "welcome", "session": live.id, **state})
+            return
         clock = live.source_clock
         if clock is not None and clock.run == self.lateness.run and not self.lateness.is_known:
             self.lateness = clock
         live.source_clock = self.lateness
-        live.source_trouble = ""  # a sensor says so again
-        fold = live.aggregate.fold
+        live.source_state = None  # a sensor says so again
         await self.send_message(
             {
                 "type": "welcome",
@@ -127,6 +157,8 @@ class SourceConsumer(DeviceSocket):
         if not self.hello_received:
             raise BadFrame("Send hello first.", "no_hello")
         live = self.live
+        if self._is_companion:
+            raise BadFrame("A sensor on the other leg sends contacts, no steps.", "other_leg")
         if live is None:
             await self._send_error(
                 "no_session", "This station has no open session. Wait for welcome."

@@ -27,6 +27,7 @@ from rehab.sessions.live.protocol.fields import (
 )
 from rehab.sessions.log import REMARK_RANGES, Remark
 from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
+from rehab.training.steps import Side
 from robot.wire.frames import (
     BadFrame,
     check_values,
@@ -67,6 +68,7 @@ class Hello(Struct, frozen=True):
     clock_s: Number | None = None
     speed: Positive | None = 1.0  # None: as fast as it can
     clock_pauses: bool = False  # its clock stands while the session is paused
+    side: Side | None = None  # of a worn sensor: on the leg that is not trained it brings contacts
 
 
 class _Pose(Struct):
@@ -186,17 +188,44 @@ class SensorTrouble(StrEnum):
     SLOW = "slow"
     GAP = "gap"
     MOVED = "moved"
+    ELSEWHERE = "elsewhere"
     BATTERY = "battery"
     DOUBT = "doubt"
 
 
-class _Sensor(Struct):
+class SensorState(Struct, frozen=True):
+    """What a worn sensor says of itself: its trouble, its rate, its clock less ours."""
+
     trouble: SensorTrouble
+    rate_hz: Number | None = None
+    clock_offset_s: Number | None = None
+    clock_error_s: Positive | None = None
 
 
-def read_trouble(message: Message) -> SensorTrouble:
+class Contact(Struct, frozen=True):
+    """When the foot of the leg that is not trained met the floor, by the server's clock."""
+
+    at_s: Number
+    error_s: Positive
+
+
+class _Clock(Struct):
+    asked_s: Number
+
+
+def read_sensor(message: Message) -> SensorState:
     """Return what a worn sensor says of itself. Raises BadFrame."""
-    return read_fields(message, _Sensor).trouble
+    return read_fields(message, SensorState)
+
+
+def read_contact(message: Message) -> Contact:
+    """Return a contact of the other leg. Raises BadFrame."""
+    return read_fields(message, Contact)
+
+
+def read_clock(message: Message) -> float:
+    """Return when a source asked for our time, by its clock [s]. Raises BadFrame."""
+    return read_fields(message, _Clock).asked_s
 
 
 def read_plain(text: str) -> tuple[float | None, float | None] | None:

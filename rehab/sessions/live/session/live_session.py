@@ -22,6 +22,7 @@ from rehab.sessions.events.event import (
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live.database.trouble import WORDS, NotStored, classify_failure
 from rehab.sessions.live.devices import ConnectedDevice
+from rehab.sessions.live.protocol.messages import SensorState
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
 from rehab.sessions.live.session.group_commit import Writer
@@ -66,7 +67,9 @@ class LiveSession:
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
         self.source: ConnectedDevice | None = None
         self.source_clock: Lateness | None = None  # of its latest run
-        self.source_trouble = ""  # what a worn sensor says of itself
+        self.source_state: SensorState | None = None  # what a worn sensor says of itself
+        self.companion: ConnectedDevice | None = None  # a sensor on the leg that is not trained
+        self.companion_state: SensorState | None = None
         self.robot: ConnectedDevice | None = None
         self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
         self.tablets = 0
@@ -94,7 +97,8 @@ class LiveSession:
     @property
     def is_idle(self) -> bool:
         """Whether nothing needs it in memory."""
-        return not (self.feed.subscribers or self.source or self.robot or self.uncommitted)
+        devices = self.source or self.companion or self.robot
+        return not (self.feed.subscribers or devices or self.uncommitted)
 
     @property
     def is_running(self) -> bool:
@@ -227,7 +231,11 @@ class LiveSession:
         """Return who is connected, and how long ago source and tablet last sent something."""
         return {
             "source": self.source is not None,
-            "source_trouble": self.source_trouble if self.source else "",
+            "source_trouble": _trouble(self.source, self.source_state),
+            "source_clock": _clock(self.source, self.source_state),
+            "companion": self.companion is not None,
+            "companion_trouble": _trouble(self.companion, self.companion_state),
+            "companion_clock": _clock(self.companion, self.companion_state),
             "robot": self.robot is not None,
             "tablets": self.tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),
@@ -301,3 +309,14 @@ def _ago_s(moment: datetime | None, now: datetime) -> float | None:
 
 def _for_patient(about: Message) -> Message:
     return {name: about[name] for name in ("session", "nickname", "language", "own_goal")}
+
+
+def _trouble(device: ConnectedDevice | None, state: SensorState | None) -> str:
+    return state.trouble.value if device and state else ""
+
+
+def _clock(device: ConnectedDevice | None, state: SensorState | None) -> list[float | None] | None:
+    """Return a worn sensor's clock less ours, and its error [s]."""
+    if device is None or state is None or state.clock_error_s is None:
+        return None
+    return [state.clock_offset_s, state.clock_error_s]
