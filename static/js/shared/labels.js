@@ -92,10 +92,10 @@ const DOUBTS = {
     "The angle moves as a knee’s does. Check the source’s columns; if right, pause and go on: strides then count.",
   ),
   doubt_moment: _(
-    "The ankle’s moment does not rest in swing. Zero the plates before the lab’s computation; if right, pause and go on.",
+    "The ankle’s moment is not zero in swing. Zero the plates before the lab computes it; if right, pause and go on.",
   ),
   doubt_load: _(
-    "The other plate is loaded while one foot stands: cane, hand or a foot that drags. If right, pause and go on: strides then count.",
+    "The other plate is loaded while one foot stands: cane, hand or dragging foot. If right, pause and go on.",
   ),
 };
 
