@@ -4,6 +4,8 @@ import json
 import math
 from argparse import ArgumentParser
 from contextlib import suppress
+from types import SimpleNamespace
+from unittest.mock import patch
 
 from robot.base_options import add_base_arguments, make_base
 from robot.bases.rosbridge import RosbridgeBase
@@ -41,8 +43,19 @@ class Stage:
         self.is_frozen = False  # nothing passes any more, and nobody is told; later it does
         self.inbox, self.outbox, self.client = [], [], None
         self.performer = None
-        self.connect()
-        self.wait(0.2)
+        self.open()
+
+    def open(self):
+        """Open the base as a program does, which may order motion from then on."""
+        with (
+            patch.object(self.base._bridge, "open", lambda url: self.connect()),
+            patch("robot.bases.rosbridge.base.time", SimpleNamespace(sleep=self.sleep)),
+        ):
+            RosbridgeBase.open(self.base)
+
+    def sleep(self, span_s):
+        self.now_s += span_s
+        self.pass_on()
 
     def connect(self):
         self.client = self.bridge.join(self.inbox.append)

@@ -12,6 +12,7 @@ from robot.bases.base import Answer, BaseLost, BaseState, Indication, MobileBase
 from robot.bases.rosbridge.client import BaseClient
 from robot.bases.rosbridge.options import add_topic_arguments, read_topics
 from robot.bases.rosbridge.topics import DEFAULT_PROFILE, PROFILES, Topics
+from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL, Twist
 from robot.ros.bridge import Bridge, find_bridge
 
@@ -45,11 +46,14 @@ class RosbridgeBase(MobileBase):
         self._set_topics(read_topics(options))
 
     def open(self) -> None:
-        """Connect, and wait a moment for the base's odometry."""
+        """Connect, wait a moment for the base's odometry, and let it be ordered to move."""
         self._bridge.open(self.port or find_bridge())
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and self.read().sensors.silent_s == math.inf:
-            time.sleep(0.02)
+            time.sleep(TICK_S)
+        # Motion is refused until a stop was confirmed and ordered once more; a gesture that is not
+        # announced begins with motion.
+        self.stop()
 
     def close(self) -> None:
         """Send the last frames, which are stops, and close the connection."""

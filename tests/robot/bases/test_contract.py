@@ -109,7 +109,7 @@ def rosbridge():
     ros = RosStage()
     ros.lose()
     base: Any = ros.base
-    base.open, base.close = ros.connect, lambda: None
+    base.open, base.close = ros.open, lambda: None
     yield Stage(base, RosClock(ros))
 
 
