@@ -51,6 +51,7 @@ HEADINGS = (
         _("People"),
         {
             "User": _("Who works here, and what their role lets them do."),
+            "SignOnGroup": _("Which clinic and role a group of the hospital’s sign-on gives."),
             "ApiToken": _("Tokens with which programs use the API."),
             "Clinic": _("Name, language, clock, second factor, how long data is kept."),
         },

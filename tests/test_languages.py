@@ -30,15 +30,18 @@ PLURALS = {  # as Django's own catalogs have them
     "fr": "nplurals=2; plural=(n > 1);",
 }
 # Words that are the same in English and in another language.
-ALIKE = "borg django garry min quattrocchi neurol neurosurg psychiatry paul medrxiv"
+ALIKE = (
+    "and android ipad iphone linux mac timed windows borg django garry min quattrocchi neurol "
+    "neurosurg psychiatry paul medrxiv"
+)
 ALIKE_IN = {
-    "es": "factor robot sensor extra normal plan",
-    "de": "arm code codes design feedback hedges minus monitor name normal passkey patient pause "
-    "person phase plan plus sensor start tablet tablets training",
-    "fr": "cadence code correction corrections date description effort incident incidents "
+    "es": "factor robot sensor extra normal plan total",
+    "de": "arm code codes design feedback hand hedges index minus monitor name normal passkey "
+    "patient pause person phase plan plus sensor start tablet tablets training",
+    "fr": "cadence code correction corrections date description distance effort incident incidents "
     "migrations minutes moment normal options pages participant participants patient patients "
     "pause performance phase phases phrases plan plus point points position questionnaire "
-    "questionnaires questions robot signature source type variation version",
+    "questionnaires questions robot signature source test total type variation version",
 }
 
 

@@ -28,7 +28,7 @@ MACHINE = {"help", "healthz", "readyz", "catalog", "tablet-state", "tablet-app",
 # What nobody translates: names of ours, units, codes, what people typed, and how dates are told.
 AS_IT_IS = re.compile(
     r"[Zz]q\w+qz[\w-]*|\bzq\b|NASA-TLX \(raw\)|System Usability Scale \(SUS\)|GARRY|"
-    r"W/kg|\b(?:kg|min|s|m)\b|(?:localhost|testserver|http)\S*|"
+    r"mm/\(steps/min\)|W/kg|\b(?:kg|min|s|m)\b|(?:localhost|testserver|http)\S*|"
     r"\bde\b|\ba las\b|UTC|[A-Z]\w+/\w+|/admin/[\w/]*|"
     r"P-[A-Z0-9]{8}|\b[A-Z0-9]{6}\b|\b[A-Z]\b|"
     r"\b(?:a\.m|p\.m|noon|midnight)\b\.?|[a-z]+(?:_[a-z]+)+|\{\x22.*|\w+\.py"

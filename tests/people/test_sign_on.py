@@ -34,6 +34,7 @@ def hospital(settings, monkeypatch):
 
 @pytest.fixture
 def linked(world) -> User:
+    SignOnGroup.everywhere.all().delete()
     user: User = world.people[Role.PT]
     user.subject = "4711"
     user.save()

@@ -177,7 +177,7 @@ def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_as
     session = walk(patient, "binary", strides(2000, 1000))
     url = reverse("session", kwargs={"session_id": session.pk})
     client.get(url)  # what is seen is noted once in some minutes
-    with django_assert_num_queries(11):
+    with django_assert_num_queries(14):
         page = client.get(url).content.decode()
     assert len(read_json(page, "session")["strides"]["number"]) == 3000
     assert len(page) < 150_000

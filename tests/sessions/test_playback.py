@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from rehab.people.audit import guards
 from rehab.people.roles import Role
 from rehab.sessions.log import Step
 from rehab.sessions.reports.playback import play_back
@@ -12,7 +13,8 @@ pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 def test_steps_that_came_too_late_are_as_quiet_as_they_were(world):
-    Step.everywhere.filter(session=world.session, number__in=(2, 4)).update(late=True)
+    with guards.lifted("default"):
+        Step.everywhere.filter(session=world.session, number__in=(2, 4)).update(late=True)
     played = play_back(world.people[Role.PT], world.session)
     told = [patient for *_, patient, _ in played["moments"] if patient]
     steps = {one["number"]: one for one in told if one["kind"] == "step"}

@@ -88,7 +88,7 @@ def test_the_end_of_a_session_sends_its_last_part_and_a_still_robot_sends_none(t
     stage.wait(6)
     stage.hear(type="state", state="finished", gesture="farewell")
     stage.wait(7)
-    stage.box.write()
+    stage.close()
     records = [record for one in stage.box.motion for record in unpack(one.recording)]
     names = [one["sent"]["name"] for one in records if "sent" in one]
     assert [name.rpartition("_")[0] for name in names] == ["greeting"] * 2 + ["farewell"] * 2

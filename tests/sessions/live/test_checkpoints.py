@@ -8,9 +8,9 @@ from asgiref.sync import sync_to_async
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import aggregate as aggregates
 from rehab.sessions.live.session.aggregate import SessionAggregate
-from rehab.sessions.log import Step
 from rehab.training.phases import make_phase
 from tests.support.callers import change, reread, restart
+from tests.support.evidence import change_steps
 
 pytestmark = pytest.mark.postgres
 
@@ -38,7 +38,7 @@ async def test_what_a_checkpoint_has_is_not_read_again(place, sourced, monkeypat
     await source.walk(*[4.0] * 12)
     await source.hang_up()
     await restart()
-    await Step.everywhere.filter(session=session, number__lte=10).aupdate(value=1.0)
+    await change_steps({"value": 1.0}, session=session, number__lte=10)
     again = await place.source().dial()
     assert (await again.hello())["next"] == 13
     await again.walk(4.0)

@@ -7,25 +7,25 @@ from asgiref.sync import sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.owners import note_ends
-from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.training.fold import SessionFold
 from tests.support.callers import a_step, change, numbers, restart
+from tests.support.evidence import lose_steps
 
 pytestmark = pytest.mark.postgres
 
 
-async def lose_steps(session: TrainingSession, after: int) -> None:
+async def set_back(session: TrainingSession, after: int) -> None:
     """Set the database back, as a failover to a copy that lagged does."""
-    await Step.everywhere.filter(session=session, number__gt=after).adelete()
+    await lose_steps(session=session, number__gt=after)
     await TrainingSession.everywhere.filter(pk=session.pk).aupdate(last_number=after)
 
 
 async def test_a_lagging_failover_tears_no_hole_into_the_log(place, sourced, bystander, caplog):
     session, source = await sourced(place)
     await source.walk(*[4.0] * 5)
-    await lose_steps(session, after=3)
+    await set_back(session, after=3)
     await source.say(a_step(6))
     code, error = await source.sent_away()
     assert (code, error["code"]) == (4011, "not_stored")
@@ -40,7 +40,7 @@ async def test_a_lagging_failover_tears_no_hole_into_the_log(place, sourced, bys
 async def test_a_step_that_is_gone_alone_is_missed_at_the_next_commit(place, sourced, caplog):
     session, source = await sourced(place)
     await source.walk(*[4.0] * 5)
-    await Step.everywhere.filter(session=session, number=5).adelete()
+    await lose_steps(session=session, number=5)
     await source.say(a_step(6))
     assert (await source.sent_away())[1]["code"] == "not_stored"
     assert await numbers(session) == [1, 2, 3, 4]
@@ -52,7 +52,7 @@ async def test_nothing_is_folded_over_a_hole(place, sourced, caplog):
     await source.walk(*[4.0] * 5)
     await source.hang_up()
     await restart()
-    await Step.everywhere.filter(session=session, number=3).adelete()
+    await lose_steps(session=session, number=3)
     reread = await TrainingSession.everywhere.aget(pk=session.pk)
     fold = await sync_to_async(fold_log)(SessionFold(session.to_plan()), reread)
     assert (fold.last_number, fold.score) == (2, 2)
@@ -70,7 +70,7 @@ async def test_a_log_that_lost_its_end_is_not_continued(place, sourced):
     await source.walk(*[4.0] * 5)
     await source.hang_up()
     await restart()
-    await Step.everywhere.filter(session=session, number=5).adelete()
+    await lose_steps(session=session, number=5)
     tablet = await place.tablet(session).dial()
     assert (await tablet.sent_away())[1]["code"] == "damaged_log"
 
@@ -87,6 +87,6 @@ async def test_a_logs_end_is_noted_with_changes_and_at_a_stop_and_never_lowered(
     await source.walk(4.0)
     await restart()
     assert await noted() == 3
-    await Step.everywhere.filter(session=session, number=3).adelete()
+    await lose_steps(session=session, number=3)
     await sync_to_async(note_ends)([session.pk])
     assert await noted() == 3

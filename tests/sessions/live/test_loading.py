@@ -10,6 +10,7 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError, connection
 from django.test.utils import CaptureQueriesContext
 
+from rehab.people.audit import guards
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import loading
 from rehab.sessions.live.session.aggregate import SessionAggregate
@@ -79,7 +80,8 @@ def test_sessions_loaded_together_are_what_each_is_alone():
 
 def test_a_session_that_cannot_be_loaded_leaves_the_others_alone():
     whole, damaged = (walk(build_place(name), 4) for name in ("elm", "oak"))
-    Step.everywhere.filter(session=damaged, number=2).delete()
+    with guards.lifted("default"):
+        Step.everywhere.filter(session=damaged, number=2).delete()
     found = loading.load_together(dict.fromkeys([whole.pk, damaged.pk, 0], 0))
     assert isinstance(found[whole.pk], loading.LoadedSession)
     assert isinstance(found[damaged.pk], DamagedLog)

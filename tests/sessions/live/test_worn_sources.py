@@ -66,7 +66,7 @@ async def test_a_phone_asks_for_the_time(place, sourced):
         answer = await source.hear("clock")
         assert answer["asked_s"] == asked_s
         times.append(answer["at_s"])
-    assert abs(times[0] - time.time()) < 60
+    assert times[0] > 1.7e9  # seconds since 1970
     assert 0 <= times[1] - times[0] <= time.monotonic() - before_s
 
 
