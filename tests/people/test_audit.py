@@ -55,7 +55,7 @@ SILENT = {
     *("account", "own-password", "set-up-second-factor", "add-app", "add-passkey"),
     *("sign-on", "sign-on-complete", "sign-on-ended", "sign-on-confirm", "sign-on-link"),
     *("remove-authenticator", "recovery-codes", "pair", "pair-phone", "consent-text", "export"),
-    *("screen-size", "https"),
+    *("screen-size", "https", "certificate", "certificate-file", "trial-walk"),
     *(
         "catalog",
         "home",

@@ -38,7 +38,7 @@ def close_study(name: str, patient: Patient, session: TrainingSession, by: User)
     """Store a study that is closed, so that it hides nothing: with a row of each of its models."""
     study = Study.everywhere.create(
         clinic=patient.clinic,
-        code=f"7{patient.clinic_id}",
+        code=f"7{patient.clinic_id}"[-8:],
         title=mark(name, Study),
         question=mark(name, Study),
         state="closed",

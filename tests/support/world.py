@@ -398,7 +398,7 @@ def build_world(name: str) -> World:
         ),
         Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
-            code=f"P{clinic.pk}",
+            code=f"P{clinic.pk}"[-8:],
             secret_hash=f"pairing-{name}",
             expires_at=NOW,
             device=device,

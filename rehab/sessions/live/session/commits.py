@@ -120,8 +120,11 @@ def commit(jobs: Sequence[Job]) -> None:
         if events:
             SessionEvent.everywhere.bulk_create(events)
             _note_robot_orders(events)
-            after_end = {event.session_id for event in events if event.session.ended_at}
-            if after_end:  # they may be sealed to their end already
+            # After an end, the log may be sealed to it already. A row that is updated twice would
+            # wait for its clinic's (PostgreSQL checks foreign keys again).
+            updated = {job.session_id for job in jobs if job.summary is not None}
+            after_end = {event.session_id for event in events if event.session.ended_at} - updated
+            if after_end:
                 TrainingSession.everywhere.filter(pk__in=after_end).update(unsealed=True)
         metrics = [row for job in jobs for row in job.rows if isinstance(row, SessionMetric)]
         if metrics:
@@ -129,7 +132,7 @@ def commit(jobs: Sequence[Job]) -> None:
         for job in jobs:
             if job.summary is not None:
                 TrainingSession.everywhere.filter(pk=job.session_id).update(
-                    last_number=noted_end(), **job.summary
+                    last_number=noted_end(), unsealed=True, **job.summary
                 )
         if metrics:
             _announce_figures({row.session.patient_id for row in metrics})
