@@ -2815,6 +2815,7 @@ class Migration(migrations.Migration):
                 "verbose_name": "sign-on group",
                 "verbose_name_plural": "sign-on groups",
                 "ordering": ["clinic", "name"],
+                "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
             },

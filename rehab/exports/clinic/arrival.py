@@ -32,7 +32,7 @@ from rehab.exports.clinic.sealed_file import (
     read_parts,
 )
 from rehab.exports.clinic.shared_rows import place_shared
-from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables, table_of
+from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables
 from rehab.people.aliases import draw_alias
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -320,6 +320,3 @@ def _store_recordings(file: BinaryIO, identities: Sequence[Identity]) -> Iterato
         new.unlink()
         if not is_same:
             yield name
-
-
-__all__ = ["Arrival", "clinic_paths", "import_clinic", "table_of"]

@@ -13,7 +13,7 @@ from cryptography.fernet import InvalidToken
 from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
 from django.db.models import Model, Q, QuerySet
 
-from rehab.exports.clinic.tables import MOVES, Table, clinic_paths, moving_tables, table_of
+from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables
 from rehab.people.audit.moves import ClinicMove, Translate, same_key
 from rehab.people.audit.sealing import with_floats
 from rehab.people.models import Clinic, User
@@ -229,6 +229,3 @@ def shared_references(clinic_id: int) -> dict[str, list[int]]:
 
 def _is_shared(model: type[Model]) -> bool:
     return bool(getattr(getattr(model, "scope", None), "shared", False))
-
-
-__all__ = ["MOVES", "ClinicRows", "Digest", "shared_references", "table_of", "to_json"]

@@ -11,7 +11,7 @@ from django.apps import apps
 from django.db.models import Model
 
 from rehab.people.audit.history import translate_entry
-from rehab.people.audit.moves import ClinicMove, Translate
+from rehab.people.audit.moves import Translate
 from rehab.people.audit.seals import sealed_models
 
 # Models whose rows stay behind, and why.
@@ -142,4 +142,3 @@ MORE_KEYS: dict[str, Callable[[Table, list[Any], Translate], None]] = {
     "rehab.logseal": _translate_seal,
     "rehab.boardsnapshot": _translate_snapshot,
 }
-MOVES = ClinicMove._meta.label_lower

@@ -10,13 +10,13 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models.clinics import Clinic
 from rehab.people.roles import Role
-from rehab.people.scope import Scope, ScopedManager
+from rehab.people.scope import Scope, ScopedModel
 
 
-class SignOnGroup(models.Model):
+class SignOnGroup(ScopedModel):
     """A group that the hospital's sign-on names, with the clinic and role of its members."""
 
-    scope: ClassVar[Scope] = Scope(clinic="clinic", host=Q())
+    scope = Scope(clinic="clinic", host=Q())
 
     name = models.CharField(
         _("group"), max_length=200, help_text=_("As the hospital's sign-on names it.")
@@ -28,15 +28,10 @@ class SignOnGroup(models.Model):
         _("role"), max_length=16, choices=[one for one in Role.choices if one[0] != Role.HOST]
     )
 
-    everywhere = models.Manager["SignOnGroup"]()
-    objects = ScopedManager["SignOnGroup"]()
-
-    class Meta:
+    class Meta(ScopedModel.Meta):
         verbose_name = _("sign-on group")
         verbose_name_plural = _("sign-on groups")
         ordering: ClassVar = ["clinic", "name"]
-        default_manager_name = "everywhere"
-        base_manager_name = "everywhere"
         constraints: ClassVar = [
             models.UniqueConstraint(
                 fields=["name", "clinic"],

@@ -29,6 +29,14 @@ def landing_page(user: User) -> str:
     return reverse("start" if user.role in {Role.LEAD, Role.PT} else "admin:index")
 
 
+def go_on(request: HttpRequest, user: User, next_url: str) -> HttpResponse:
+    """Sign in a person whose account is proven, or lead on to the second factor."""
+    if flow.begin(request, user, next_url, timezone.now()):
+        return HttpResponseRedirect(next_url)
+    has_factor = factors.authenticators_of(user).exists()
+    return redirect("second-factor" if has_factor else "set-up-second-factor")
+
+
 class SignIn(LoginView):
     """Name and password."""
 
@@ -42,11 +50,7 @@ class SignIn(LoginView):
     def form_valid(self, form: Any) -> HttpResponse:
         """Sign in, or go on to the second factor."""
         user: User = form.get_user()
-        next_url = self.get_redirect_url() or landing_page(user)
-        if flow.begin(self.request, user, next_url, timezone.now()):
-            return HttpResponseRedirect(next_url)
-        has_factor = factors.authenticators_of(user).exists()
-        return redirect("second-factor" if has_factor else "set-up-second-factor")
+        return go_on(self.request, user, self.get_redirect_url() or landing_page(user))
 
 
 sign_in = public(SignIn.as_view())

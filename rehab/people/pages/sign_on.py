@@ -15,10 +15,9 @@ from django.views.decorators.http import require_POST, require_safe
 from rehab.people.access import for_roles, public, user_of
 from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import User
-from rehab.people.pages.sign_in import landing_page
+from rehab.people.pages.sign_in import go_on, landing_page
 from rehab.people.roles import Role
 from rehab.people.sign_in import flow, sign_on, step_up
-from rehab.people.sign_in.factors import factors
 
 
 @public
@@ -106,14 +105,11 @@ def _lead_there(request: HttpRequest, kind: str, next_url: str, back: str) -> Ht
 def _sign_in(
     request: HttpRequest, user: User, claims: dict[str, object], next_url: str
 ) -> HttpResponse:
-    now = timezone.now()
     if not step_up.is_own_page(request, next_url):
         next_url = landing_page(user)
-    if sign_on.has_second_factor(claims):
-        flow.finish(request, user, now, second_factor_verified=True)
-    elif not flow.begin(request, user, next_url, now):
-        has_factor = factors.authenticators_of(user).exists()
-        return redirect("second-factor" if has_factor else "set-up-second-factor")
+    if not sign_on.has_second_factor(claims):
+        return go_on(request, user, next_url)
+    flow.finish(request, user, timezone.now(), second_factor_verified=True)
     return redirect(next_url)
 
 
