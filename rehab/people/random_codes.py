@@ -9,6 +9,52 @@ ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 
 
 CONSONANTS, VOWELS = "bdfghjklmnprstvz", "aeiou"
+# Words of these letters that insult or frighten in a language of the pages.
+UNWELCOME = frozenset(
+    [
+        "bite",
+        "bobo",
+        "dago",
+        "fude",
+        "hate",
+        "homo",
+        "hure",
+        "jode",
+        "jodi",
+        "jodo",
+        "jude",
+        "kaka",
+        "kike",
+        "lame",
+        "loko",
+        "lolo",
+        "maso",
+        "naga",
+        "nazi",
+        "nega",
+        "nego",
+        "nude",
+        "nuke",
+        "paki",
+        "pedo",
+        "pene",
+        "pija",
+        "pipi",
+        "popo",
+        "puta",
+        "pute",
+        "puti",
+        "puto",
+        "rape",
+        "rata",
+        "sado",
+        "sida",
+        "teta",
+        "tete",
+        "tote",
+        "zizi",
+    ]
+)
 
 
 def random_words(count: int) -> str:
@@ -18,7 +64,8 @@ def random_words(count: int) -> str:
     """
 
     def word() -> str:
-        return "".join(secrets.choice(CONSONANTS) + secrets.choice(VOWELS) for _ in range(2))
+        drawn = "".join(secrets.choice(CONSONANTS) + secrets.choice(VOWELS) for _ in range(2))
+        return word() if drawn in UNWELCOME else drawn
 
     return "-".join(word() for _ in range(count))
 

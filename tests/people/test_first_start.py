@@ -5,6 +5,7 @@ from django.conf import settings as live_settings
 from django.core.management import CommandError, call_command
 
 from rehab.people.models import User
+from rehab.people.random_codes import random_words
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import first_clinic, first_password, prepare_database
 
@@ -69,3 +70,9 @@ def test_a_hosted_database_is_never_migrated_behind_the_operators_back(settings,
     )
     with pytest.raises(CommandError, match=r"manage\.py migrate"):
         prepare_database()
+
+
+def test_a_first_password_has_no_word_that_insults(monkeypatch):
+    drawn = iter("nazidafokimutero")
+    monkeypatch.setattr("rehab.people.random_codes.secrets.choice", lambda _: next(drawn))
+    assert random_words(3) == "dafo-kimu-tero"
