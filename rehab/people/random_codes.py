@@ -10,9 +10,13 @@ ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 
 CONSONANTS, VOWELS = "bdfghjklmnprstvz", "aeiou"
 # Words of these letters that insult or frighten in a language of the pages.
-UNWELCOME = frozenset(
-    ["bite", "bobo", "dago", "fude", "hate", "homo", "hure", "jode", "jodi", "jodo", "jude", "kaka", "kike", "lame", "loko", "lolo", "maso", "naga", "nazi", "nega", "nego", "nude", "nuke", "paki", "pedo", "pene", "pija", "pipi", "popo", "puta", "pute", "puti", "puto", "rape", "rata", "sado", "sida", "teta", "tete", "tote", "zizi"]
-)
+UNWELCOME = {
+    *("bite", "bobo", "dago", "fude", "hate", "homo", "hure", "jode", "jodi", "jodo"),
+    *("jude", "kaka", "kike", "lame", "loko", "lolo", "maso", "naga", "nazi", "nega"),
+    *("nego", "nude", "nuke", "paki", "pedo", "pene", "pija", "pipi", "popo", "puta"),
+    *("pute", "puti", "puto", "rape", "rata", "sado", "sida", "teta", "tete", "tote"),
+    *("zizi",),
+}
 
 
 def random_words(count: int) -> str:
