@@ -100,3 +100,34 @@ def test_decimal_commas(tmp_path, delimiter):
         "Zeit [ms]": [0.5, 1.5],
         "Kraft": [-125.0, 7.0],
     }
+
+
+PLAIN = "time,L_Fz,L_Ank\n0.01,1.5,2\n0.02,-2.5,3\n0.03,,4\n"
+DIALECTS = {
+    "units": PLAIN.replace("L_Ank\n", "L_Ank\ns,N,deg\n"),
+    "above": "Subject: P01, male\nDate: 2026-01-01\n\n" + PLAIN,
+    "above, padded": "P01,,\n" + PLAIN,
+    "comment": "# exported\n" + PLAIN,
+    "Excel's": "sep=;\n" + PLAIN.replace(",", ";").replace(".", ","),
+    "quoted": "\n".join(
+        ",".join(f'"{cell}"' for cell in line.split(",")) for line in PLAIN.split("\n")[:-1]
+    ),
+    "quoted, decimal commas": "time,L_Fz,L_Ank\n" + "\n".join(
+        ",".join(f'"{cell.replace(".", ",")}"' for cell in line.split(","))
+        for line in PLAIN.split("\n")[1:-1]
+    ),
+    "bars": PLAIN.replace(",", "|"),
+    "blanks": PLAIN.replace(",,", ",nan,").replace(",", "  "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_a_table_is_read_in_any_dialect(tmp_path, name):
+    path = tmp_path / "walk.csv"
+    path.write_text(DIALECTS[name])
+    table = read_any_table(path)
+    expected = {"time": [0.01, 0.02, 0.03], "L_Fz": [1.5, -2.5, np.nan], "L_Ank": [2, 3, 4]}
+    assert list(table) == list(expected)
+    for column, values in expected.items():
+        np.testing.assert_array_equal(table[column], values)
+    assert table.units.get("L_Ank", "") == ("deg" if name == "units" else "")

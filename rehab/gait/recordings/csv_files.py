@@ -1,4 +1,4 @@
-"""Recorded signals in CSV files: a header, then one row a sample."""
+"""Recorded signals in CSV files: names of columns, then one row a sample."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import csv
 import gzip
 import warnings
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE, getincrementaldecoder
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from io import TextIOWrapper
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, BinaryIO, TextIO, cast
+from typing import Any, BinaryIO, NamedTuple, TextIO, cast
 
 import numpy as np
 
@@ -22,11 +23,13 @@ from rehab.gait.recordings.columns import (
     ColumnMap,
     SignalColumn,
 )
+from rehab.gait.recordings.table import Table
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
 
 MAX_HEADER = 64 * 1024
+HEAD_LINES = 40  # above and below the names
 
 
 def open_text(path: Path) -> TextIO:
@@ -80,8 +83,23 @@ def _is_utf_16(head: bytes, encoding: str) -> bool:
     return "\0" not in letters and latin > 0.8 * len(letters)
 
 
-def read_header(path: Path) -> tuple[list[str], str]:
-    """Return a file's column names and its delimiter.
+class Head(NamedTuple):
+    """What stands above the samples: names and units of columns, their delimiter, how many lines.
+
+    A ``delimiter`` of None is blanks.
+    """
+
+    names: list[str]
+    units: list[str]
+    delimiter: str | None
+    lines: int
+
+
+def read_head(path: Path) -> Head:
+    """Return what stands above a file's samples.
+
+    The names are in the first line of words that has as many cells as the lines below it; what
+    stands above is passed over, a line of units below is read.
 
     Raises
     ------
@@ -91,52 +109,80 @@ def read_header(path: Path) -> tuple[list[str], str]:
         For a file that cannot be read.
     """
     with open_text(path) as file:
-        first = file.readline(MAX_HEADER)
-    delimiter = max(",;\t", key=first.count)
-    return [name.strip() for name in next(csv.reader([first], delimiter=delimiter), [])], delimiter
+        lines = [file.readline(MAX_HEADER) for _ in range(HEAD_LINES)]
+    for at, line in enumerate(lines):
+        delimiter = _find_delimiter(line)
+        names = _split(line, delimiter)
+        below = [_split(one, delimiter) for one in lines[at + 1 : at + 4] if one.strip()]
+        is_table = bool(below) and all(len(row) == len(names) for row in below)
+        if is_table and len(names) > 1 and 2 * sum(map(_is_word, names)) > len(names):
+            break
+    else:
+        at, delimiter = 0, _find_delimiter(lines[0])
+        names, below = _split(lines[0], delimiter), []
+    units = below[0] if below and any(map(_is_word, below[0])) else []
+    units = [] if any(unit and not _is_word(unit) for unit in units) else units
+    return Head(names, units, delimiter, at + 1 + bool(units))
 
 
-def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floats]:
+def _find_delimiter(line: str) -> str | None:
+    delimiter = max(",;\t|", key=line.count)
+    return delimiter if delimiter in line or len(line.split()) < 2 else None
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    cells = line.split() if delimiter is None else next(csv.reader([line], delimiter=delimiter), [])
+    return [cell.strip() for cell in cells]
+
+
+def _is_word(cell: str) -> bool:
+    """Return whether a cell is neither empty nor a number."""
+    try:
+        float(cell.replace(",", ".") or "nan")
+    except ValueError:
+        return True
+    return False
+
+
+def read_table(path: Path) -> Table:
     """Return the columns of a CSV file by name, shape (n,) each; blank cells and text are NaN.
-
-    Parameters
-    ----------
-    path
-        The file.
-    names
-        Which columns; None for all.
 
     Raises
     ------
     GaitInputError
-        With the cure, for columns that are missing and for a file without samples.
+        With the cure, for a file without names or samples.
     OSError
         For a file that cannot be read.
     """
-    header, delimiter = read_header(path)
-    if not any(header):
+    head = read_head(path)
+    if not any(head.names):
         raise GaitInputError(f"{path.name} is empty. Export it again.")
-    wanted = header if names is None else list(names)
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        raise GaitInputError(
-            f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(header)}."
-        )
     with open_text(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of rows that are too short, which are left out
-        # Between semicolons or tabs a comma is a decimal one, as in half of Europe.
-        lines = file if delimiter == "," else (line.replace(",", ".") for line in file)
-        table = np.genfromtxt(
-            lines,
-            delimiter=delimiter,
-            skip_header=1,
-            usecols=[header.index(name) for name in wanted],
+        rows = np.genfromtxt(
+            _prepare(islice(file, head.lines, None), head.delimiter),
+            delimiter=head.delimiter,
+            usecols=range(len(head.names)),
             invalid_raise=False,
             ndmin=2,
         )
-    if not table.shape[0]:
+    if not rows.shape[0]:
         raise GaitInputError(f"{path.name} has a header but no samples. Export it again.")
-    return dict(zip(wanted, table.T, strict=True))
+    columns = dict(zip(head.names, rows.T, strict=True))
+    return Table(columns, dict(zip(head.names, head.units, strict=False)))
+
+
+def _prepare(lines: Iterator[str], delimiter: str | None) -> Iterable[str]:
+    """Return lines of numbers without quotation marks and with decimal points.
+
+    Between semicolons or tabs a comma is a decimal one, as in half of Europe; so it is in quotes.
+    """
+    first = next(lines, "")
+    rest = chain([first], lines)
+    if '"' in first and delimiter is not None:
+        cells = csv.reader(rest, delimiter=delimiter)
+        return (delimiter.join(cell.replace(",", ".") for cell in row) for row in cells)
+    return rest if delimiter == "," else (line.replace(",", ".") for line in rest)
 
 
 def apply_columns(

@@ -65,7 +65,7 @@ def read_qualisys(path: Path) -> Table:
     begin = next((n for n, row in enumerate(rows) if _are_numbers(row)), len(rows))
     heads = {row[0].strip().upper(): row[1:] for row in rows[:begin] if row[0].strip()}
     if "FREQUENCY" not in heads:
-        return Table(csv_files.read_table(path))
+        return csv_files.read_table(path)
     try:
         rate_hz = float(heads["FREQUENCY"][0])
         if not 0 < rate_hz < RATE_MOST_HZ:

@@ -125,7 +125,10 @@ def check_setup(
         f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt
     ]
     findings += _describe_missing(proposal) + _describe_timing(timing)
-    findings += compare_with_own(columns, time_s, legs, strides)
+    unlike = compare_with_own(columns, time_s, legs, strides)
+    for key, text in unlike.items():  # what their curve and label say is then not sure
+        proposal.guesses[key] = replace(proposal.guesses[key], doubt=text)
+    findings += unlike.values()
     findings += [finding.message for finding in check.findings]
     return SetupCheck(
         proposal=proposal,

@@ -36,7 +36,7 @@ from rehab.gait.setup.units import (
     MOMENT_UNITS,
     TIME_UNITS,
 )
-from rehab.gait.signals.clock import find_period
+from rehab.gait.signals.clock import estimate_rate, find_period
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError
@@ -140,7 +140,7 @@ def propose(
     return Proposal(
         time_name,
         time_factor,
-        1 / (find_period(time_s) or 0.01),
+        estimate_rate(time_s),
         mass,
         source if mass_kg is not None else "plates",
         is_overground,
@@ -203,7 +203,7 @@ def _find_time(columns: Mapping[str, Floats]) -> tuple[str, float]:
         if not (steps > 0).mean() > 0.99 or not period or steps.std() > 20 * period:
             continue
         for factor in TIME_UNITS.values():
-            rate_hz = 1 / (period * factor)
+            rate_hz = round(1 / (period * factor), 3)
             is_frame = factor == 1.0 and period == 1.0
             if RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ and not is_frame:
                 return name, factor

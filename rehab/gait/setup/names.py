@@ -59,7 +59,7 @@ OTHER = [
 ]
 MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b")
 ANGLE = re.compile(
-    r"winkel|[aá]ngulo|\bang(le)?s?\b|[a-z]angles?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b"
+    r"winkel|[aá]ngulo|\bang(le)?s?\b|[a-z]angles?v?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b"
 )
 FORCE = re.compile(
     r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?z ?\d*\b"

@@ -28,8 +28,10 @@ def compare_with_own(
     time_s: Floats,
     legs: Mapping[str, LegSamples],
     strides: Sequence[Stride],
-) -> list[str]:
+) -> dict[tuple[str, str], str]:
     """Return which moments and angles are not those of plates and markers, by their size.
+
+    By side and channel, in words.
 
     Parameters
     ----------
@@ -39,7 +41,7 @@ def compare_with_own(
     time_s, legs, strides
         As measured with the columns that are proposed.
     """
-    found = []
+    found = {}
     for (side, leg), (channel, (least, most)) in product(legs.items(), USUAL_GAIN.items()):
         is_moment = channel == "moment"
         own = columns.get(f"own.{side}_{'moment_nm' if is_moment else 'angle_rad'}")
@@ -58,7 +60,7 @@ def compare_with_own(
         gains = [_find_gain(time_s, own, theirs, span) for span in spans]
         known = [gain for gain in gains if gain is not None]
         if known and not least <= median(known) <= most:
-            found.append(
+            found[side, channel] = (
                 f"The {side} {channel} is {median(known):.2f} times what the file's plates and "
                 f"markers come to. {CURES[channel]}"
             )
