@@ -32,6 +32,9 @@ VARIED = {
         "very slow": {"tempo": 2.6},
         "stiff ankles": {"stiffness": 2.0},
         "orthosis, slow": {"stiffness": 4.0, "tempo": 1.5},
+        "a child": {"heavier": 0.4, "tempo": 0.8, "is_mirrored": True},
+        "heavy, slow": {"heavier": 1.8, "tempo": 1.5, "braking_s": 0.025},
+        "mirrored, stiff": {"stiffness": 2.0, "is_mirrored": True},
     }.items()
 }
 
@@ -39,6 +42,7 @@ VARIED = {
 MISSED = {
     "gaitalytics treadmill, very slow": "2 of 5: the moment scatters by 29 ms",
     "gaitalytics treadmill, fast": "4 of 5: the moment scatters by 29 ms",
+    "gaitalytics treadmill, heavy, slow": "4 of 5: the moment scatters by 29 ms",
 }
 
 

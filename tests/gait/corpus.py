@@ -256,7 +256,13 @@ def bend(walk: CorpusWalk, values: np.ndarray) -> CubicSpline:
 
 
 def vary(
-    walk: CorpusWalk, *, braking_s: float = 0.0, tempo: float = 1.0, stiffness: float = 1.0
+    walk: CorpusWalk,
+    *,
+    braking_s: float = 0.0,
+    tempo: float = 1.0,
+    stiffness: float = 1.0,
+    heavier: float = 1.0,
+    is_mirrored: bool = False,
 ) -> CorpusWalk:
     """Return another person's walk, made of this one.
 
@@ -268,10 +274,14 @@ def vary(
         How many times as long all takes.
     stiffness
         What the ankles' motion is divided by.
+    heavier
+        How many times as heavy the person is: force and moment grow with it.
+    is_mirrored
+        Whether left and right change places.
     """
     t_s = np.arange(walk.t_s[0], walk.t_s[0] + tempo * np.ptp(walk.t_s), 1 / walk.rate_hz)
     before_s = (t_s - t_s[0]) / tempo + t_s[0]
-    legs = {}
+    legs, named = {}, {}
     for side in SIDES:
         rows = [np.asarray(row, dtype=float) for row in walk.legs[side][:3]]
         moved = before_s.copy()
@@ -284,9 +294,11 @@ def vary(
         moment, angle = (
             bend(walk, row)(at) for at, row in zip((before_s, moved), rows[1:], strict=True)
         )
-        legs[side] = LegSamples(force, moment, angle / stiffness)
+        named[side] = SIDES[side == "left"] if is_mirrored else side
+        legs[named[side]] = LegSamples(force * heavier, moment * heavier, angle / stiffness)
     known = tuple(
-        (side, *((at_s - walk.t_s[0]) * tempo + walk.t_s[0] for at_s in times))
+        (named[side], *((at_s - walk.t_s[0]) * tempo + walk.t_s[0] for at_s in times))
         for side, *times in find_clean_stances(walk)
     )
-    return replace(walk, t_s=t_s, legs=legs, power_w_kg={}, events_s={}, known=known)
+    changed = {"t_s": t_s, "legs": legs, "mass_kg": walk.mass_kg * heavier, "known": known}
+    return replace(walk, **changed, power_w_kg={}, events_s={})

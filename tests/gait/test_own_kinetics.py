@@ -138,8 +138,11 @@ def test_a_moment_with_a_wrong_gain_is_told_by_plates_and_markers(name, factor):
     table = read_any_table(read_lab_file(FILES[name]))
     for column in [one for one in table if one.endswith("AnkleMoment.X")]:
         table[column] = table[column] * factor
-    told = [text for text in check_setup(table).findings if "times what the file's plates" in text]
+    check = check_setup(table)
+    told = [text for text in check.findings if "times what the file's plates" in text]
     assert bool(told) == (factor != 1.0), told
+    moments = [one for (_, channel), one in check.proposal.guesses.items() if channel == "moment"]
+    assert {one.doubt for one in moments if not one.is_certain} == set(told)  # none is "sure"
 
 
 def test_a_c3d_whose_second_axis_is_upward_gets_its_plates(tmp_path):
