@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.offline import make_detector
-from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
-from rehab.gait.selfcheck.cures import CURES
+from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.selfcheck.lag import find_deceleration_peak
+from rehab.gait.selfcheck.one_leg import check_force, check_strides
 from rehab.gait.selfcheck.shapes import find_likeness, find_stances, make_profile
 from rehab.gait.selfcheck.unloaded import find_moment_zero, find_other_load
 from rehab.gait.signals.filters import Floats
@@ -23,7 +22,6 @@ from rehab.gait.stances.lag_watch import BRAKING_S
 from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW
 
-OFTEN = 0.2  # of the strides; a fault of fewer is the walker's, not the set-up's
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
 USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
 OWN_TOLERANCE_S = 0.003  # against the same person's earlier check
@@ -33,8 +31,6 @@ CERTAIN_LOAD = (0.9, 1.1)
 # the five people of ``stances.plausibility`` are less so, by 0.03 and more; knees of two of them
 # are, by 0.14 and more. (Hips are not told: an ankle that brakes late is as like one.)
 KNEE_LEAD = 0.08
-USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (docs/reference/gait.md#usual-values)
-USUAL_A2 = (0.3, 7.0)  # W/kg (docs/reference/gait.md#usual-values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +128,7 @@ def check_signals(
     for side, leg in given.items():
         own = [stride for stride in strides if stride.side == side]
         force = np.asarray(leg.force_n, dtype=np.float64)
-        found = _check_force(force, own, mass_kg * GRAVITY_M_S2) + _check_strides(own)
+        found = check_force(force, own, mass_kg * GRAVITY_M_S2) + check_strides(own)
         decelerations[side] = find_deceleration_peak(time, leg.angle_rad, own)
         findings += [Finding(code, message, side) for code, message in found]
         findings += _check_joint(time, force, np.asarray(leg.angle_rad, dtype=np.float64), side)
@@ -178,56 +174,6 @@ def _check_rate(time: Floats, rate_hz: float) -> list[Finding]:
 
 def _round(rate_hz: float) -> str:
     return f"{rate_hz:.0f}" if rate_hz >= 10 else f"{rate_hz:.2g}"
-
-
-def _check_force(force: Floats, strides: list[Stride], weight_n: float) -> list[tuple[str, str]]:
-    """Check the force itself, where there are no strides, or no usable ones."""
-    finite = force[np.isfinite(force)]
-    if not len(finite):
-        return [("force_lost", "No vertical force arrives. Look at the plate and its channel.")]
-    low, high = np.percentile(finite, [1, 99]).tolist()
-    if -low > high and -low > 0.3 * weight_n:
-        return [
-            (
-                "force_sign",
-                "The vertical force is negative; here up is positive. Give it a factor of -1.",
-            )
-        ]
-    if high < 0.01 * weight_n and high - low > 0.0002 * weight_n:
-        return [("force_unit", f"The vertical force reaches only {high:.2g} N. Look up its "
-                 "unit, and check that the plate is on.")]  # fmt: skip
-    if high > 5 * weight_n:
-        return [("force_unit", f"The vertical force reaches {high:.2g} N. Look up its unit, "
-                 "and check the body mass.")]  # fmt: skip
-    if not strides:
-        return [("no_strides", "No stride was seen. Walk for half a minute, and check that the "
-                 "plate is on and zeroed.")]  # fmt: skip
-    offset = strides[-1].offset_n
-    if abs(offset) > OFFSET_N:
-        return [("offset", f"The plate reads {offset:.0f} N while the foot swings. Zero it: the "
-                 "contacts are corrected for it, the lab's moment is not.")]  # fmt: skip
-    return []
-
-
-def _check_strides(strides: list[Stride]) -> list[tuple[str, str]]:
-    counts = Counter(reason for stride in strides for reason in stride.reasons)
-    found = [
-        (str(reason), CURES[reason])
-        for reason, count in counts.most_common()
-        if reason in CURES and count > OFTEN * len(strides)
-    ]
-    good = [stride for stride in strides if stride.valid]
-    if found or not good:
-        return found
-    moment = float(np.median([s.moment_peak_nm_kg or 0.0 for s in good]))
-    a2 = float(np.median([s.a2_w_kg or 0.0 for s in good]))
-    if not USUAL_MOMENT[0] <= moment <= USUAL_MOMENT[1]:
-        found.append(("moment_unusual", f"The ankle moment peaks at {moment:.2f} Nm/kg; usual are "
-                      "0.8 to 2.0. Right for a weak leg; else check unit and mass."))  # fmt: skip
-    if not USUAL_A2[0] <= a2 <= USUAL_A2[1]:
-        found.append(("a2_unusual", f"A2 is {a2:.2f} W/kg; usual are 0.3 to 7. Right for a weak "
-                      "leg; else check units and mass."))  # fmt: skip
-    return found
 
 
 def _check_weight(ratio: float | None, mass_kg: float) -> list[Finding]:

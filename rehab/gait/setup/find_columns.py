@@ -7,7 +7,6 @@ label says anything; it overrules no label.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -26,16 +25,7 @@ from rehab.gait.setup.find_forces import (
 )
 from rehab.gait.setup.guess import Guess
 from rehab.gait.setup.names import Label, names_another, read_label, read_unit
-from rehab.gait.setup.units import (
-    ANGLE_RAD,
-    ANGLE_SPREAD,
-    ANGLE_UNITS,
-    BY_MASS,
-    LEVER_M,
-    LEVER_SPREAD,
-    MOMENT_UNITS,
-    TIME_UNITS,
-)
+from rehab.gait.setup.units import TIME_UNITS, find_unit
 from rehab.gait.signals.clock import estimate_rate, find_period
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import find_frame_problem
@@ -252,7 +242,7 @@ def _find_channel(
     label = named.get(name)
     own = like[channel]
     rival = max(RIVALS[channel], key=lambda shape: abs(like[shape]))
-    unit, factor, doubts = _find_unit(
+    unit, factor, doubts = find_unit(
         table, name, channel, profile, time_s, stances, force_n, mass_kg
     )
     sign = 1.0 if own > 0 else -1.0
@@ -272,44 +262,3 @@ def _find_channel(
     return Guess(
         name, side, channel, factor * sign, unit, abs(own), label is not None, "; ".join(doubts)
     )
-
-
-def _find_unit(
-    table: Table,
-    name: str,
-    channel: str,
-    profile: Floats,
-    time_s: Floats,
-    stances: Stances,
-    force_n: Floats,
-    mass_kg: float,
-) -> tuple[str, float, list[str]]:
-    """Return a moment's or an angle's unit, its factor, and what speaks against it.
-
-    A unit that the file says stands, but for moments by body mass, which many a file does not
-    write: the size of both decides, which differ by tens.
-    """
-    if channel == "moment":
-        stance_n = make_profile(time_s, force_n, stances)
-        at = int(np.abs(profile).argmax())
-        expected = LEVER_M * max(float(stance_n[at]), 1.0) if stance_n is not None else mass_kg
-        units = {u: f * (mass_kg if u in BY_MASS else 1) for u, f in MOMENT_UNITS.items()}
-        size, spread = float(np.abs(profile).max()), LEVER_SPREAD
-    else:
-        expected, units, spread = ANGLE_RAD, ANGLE_UNITS, ANGLE_SPREAD
-        size = float(np.ptp(profile))
-    off = {unit: abs(math.log(max(size * f, 1e-300) / expected)) for unit, f in units.items()}
-    unit, second = sorted(units, key=lambda one: off[one])[:2]
-    written = read_unit(name, table.units)
-    doubts = []
-    if written in units:
-        near = unit
-        unit = min((one for one in units if one in {written, written + "/kg"}), key=off.__getitem__)
-        spread *= 3
-        if off[unit] > spread and near != unit:
-            doubts.append(f"the file says {written}, but its size is that of {near}")
-    elif off[second] < off[unit] + 2 * spread and off[second] < 2 * spread:
-        doubts.append(f"{second} would be as likely as {unit}")
-    if off[unit] > spread and not doubts:
-        doubts.append(f"its size is {math.exp(min(off[unit], 99)):.1f} times off what is usual")
-    return unit, units[unit], doubts

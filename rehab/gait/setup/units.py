@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from rehab.gait.one_leg import GRAVITY_M_S2
+from rehab.gait.recordings.table import Table
+from rehab.gait.selfcheck.shapes import Stances, make_profile
+from rehab.gait.setup.names import read_unit
+from rehab.gait.signals.filters import Floats
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
 # What one of each is in N, Nm and rad; of units by body mass, for 1 kg.
@@ -28,3 +34,55 @@ ANGLE_RAD, ANGLE_SPREAD = (
     0.6,
 )  # range over a stride: 0.40 to 0.64 (the same); 0.3 in an orthosis
 MASS_USUAL_KG = (35.0, 160.0)
+
+
+def find_unit(
+    table: Table,
+    name: str,
+    channel: str,
+    profile: Floats,
+    time_s: Floats,
+    stances: Stances,
+    force_n: Floats,
+    mass_kg: float,
+) -> tuple[str, float, list[str]]:
+    """Return a moment's or an angle's unit, its factor, and what speaks against it.
+
+    A unit that the file says stands, but for moments by body mass, which many a file does not
+    write: the size of both decides, which differ by tens.
+
+    Parameters
+    ----------
+    table, name, channel
+        The column, and whether it is a "moment" or an "angle".
+    profile
+        Its median over strides, shape (POINTS,).
+    time_s, stances, force_n
+        Times [s] and the leg's force [N], shape (n,), with its stances.
+    mass_kg
+        Body mass.
+    """
+    if channel == "moment":
+        stance_n = make_profile(time_s, force_n, stances)
+        at = int(np.abs(profile).argmax())
+        expected = LEVER_M * max(float(stance_n[at]), 1.0) if stance_n is not None else mass_kg
+        units = {u: f * (mass_kg if u in BY_MASS else 1) for u, f in MOMENT_UNITS.items()}
+        size, spread = float(np.abs(profile).max()), LEVER_SPREAD
+    else:
+        expected, units, spread = ANGLE_RAD, ANGLE_UNITS, ANGLE_SPREAD
+        size = float(np.ptp(profile))
+    off = {unit: abs(math.log(max(size * f, 1e-300) / expected)) for unit, f in units.items()}
+    unit, second = sorted(units, key=lambda one: off[one])[:2]
+    written = read_unit(name, table.units)
+    doubts = []
+    if written in units:
+        near = unit
+        unit = min((one for one in units if one in {written, written + "/kg"}), key=off.__getitem__)
+        spread *= 3
+        if off[unit] > spread and near != unit:
+            doubts.append(f"the file says {written}, but its size is that of {near}")
+    elif off[second] < off[unit] + 2 * spread and off[second] < 2 * spread:
+        doubts.append(f"{second} would be as likely as {unit}")
+    if off[unit] > spread and not doubts:
+        doubts.append(f"its size is {math.exp(min(off[unit], 99)):.1f} times off what is usual")
+    return unit, units[unit], doubts
