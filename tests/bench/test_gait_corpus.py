@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from statistics import median
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from tests.gait.corpus import READERS, CorpusWalk, find_clean, open_corpus, vary
 
 pytestmark = pytest.mark.bench
 
-VARIED = {
+VARIED: dict[str, tuple[str, dict[str, Any]]] = {
     f"{base}, {name}": (base, change)
     for base in ("moore2013", "gaitalytics treadmill")
     for name, change in {

@@ -300,5 +300,5 @@ def vary(
         (named[side], *((at_s - walk.t_s[0]) * tempo + walk.t_s[0] for at_s in times))
         for side, *times in find_clean_stances(walk)
     )
-    changed = {"t_s": t_s, "legs": legs, "mass_kg": walk.mass_kg * heavier, "known": known}
-    return replace(walk, **changed, power_w_kg={}, events_s={})
+    varied = replace(walk, t_s=t_s, legs=legs, mass_kg=walk.mass_kg * heavier, known=known)
+    return replace(varied, power_w_kg={}, events_s={})
