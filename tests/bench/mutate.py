@@ -24,7 +24,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 
-from tests.bench import mutants as making
 from tests.bench import mutation_probe
 from tests.bench.mutants import Mutant, mutants, probed
 
@@ -46,9 +45,7 @@ class Tree:
         listed = subprocess.run(
             ["git", "ls-files"], cwd=checkout, capture_output=True, text=True, check=True
         )
-        ours = [
-            f"tests/bench/{Path(file).name}" for file in (making.__file__, mutation_probe.__file__)
-        ]
+        ours = ["tests/bench/mutants.py", "tests/bench/mutation_probe.py"]
         for name in {*listed.stdout.splitlines(), *ours}:
             origin = ROOT if name in ours else checkout
             if (origin / name).is_file():
@@ -96,9 +93,9 @@ class Tree:
             duration_s[test] = float(seconds)
         found: list[list[str]] = [[] for _ in chosen]
         for line in hits.read_text().splitlines():
-            number, _, test = line.partition("\t")
+            mutant_number, _, test = line.partition("\t")
             if test in duration_s:
-                found[int(number)].append(test)
+                found[int(mutant_number)].append(test)
         return [_quick_files_first(tests, duration_s) for tests in found]
 
     def killer(self, mutant: Mutant, tests: list[str]) -> str:
