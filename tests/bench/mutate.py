@@ -1,9 +1,9 @@
 """Mutation bench (`make mutate`): change the product a little, and see whether a test notices.
 
 Each mutant is one small change (a comparison, a number, a condition, a call that goes, …) in a copy
-of the tree. It is killed where a test fails that passed before. The nearest tests run first; only
-what survives them meets the further ones. Which mutants are made depends on the seed and on the
-code alone, so that two runs of one tree agree.
+of the tree. One run of all tests tells which of them come to the changed statements; a mutant meets
+those, the quick files first, and is killed where one fails that passed before. Which mutants are
+made depends on the seed and on the code alone, so that two runs of one tree agree.
 
 `--seed`, `--each` (mutants a package), `--only` (a package), `--tree` (another checkout).
 """
@@ -11,8 +11,6 @@ code alone, so that two runs of one tree agree.
 from __future__ import annotations
 
 import argparse
-import ast
-import copy
 import os
 import random
 import shutil
@@ -20,174 +18,113 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from queue import SimpleQueue
+
+from tests.bench import mutation_probe
+from tests.bench.mutants import Mutant, mutants, probed
 
 ROOT = Path(__file__).parents[2]
-TIMEOUT_S = 600  # of one run of tests: a mutant that hangs is killed, too
+TIMEOUT_S = 300  # of one run of tests: a mutant that hangs is killed, too
 AIM = 0.9
-
-# Which tests look at a package: the nearest first.
-PACKAGES: dict[str, tuple[tuple[str, ...], ...]] = {
-    "rehab/training": (("tests/training",), ("tests/sessions", "tests/boards", "tests/feedback")),
-    "rehab/gait": (("tests/gait",), ("tests/sources",)),
-    "rehab/sessions/live": (("tests/sessions/live",), ("tests/sessions", "tests/management")),
-    "rehab/people": (("tests/people",), ("tests/patients", "tests/api", "tests/stations")),
-    "robot/behavior": (("tests/robot/behavior",), ("tests/robot",)),
-}
-_COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
-    ast.In: ast.NotIn, ast.NotIn: ast.In,
-}  # fmt: skip
-_COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
-    ast.FloorDiv: ast.Mult, ast.Mod: ast.Mult,
-}  # fmt: skip
-# Calls whose loss no test should have to notice.
-_UNNOTICED = {"log", "logger", "logging", "debug", "info", "warning", "exception", "print"}
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """One change of one file: the node's place in `ast.walk`, and what was done."""
-
-    file: str
-    line: int
-    node: int
-    what: str
-    source: str
-
-
-def mutate(node: ast.AST) -> str | None:
-    """Change a node in place; return what was done, or None where there is nothing to change."""
-    match node:
-        case ast.Compare(ops=[op, *_]) if type(op) in _COMPARED:
-            new = _COMPARED[type(op)]()
-            node.ops[0] = new
-            return f"{type(op).__name__} → {type(new).__name__}"
-        case ast.BinOp(op=op) if type(op) in _COMPUTED and not _is_text(node):
-            node.op = _COMPUTED[type(op)]()
-            return f"{type(op).__name__} → {type(node.op).__name__}"
-        case ast.BoolOp(op=op):
-            node.op = ast.Or() if isinstance(op, ast.And) else ast.And()
-            return f"{type(op).__name__} → {type(node.op).__name__}"
-        case ast.UnaryOp(op=ast.Not()):
-            node.op = ast.UAdd()
-            node.operand = ast.Call(ast.Name("bool", ast.Load()), [node.operand], [])
-            return "not removed"
-        case ast.Constant(value=bool(value)):
-            node.value = not value
-            return f"{value} → {not value}"
-        case ast.Constant(value=int(value)):
-            node.value = value + 1
-            return f"{value} → {value + 1}"
-        case ast.Constant(value=float(value)):
-            node.value = value * 1.5 if value else 1.0
-            return f"{value} → {node.value}"
-        case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
-            node.test = ast.UnaryOp(ast.Not(), test)
-            return "condition negated"
-        case ast.Expr(value=ast.Call() as call) if not _UNNOTICED & _names(call.func):
-            node.value = ast.Constant(None)
-            return f"call of {ast.unparse(call.func)} removed"
-        case ast.Call(func=ast.Name(id="min" | "max" as name)):
-            node.func = ast.Name("max" if name == "min" else "min", ast.Load())
-            return f"{name} → {node.func.id}"
-    return None
-
-
-def _is_text(node: ast.BinOp) -> bool:
-    sides = (node.left, node.right)
-    return any(isinstance(s, ast.JoinedStr | ast.Constant) and not _is_number(s) for s in sides)
-
-
-def _is_number(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and isinstance(node.value, int | float)
-
-
-def _names(func: ast.expr) -> set[str]:
-    return {n.id if isinstance(n, ast.Name) else n.attr for n in ast.walk(func)
-            if isinstance(n, ast.Name | ast.Attribute)}  # fmt: skip
-
-
-def _inside_functions(tree: ast.Module) -> set[int]:
-    """Return the ids of the nodes that run: bodies of functions, without annotations."""
-    found: set[int] = set()
-    for function in ast.walk(tree):
-        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
-            for statement in function.body:
-                found.update(map(id, ast.walk(statement)))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.AnnAssign | ast.arg) and node.annotation is not None:
-            found.difference_update(map(id, ast.walk(node.annotation)))
-    return found
-
-
-def mutants(tree: Path, package: str, rng: random.Random) -> Iterator[Mutant]:
-    """Yield mutants of a package without end, no node twice, files by how much they hold."""
-    found: list[tuple[Path, int]] = []
-    for file in sorted((tree / package).rglob("*.py")):
-        module = ast.parse(file.read_text())
-        running = _inside_functions(module)
-        for place, node in enumerate(ast.walk(module)):
-            if id(node) in running and mutate(copy.deepcopy(node)) is not None:
-                found.append((file, place))
-    rng.shuffle(found)
-    for file, place in found:
-        module = ast.parse(file.read_text())
-        node = next(node for at, node in enumerate(ast.walk(module)) if at == place)
-        what = mutate(node)
-        assert what is not None
-        source = ast.unparse(ast.fix_missing_locations(module))
-        name = file.relative_to(tree).as_posix()
-        yield Mutant(name, getattr(node, "lineno", 0), place, what, source)
+PACKAGES = (
+    "rehab/training", "rehab/gait", "rehab/sessions/live", "rehab/people", "robot/behavior",
+)  # fmt: skip
+UNMARKED = "not (bench or screenshots or browser or realtime or long)"
 
 
 class Tree:
     """A copy of a checkout, in which one file at a time is another."""
 
     def __init__(self, checkout: Path, folder: Path) -> None:
-        self.checkout, self.folder = checkout, folder
+        self.checkout, self.folder, self.notes = checkout, folder / "tree", folder / "notes"
+        self.notes.mkdir(parents=True)
         listed = subprocess.run(
             ["git", "ls-files"], cwd=checkout, capture_output=True, text=True, check=True
         )
-        for name in listed.stdout.splitlines():
-            if (checkout / name).is_file():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(checkout / name, folder / name)
-        (folder / "node_modules").symlink_to(checkout / "node_modules")
+        ours = ["tests/bench/mutants.py", "tests/bench/mutation_probe.py"]
+        for name in {*listed.stdout.splitlines(), *ours}:
+            origin = ROOT if name in ours else checkout
+            if (origin / name).is_file():
+                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(origin / name, self.folder / name)
+        (self.folder / "node_modules").symlink_to(checkout / "node_modules")
 
-    def fails(self, tests: tuple[str, ...]) -> str:
-        """Return the end of what these tests print where they fail here (or hang), else ""."""
-        unmarked = "not (bench or screenshots or browser or server or realtime or long or wide)"
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "2", "-m", unmarked]
-        command += ["-p", "no:cacheprovider", "--timeout", "60", *tests]
+    def run(self, *arguments: str, timeout_s: float, **notes: Path) -> str:
+        """Run tests; return the end of what they print where one fails (or hangs), else ""."""
+        command = [sys.executable, "-m", "pytest", "-q", "-m", UNMARKED, "--timeout", "60"]
+        command += ["-p", "no:cacheprovider", "-p", mutation_probe.__name__, *arguments]
         environment = os.environ | {
             "GARRY_TEST_TABLES": "mutants",  # no mutant changes a table
-            "GARRY_TEST_DATA": str((ROOT / "../shared/data").resolve()),
+            "GARRY_TEST_DATA": os.environ.get("GARRY_TEST_DATA")
+            or str((ROOT / "../shared/data").resolve()),
             "PYTHONDONTWRITEBYTECODE": "1",
+            "PYTHONPATH": str(self.folder),
         }
+        environment |= {getattr(mutation_probe, name): str(file) for name, file in notes.items()}
         try:
             result = subprocess.run(
-                command, cwd=self.folder, env=environment, capture_output=True, timeout=TIMEOUT_S
+                command, cwd=self.folder, env=environment, capture_output=True, timeout=timeout_s
             )
         except subprocess.TimeoutExpired:
-            return f"No end within {TIMEOUT_S} s."
+            return f"No end within {timeout_s} s."
         return result.stdout.decode()[-2000:] if result.returncode else ""
 
-    def kills(self, mutant: Mutant, rounds: tuple[tuple[str, ...], ...]) -> bool:
-        """Return whether a test notices."""
+    def tests_of(self, chosen: list[Mutant]) -> list[list[str]]:
+        """Return the tests that come to each mutant and pass without it, quick files first."""
+        places: dict[str, dict[int, int]] = defaultdict(dict)
+        for number, mutant in enumerate(chosen):
+            places[mutant.file][mutant.node] = number
+        for name, numbers in places.items():
+            source = (self.checkout / name).read_text()
+            (self.folder / name).write_text(probed(source, numbers))
+        hits, passed = self.notes / "hits", self.notes / "passed"
+        self.run(
+            "-n", "2", "--dist", "worksteal", "tests", timeout_s=3600, HITS=hits, PASSED=passed
+        )
+        for name in places:
+            shutil.copy2(self.checkout / name, self.folder / name)
+        duration_s: dict[str, float] = {}
+        for line in passed.read_text().splitlines():
+            seconds, _, test = line.partition("\t")
+            duration_s[test] = float(seconds)
+        found: list[list[str]] = [[] for _ in chosen]
+        for line in hits.read_text().splitlines():
+            mutant_number, _, test = line.partition("\t")
+            if test in duration_s:
+                found[int(mutant_number)].append(test)
+        return [_quick_files_first(tests, duration_s) for tests in found]
+
+    def killer(self, mutant: Mutant, tests: list[str]) -> str:
+        """Return the test that notices, or ""."""
+        chosen, failed = self.notes / "chosen", self.notes / "failed"
         (self.folder / mutant.file).write_text(mutant.source)
         try:
-            return any(self.fails(self.existing(tests)) for tests in rounds)
+            for some in _in_rounds(tests):
+                chosen.write_text("\n".join(some))
+                failed.write_text("")
+                files = dict.fromkeys(test.partition("::")[0] for test in some)
+                if self.run("-x", *files, timeout_s=TIMEOUT_S, CHOSEN=chosen, FAILED=failed):
+                    return (*failed.read_text().splitlines(), "(no end, or no start)")[0]
+            return ""
         finally:
             shutil.copy2(self.checkout / mutant.file, self.folder / mutant.file)
 
-    def existing(self, tests: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the folders of tests that this checkout has."""
-        return tuple(name for name in tests if (self.folder / name).exists())
+
+def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> list[str]:
+    by_file: dict[str, list[str]] = defaultdict(list)
+    for test in dict.fromkeys(tests):
+        by_file[test.partition("::")[0]].append(test)
+    took = {file: sum(map(duration_s.__getitem__, by_file[file])) for file in by_file}
+    return [test for file in sorted(by_file, key=took.__getitem__) for test in by_file[file]]
+
+
+def _in_rounds(tests: list[str]) -> Iterator[list[str]]:
+    """Yield the first 150 tests, and then the rest: most mutants die early."""
+    yield from (some for some in (tests[:150], tests[150:]) if some)
 
 
 def main() -> int:
@@ -198,31 +135,45 @@ def main() -> int:
     parser.add_argument("--only", choices=PACKAGES)
     parser.add_argument("--tree", type=Path, default=ROOT)
     args = parser.parse_args()
-    killed, survivors = 0, []
+    checkout = args.tree.resolve()
+    chosen: list[Mutant] = []
+    for package in PACKAGES:
+        if args.only in (None, package):
+            made = mutants(checkout, package, random.Random(f"{args.seed} {package}"))
+            chosen += [next(made) for _ in range(args.each)]
     with tempfile.TemporaryDirectory(prefix="garry-mutants-") as folder:
-        tree = Tree(args.tree.resolve(), Path(folder))
-        for package, rounds in PACKAGES.items():
-            if args.only not in (None, package):
-                continue
-            for tests in rounds:
-                if found := tree.fails(tree.existing(tests)):
-                    print(f"{found}\n{' '.join(tests)}: fails without a mutant.", file=sys.stderr)
-                    return 2
-            chosen = mutants(tree.checkout, package, random.Random(f"{args.seed} {package}"))
-            for mutant in (next(chosen) for _ in range(args.each)):
-                began = time.monotonic()
-                is_killed = tree.kills(mutant, rounds)
-                killed += is_killed
-                survivors += [] if is_killed else [mutant]
-                print(
-                    f"{'killed  ' if is_killed else 'SURVIVED'} {mutant.file}:{mutant.line} "
-                    f"{mutant.what} ({time.monotonic() - began:.0f} s)",
-                    flush=True,
-                )
-    total = killed + len(survivors)
+        trees: SimpleQueue[Tree] = SimpleQueue()
+        first, second = (Tree(checkout, Path(folder) / name) for name in "ab")
+        tests = first.tests_of(chosen)
+        trees.put(first)
+        trees.put(second)
+
+        def meet(number: int) -> str:
+            mutant, tree, began = chosen[number], trees.get(), time.monotonic()
+            killer = tree.killer(mutant, tests[number])
+            trees.put(tree)
+            print(
+                f"{'killed  ' if killer else 'SURVIVED'} {mutant.file}:{mutant.line} {mutant.what} "
+                f"({time.monotonic() - began:.0f} s, {len(tests[number])} tests) {killer}",
+                flush=True,
+            )
+            return killer
+
+        with ThreadPoolExecutor(2) as pool:
+            killers = list(pool.map(meet, range(len(chosen))))
+        known = [killer for killer in killers if "::" in killer]
+        (first.notes / "chosen").write_text("\n".join(known))
+        files = {killer.partition("::")[0] for killer in known}
+        if files and (
+            found := first.run(*files, timeout_s=TIMEOUT_S, CHOSEN=first.notes / "chosen")
+        ):
+            print(f"{found}\nThese fail without a mutant, too.", file=sys.stderr)
+            return 2
+    survivors = [mutant for mutant, killer in zip(chosen, killers, strict=True) if not killer]
+    killed, total = len(chosen) - len(survivors), len(chosen)
     print(f"\n{killed} of {total} killed ({killed / total:.0%}, aim {AIM:.0%})")
     for mutant in survivors:
-        print(f"  survived: {mutant.file}:{mutant.line} {mutant.what}")
+        print(f"  survived: {mutant.file}:{mutant.line} {mutant.what}: {mutant.statement}")
     return 0 if killed >= AIM * total else 1
 
 

@@ -1,0 +1,47 @@
+"""Which tests run which mutant, as a plugin of pytest and a call in the product's code.
+
+`hit` stands before each statement that will be changed. Servers and robots that a test starts count
+for it: they inherit its name.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+HITS = "GARRY_MUTATION_HITS"  # the file that says so
+PASSED = "GARRY_MUTATION_PASSED"  # the file of tests that passed, with their seconds
+CHOSEN = "GARRY_MUTATION_CHOSEN"  # the file of tests to run, of those collected
+FAILED = "GARRY_MUTATION_FAILED"  # the file of the test that failed
+_seen: set[tuple[int, str]] = set()
+
+
+def hit(mutant: int) -> None:
+    """Note that the test of this moment came here."""
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    if test and (mutant, test) not in _seen:
+        _seen.add((mutant, test))
+        _write(HITS, f"{mutant}\t{test}")
+
+
+def _write(variable: str, line: str) -> None:
+    if file := os.environ.get(variable):
+        with Path(file).open("a") as lines:
+            lines.write(f"{line}\n")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if file := os.environ.get(CHOSEN):
+        chosen = set(Path(file).read_text().splitlines())
+        items[:] = [item for item in items if item.nodeid in chosen]
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if os.environ.get("PYTEST_XDIST_WORKER"):
+        return
+    if report.failed:
+        _write(FAILED, report.nodeid)
+    elif report.passed and report.when == "call":
+        _write(PASSED, f"{report.duration:.4f}\t{report.nodeid}")
