@@ -48,8 +48,9 @@ from robot.connection_args import (
     websocket_url,
 )
 from robot.link import Link, LinkRefused
-from robot.original_topics import TOPICS, OriginalTopics
+from robot.original_topics import OriginalTopics
 from robot.ros.holder import add_driven_base_arguments, find_driven_base
+from robot.ros.original_nodes import TOPICS
 from robot.worker import Worker
 
 ROBOT_PATH = "/ws/robot/"

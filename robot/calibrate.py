@@ -24,7 +24,8 @@ from robot.base_options import (
 )
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.behavior.body import Body
-from robot.behavior.performer import Performer, control_loop
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import Performer
 from robot.calibration import BadCalibration, store_calibration
 from robot.motion.base_response import MOST_STICTION_M_S, Response
 from robot.motion.gesture import Gesture, Waypoint

@@ -25,7 +25,8 @@ from robot.base_options import (
     print_notice,
 )
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
-from robot.behavior.performer import Performer, control_loop
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import Performer
 from robot.behavior.safety import BASE_SILENT, BASE_SILENT_S
 from robot.calibration import BadCalibration, apply_calibration
 from robot.motion.gesture import Gesture

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from robot.bases import BASES
-from robot.behavior.performer import Performer, control_loop
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import Performer
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 
 # Simulated bases that run on any clock.

@@ -9,7 +9,8 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from robot.bases import BaseLost, MobileBase
-from robot.behavior.performer import NO_LINK, Performer, control_loop
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import NO_LINK, Performer
 from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox, Incident
 from robot.link import Link, LinkRefused, Message

@@ -221,15 +221,7 @@ class KobukiBase(MobileBase):
             self._odometry.set_home()
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
-        """Show its state by the first light.
-
-        Parameters
-        ----------
-        indication
-            The state.
-        aloud
-            Whether a short sound announces it too, if there is one for it.
-        """
+        """Show its state by the first light; ``aloud`` also by a sound, if there is one for it."""
         if self.face is not None:
             self.face.show(indication)
         self._set_lights(LIGHTS[indication])

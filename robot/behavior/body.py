@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from robot.bases import Answer, BaseState, MobileBase
+from robot.behavior.cue import QUIET_PACE
 from robot.behavior.expression import Expression
 from robot.behavior.manual_drive import ManualDrive
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
-from robot.behavior.status import StatusReporter
+from robot.behavior.status import RobotState, StatusReporter
 from robot.behavior.variety import Choice
 from robot.motion.base_response import AT_ONCE
 from robot.motion.gesture import Gesture
@@ -92,13 +93,19 @@ class Body:
             self.base.set_home()  # as a person would carry it back
         return ""
 
-    def start(
+    def size(self, gesture: Gesture, intensity: float) -> float:
+        """Return the share of its size at which a gesture is performed, of a cue's intensity."""
+        return round(max(intensity, gesture.least) * self.safety.share, 3)
+
+    def perform(
         self,
         gesture: Gesture,
+        intensity: float,
         now_s: float,
         state: BaseState,
-        answer: Answer,
-        pace: float = 1.0,
+        *,
+        above: bool | None = None,
+        is_quiet: bool = False,
         choice: Choice | None = None,
     ) -> None:
         """Start a gesture that nothing refuses, and answer by it.
@@ -106,25 +113,29 @@ class Body:
         Parameters
         ----------
         gesture
-            At the size that it is played at.
+            In full size.
+        intensity
+            Of the cue, 0 to 1.
         now_s
             The time [s].
         state
             What the base reports.
-        answer
-            How to answer beside motion.
-        pace
-            Share of each waypoint's own pace, above 0 and up to 1.
+        above
+            Whether it answers a strong window; None where it answers none.
+        is_quiet
+            Whether without sounds, and slowly.
         choice
             Of what no decision reports.
         """
+        sized = gesture.scaled(self.size(gesture, intensity))
+        share = round(intensity * self.safety.share, 3)
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
         pose = self.read().pose  # a simulated base may have been put back
-        self.player.start(gesture, now_s, pose, after_s, pace)
-        self.expression.start(gesture.score.quiet if answer.is_quiet else gesture.score, now_s)
+        self.player.start(sized, now_s, pose, after_s, QUIET_PACE if is_quiet else 1.0)
+        self.expression.start(sized.score.quiet if is_quiet else sized.score, now_s)
         self.safety.start_gesture(now_s, state)
-        self.status.report_gesture(gesture, "started", "", choice)
-        self.base.answer(answer)
+        self.status.report_gesture(sized, "started", "", choice)
+        self.base.answer(Answer(gesture.name, above, is_quiet, share))
 
     def start_alone(self, gesture: Gesture, now_s: float) -> str:
         """Arm it and start a gesture where it stands, or return why not, as a code.
@@ -148,8 +159,8 @@ class Body:
         if not reason and not safety.is_at_home(state):
             reason = AWAY
         if not reason:
-            answer = Answer(gesture.name, {"glad": True, "sad": False}.get(gesture.score.mood))
-            self.start(gesture.scaled(safety.share), now_s, state, answer)
+            above = {"glad": True, "sad": False}.get(gesture.score.mood)
+            self.perform(gesture, 1.0, now_s, state, above=above)
         return reason
 
     def tick(self, now_s: float, *, may_be_driven: bool) -> BaseState:
@@ -210,6 +221,57 @@ class Body:
         """Stand still for a fault that is latched, and report it."""
         self.halt(reason)
         self.status.report({"kind": "stop", "reason": reason})
+
+    def state_code(self, there: BaseState, unready: str) -> RobotState:
+        """Return its state, and why it would not perform now, as codes.
+
+        Parameters
+        ----------
+        there
+            What the base reports.
+        unready
+            What else keeps it from performing; empty for nothing.
+        """
+        reason = self.safety.blocking_reason(there)
+        if self.safety.latch:
+            return "stopped", reason
+        if not self.safety.is_armed:
+            return "disarmed", reason
+        if self.player.is_busy:
+            return "performing", ""
+        if self.is_away:
+            return "away", AWAY
+        return "idle", unready or reason
+
+    def show(self, state: RobotState, *, is_quiet: bool) -> None:
+        """Show people a state; aloud unless it is quiet, or a gesture without notes is played."""
+        gesture = self.player.gesture
+        is_silent = gesture is not None and not gesture.score.notes
+        self.status.show(state, is_quiet=is_quiet or is_silent)
+
+    def report(self, now_s: float, state: RobotState, there: BaseState, bad_messages: int) -> None:
+        """Report the state to the server, where that is due.
+
+        Parameters
+        ----------
+        now_s
+            The time [s].
+        state
+            As ``state_code`` returned it.
+        there
+            What the base reports.
+        bad_messages
+            How many messages broke the protocol.
+        """
+        self.status.report_status(
+            now_s,
+            state,
+            there,
+            gesture=self.player.gesture,
+            lights=self.expression.lights,
+            bad_messages=bad_messages,
+            counters={"refused_arms": self.safety.refused_arms, **self.base.counters},
+        )
 
     def _can_be_driven(self, state: BaseState) -> bool:
         """Whether it is armed, real and unhindered."""

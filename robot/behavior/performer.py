@@ -9,29 +9,28 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from robot.bases import Answer, BaseState, MobileBase
+from robot.bases import MobileBase
+from robot.behavior.beside_answers import MOMENTS, BesideAnswers
 from robot.behavior.body import Body
-from robot.behavior.cue import QUIET_PACE, Cue
+from robot.behavior.cue import Cue
 from robot.behavior.gesture_library import GestureLibrary
-from robot.behavior.idle import IdleLife
-from robot.behavior.safety import AWAY, LAPSED_S, STOPPED
+from robot.behavior.safety import LAPSED_S, STOPPED
 from robot.behavior.status import Report
-from robot.behavior.variety import Choice, Variety
+from robot.behavior.variety import Variety
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import BUILT_IN, ORIGINALS
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
+from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
 
 Message = Mapping[str, Any]
 
-# Without a message for this long [s] the base stands still. The server sends a heartbeat every
-# 0.25 s, and one may come 0.4 s late; without a server a base should move for at most 0.75 s, and
-# the order to stand still takes up to 0.05 s to the wheels.
+# Without a message for this long [s] the base stands still. A heartbeat comes every 0.25 s, at most
+# 0.4 s late; the order to stand still takes up to 0.05 s to the wheels, which makes 0.75 s at most.
 SILENCE_S = 0.65
 
 # Codes: why a robot does not move, and how a gesture ended; ``safety`` has more.
@@ -39,9 +38,6 @@ NO_LINK = "no_link"
 NO_SESSION = "no_session"
 NOT_RUNNING = "not_running"
 REPLACED = "replaced"  # a welcome to another session
-
-# What a message of the session's state may order beside answers: pools of ``robot.motion.pools``.
-MOMENTS = ("greeting", "rest", "farewell")
 
 
 class Performer:
@@ -79,7 +75,7 @@ class Performer:
         self.body = Body(base, limits)
         self.gestures = GestureLibrary(gestures, limits)
         self.decider = WindowDecider(Cue())
-        self._begin_variety(0)
+        self.variety, self._beside = Variety(0), BesideAnswers(self.body, 0)
         self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad_message = ""
@@ -138,22 +134,7 @@ class Performer:
         self.decider.drop_window()
 
     def play_alone(self, gesture: Gesture, now_s: float) -> str:
-        """Arm the base and start a gesture where it stands, without a session.
-
-        The caller vouches for a person who watches. No base is carried home first.
-
-        Parameters
-        ----------
-        gesture
-            What to play; in an open loop at half its size.
-        now_s
-            The performer's clock [s].
-
-        Returns
-        -------
-        str
-            Why the gesture may not start, as a code; empty where it has started.
-        """
+        """Arm the base and start a gesture without a session, or return why not (``Body``)."""
         self._is_alone = True
         reason = self.body.start_alone(gesture, now_s)
         self.body.status.show(("stopped", reason) if reason else ("performing", ""), is_quiet=False)
@@ -165,9 +146,18 @@ class Performer:
         # Without a session it does not move, and the server sends no heartbeat.
         if self.session is not None and self.is_linked and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
-        self._idle_on(now_s)
+        free_s = self.decider.free_s(self._step_s + now_s - self._stepped_s)
+        may_idle = self.decider.cue.idles and self.may_act
+        self._beside.idle(self.decider.cue, now_s, free_s, may_idle=may_idle)
         may_be_driven = self.is_linked and not self._is_running
-        self._report(now_s, self.body.tick(now_s, may_be_driven=may_be_driven))
+        there = self.body.tick(now_s, may_be_driven=may_be_driven)
+        unready = NO_SESSION if self.session is None else NOT_RUNNING
+        if self._is_running or self._is_alone:
+            unready = ""
+        state = self.body.state_code(there, unready)
+        self.body.show(state, is_quiet=self.decider.cue.is_quiet)
+        if self.is_linked:
+            self.body.report(now_s, state, there, self.bad_messages)
 
     def _dispatch(self, message: Message, now_s: float) -> None:
         kind = message.get("type")
@@ -210,7 +200,8 @@ class Performer:
                 raise BadFrame("A welcome says in which state the session is.")
             if session != self.session:
                 self.decider = WindowDecider(cue)
-                self._begin_variety(session if cue.seed is None else cue.seed)
+                seed = session if cue.seed is None else cue.seed
+                self.variety, self._beside = Variety(seed), BesideAnswers(self.body, seed)
                 self.reports.clear()
             self._set_cue(cue)
             self.decider.drop_window()
@@ -223,10 +214,6 @@ class Performer:
         if session != self.session or not self._is_running:
             self.body.player.stop(REPLACED)
         self.session, self.is_linked = session, True
-
-    def _begin_variety(self, seed: int) -> None:
-        """Choose by a session's seed: answers, and apart from them what comes beside answers."""
-        self.variety, self._moments, self._idle = Variety(seed), Variety(seed), IdleLife(seed)
 
     def _set_cue(self, cue: Cue) -> None:
         """Use another cue, with the gestures that came with it."""
@@ -244,43 +231,11 @@ class Performer:
             self.decider.drop_window()
         # What starts may greet at once; what rests or ends, with its last permission to move.
         self._is_running |= runs
-        if pool in MOMENTS:
-            self._perform_moment(pool, now_s)
+        if pool in MOMENTS and self.may_act:
+            self._beside.perform(pool, self.decider.cue, now_s)
         self._is_running = runs
         if pool is not None and pool not in MOMENTS:  # the state counts all the same
             raise BadFrame(f'"gesture" is null, or one of: {", ".join(MOMENTS)}.')
-
-    def _perform_moment(self, pool: str, now_s: float) -> None:
-        """Greet, rest or take leave, where the robot may act now; else leave it out."""
-        if not self.may_act or self.body.player.is_busy:
-            return
-        choice = self._moments.take(pool)
-        if choice is not None and self._perform_beside(choice, now_s):
-            self._moments.mark_started(choice)
-
-    def _perform_beside(self, choice: Choice, now_s: float) -> bool:
-        """Start a gesture that answers nothing, and return whether nothing speaks against it."""
-        cue, state, gesture = self.decider.cue, self.body.read(), choice.gesture
-        share = self.body.safety.share
-        if self.body.refusal_reason(gesture, state):
-            return False
-        size = max(cue.intensity, gesture.least) * share
-        answer = Answer(gesture.name, None, cue.is_quiet, round(share, 3))
-        pace = QUIET_PACE if cue.is_quiet else 1.0
-        self.body.start(gesture.scaled(size), now_s, state, answer, pace, choice)
-        self._idle.disturb(now_s)
-        return True
-
-    def _idle_on(self, now_s: float) -> None:
-        """Begin an idle motion, where the order allows it and no answer can be due."""
-        can = self.body.base.abilities.closed_loop and self.body.base.abilities.moves
-        if not (can and self.decider.cue.idles and self.may_act) or self.body.player.is_busy:
-            self._idle.disturb(now_s)
-            return
-        free_s = self.decider.free_s(self._step_s + now_s - self._stepped_s)
-        gesture = self._idle.next(now_s, free_s, is_quiet=self.decider.cue.is_quiet)
-        if gesture is not None:
-            self._perform_beside(Choice(gesture, "idle", self.variety.seed), now_s)
 
     def _handle_watched(self, message: Message, otherwise: bool) -> None:
         watched = message.get("watched", otherwise)
@@ -301,7 +256,7 @@ class Performer:
         self._step_s, self._stepped_s = time_s, now_s
         decision = self.decider.add(time_s, performance)
         if decision is not None:
-            self._idle.disturb(now_s)
+            self._beside.disturb(now_s)
             self.decision = decision
             self._respond(decision, now_s)
 
@@ -322,78 +277,12 @@ class Performer:
             return
         # The paper's own gestures replicate it, and are the same every time.
         strength = 1.0 if gesture.name in ORIGINALS else decision.strength
-        intensity, most = cue.intensity * strength, self.body.safety.share
-        size = round(max(intensity, gesture.least) * most, 3)
+        intensity = cue.intensity * strength
+        size = self.body.size(gesture, intensity)
         self.body.status.report_decision(decision, share, gesture.name, size, choice=choice)
-        answer = Answer(gesture.name, decision.above, cue.is_quiet, round(intensity * most, 3))
-        pace = QUIET_PACE if cue.is_quiet else 1.0
-        self.body.start(gesture.scaled(size), now_s, state, answer, pace)
+        self.body.perform(
+            gesture, intensity, now_s, state, above=decision.above, is_quiet=cue.is_quiet
+        )
         self.decider.mark_started(decision)
         if choice is not None:
             self.variety.mark_started(choice)
-
-    def _state(self, there: BaseState) -> tuple[str, str]:
-        """Return the robot's state, and why it would not perform now, as codes."""
-        reason = self.body.safety.blocking_reason(there)
-        if self.body.safety.latch:
-            return "stopped", reason
-        if not self.body.safety.is_armed:
-            return "disarmed", reason
-        if self.body.player.is_busy:
-            return "performing", ""
-        if self.body.is_away:
-            return "away", AWAY
-        if self.session is None and not self._is_alone:
-            return "idle", NO_SESSION
-        return "idle", reason if self._is_running or self._is_alone else NOT_RUNNING
-
-    def _report(self, now_s: float, there: BaseState) -> None:
-        """Show the state to people, and report it to the server."""
-        state, player = self._state(there), self.body.player
-        is_silent = player.gesture is not None and not player.gesture.score.notes
-        self.body.status.show(state, is_quiet=self.decider.cue.is_quiet or is_silent)
-        if self.is_linked:
-            counts = {"refused_arms": self.body.safety.refused_arms, **self.body.base.counters}
-            self.body.status.report_status(
-                now_s,
-                state,
-                there,
-                gesture=player.gesture,
-                lights=self.body.expression.lights,
-                bad_messages=self.bad_messages,
-                counters=counts,
-            )
-
-
-def control_loop(
-    performer: Performer,
-    monotonic: Callable[[], float],
-    is_over: Callable[[], bool] = lambda: False,
-) -> Iterator[float]:
-    """Tick a performer 50 times a second.
-
-    The caller waits, by sleeping, by awaiting, or by moving a virtual clock, and may read the
-    performer's state meanwhile.
-
-    Parameters
-    ----------
-    performer
-        The robot.
-    monotonic
-        The clock [s] that the performer is ticked by.
-    is_over
-        Called before each wait; the loop ends once it returns True.
-
-    Yields
-    ------
-    float
-        How long to wait until the next tick [s].
-
-    Raises
-    ------
-    BaseLost
-        Where the base does not answer any more.
-    """
-    while not is_over():
-        yield TICK_S
-        performer.tick(monotonic())

@@ -81,7 +81,7 @@ def test_the_scene_moves_and_shows_lights_and_mood(server, browser):
         scene, base = page.locator("#scene"), page.locator("#scene .robot-base")
         report(robot, pose=pose(0.0), lights=["orange", "off"], mood="glad")
         expect(base).to_have_attribute("data-pose", "0.000 0.000 0.000")
-        expect(page.locator("[data-show=robot-state]")).to_have_text("celebrate…")
+        expect(page.locator("[data-show=robot-state]")).to_have_text("it celebrates…")
         page.locator("[data-enlarge]").click()
         box = scene.bounding_box()
         assert box is not None
@@ -112,7 +112,7 @@ def test_the_scene_moves_and_shows_lights_and_mood(server, browser):
 def test_it_is_large_enough_on_small_screens(server, browser, size):
     with monitor(browser, server, size) as (page, robot):
         report(robot, pose=pose(0.0))
-        expect(page.locator("[data-show=robot-state]")).to_have_text("celebrate…")
+        expect(page.locator("[data-show=robot-state]")).to_have_text("it celebrates…")
         box = page.locator("#scene").bounding_box()
         assert box is not None
         assert min(box["width"], box["height"]) >= 280

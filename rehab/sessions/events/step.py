@@ -193,7 +193,7 @@ def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None
         "number": step.number,
         "time_s": step.time_s,
         "performance": step.performance,
-        # For the original's ROS topics (robot/original_topics.py).
+        # For the original's ROS topics (robot/ros/original_nodes.py).
         "shown": step.shown,
         "goal": step.goal,
     }

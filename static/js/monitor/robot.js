@@ -3,7 +3,7 @@
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { RobotPlacing } from "garry/monitor/robot_placing";
-import { cureOf, describeDecision, describeReason, describeState } from "garry/monitor/robot_text";
+import { cureOf, describeDecision, describeGesture, describeReason, describeState } from "garry/monitor/robot_text";
 import { RobotScene } from "garry/shared/robot_scene";
 
 const KEPT_POSES = 240;
@@ -205,7 +205,8 @@ export class RobotPanel {
     if (!this.#isConnected) return _("not connected");
     if (this.#isStopped) return _("stopped");
     if (!this.#status) return "";
-    return this.#status.gesture ? `${this.#status.gesture}…` : describeState(this.#status.state);
+    const { gesture, state } = this.#status;
+    return gesture ? `${describeGesture(gesture)}…` : describeState(state);
   }
 
   #describeHold() {

@@ -54,8 +54,16 @@ const REASONS = {
   worker_died: _("its program died"),
 };
 
-// What it does, by the pool that its gesture is from.
-const ANSWERS = {
+// What it does, by its gesture, or by the pool of a gesture that is a variant.
+const GESTURES = {
+  celebrate: _("it celebrates"),
+  droop: _("it droops"),
+  nod: _("it nods"),
+  sway: _("it sways"),
+  greeting: _("it greets"),
+  rest: _("it rests"),
+  farewell: _("it takes leave"),
+  idle: _("it moves a little, and answers nothing"),
   joy: _("it celebrates"),
   streak_3: _("it celebrates 3 in a row"),
   streak_5: _("it celebrates 5 in a row"),
@@ -96,6 +104,8 @@ const STATES = {
 
 export const describeReason = (reason) => REASONS[reason] ?? reason;
 export const cureOf = (reason) => CURES[reason] ?? "";
+// The name of a variant ends with its number; a clinic's own gesture has the name that they gave it.
+export const describeGesture = (name) => GESTURES[name.replace(/_\d+$/, "")] ?? name;
 export const describeState = (state) => STATES[state] ?? state;
 
 // What a window came to and what followed; `breakReason`: why the gesture after it did not end as it should.
@@ -107,6 +117,6 @@ export function describeDecision(decision, breakReason) {
   return fill(_("The last five seconds: %(mean)s of the goal, it celebrates from %(threshold)s: %(what)s."), {
     mean: percent(mean),
     threshold: percent(threshold),
-    what: gesture ? (ANSWERS[pool] ?? gesture + size) + end : describeReason(reason),
+    what: gesture ? describeGesture(gesture) + (pool ? "" : size) + end : describeReason(reason),
   });
 }

@@ -1,7 +1,7 @@
 // The robot in a replay: how it moved, as its black box recorded it, and else as its gestures were ordered.
 
 import { _ } from "garry/shared/language";
-import { describeDecision } from "garry/monitor/robot_text";
+import { describeDecision, describeGesture } from "garry/monitor/robot_text";
 import { drawMoment } from "garry/shared/gesture_preview";
 import { RobotScene } from "garry/shared/robot_scene";
 
@@ -44,7 +44,7 @@ export function createReplayedRobot({ show }, pieces, player) {
       const piece = find(player.at_s);
       if (piece) drawMoment(scene, piece, player.at_s - piece.at_s);
       else scene.draw({ poses: pieces.length ? [{ x_m: 0, y_m: 0, heading_rad: 0 }] : [] });
-      const gesture = piece && !piece.recorded ? `${piece.name}…` : "";
+      const gesture = piece && !piece.recorded ? `${describeGesture(piece.name)}…` : "";
       show("robot-state", isStopped ? _("stopped") : gesture);
       show("robot-last", describeDecision(decision, breakReason));
       const how = piece?.recorded ? _("As its black box recorded it.") : _("As it was ordered.");

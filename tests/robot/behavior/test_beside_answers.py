@@ -6,7 +6,7 @@ import math
 import pytest
 
 from robot.bases.kinematic import KinematicBase
-from robot.behavior.performer import MOMENTS
+from robot.behavior.beside_answers import MOMENTS
 from robot.behavior.safety import ANNOUNCE_S
 from robot.motion.looks import ACT_OF
 from robot.motion.pools import IDLE

@@ -5,10 +5,10 @@ import math
 import pytest
 
 from robot.__main__ import make_parser
-from robot.original_topics import TOPICS, OriginalTopicClient
 from robot.ros.frames import Publication, Topic
 from robot.ros.holder import GESTURE_S, DrivenBase, find_driven_base
 from robot.ros.messages import TWIST
+from robot.ros.original_nodes import TOPICS, OriginalTopicClient
 
 WELCOME = {"type": "welcome", "session": 7, "state": "running"}
 STEP = {"type": "step", "number": 1, "performance": 0.9, "shown": 0.99, "goal": 1.1}
