@@ -16,8 +16,8 @@ DIGITS, SAME = 4, 1e-5
 MAX_UNCONFIRMED = 32  # twists whose echo is awaited
 # So many moving ones may be on their way: an echo that comes 40 ms late then holds nothing up (a
 # bridge without TCP_NODELAY, see docs/reference/rosbridge.md#behavior), and a network that holds
-# everything back has three of them, which are followed by a stop.
-IN_FLIGHT = 3
+# everything back has four of them, which are followed by a stop.
+IN_FLIGHT = 4
 
 
 class Orders:
@@ -102,9 +102,12 @@ class Orders:
 
     def handle_echo(self, twist: Twist) -> bool:
         """Handle a twist from the topic, and return whether another program sent it to move."""
-        for place in reversed(range(len(self._unconfirmed))):
+        # Of equal moving ones the first, so that none on its way counts as come; of stops the last:
+        # an earlier one may be lost.
+        places = range(len(self._unconfirmed))
+        for place in reversed(places) if twist.is_still else places:
             if _are_same(self._unconfirmed[place][1], twist):
-                for _ in range(place + 1):
+                for _ in range(place + 1):  # those before it have passed, too
                     self._unconfirmed.popleft()
                 self.is_confirmed = True
                 self._is_stop_confirmed = self._is_stop_confirmed or twist.is_still

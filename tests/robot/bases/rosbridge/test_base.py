@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.bases.rosbridge.orders import IN_FLIGHT
+from robot.bases.rosbridge.orders import IN_FLIGHT, Orders
 from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL, Twist
@@ -55,16 +55,32 @@ def test_headings_add_up_over_full_turns(stage):
 # --- drop, never queue --------------------------------------------------------------------------
 
 
-def test_three_orders_are_on_their_way_and_the_newest_waits(stage):
+def test_four_orders_are_on_their_way_and_the_newest_waits(stage):
     stage.is_frozen = True
     for number in range(1, 10):
         stage.wait(TICK_S, Twist(number / 100, 0))
-    assert len(stage.outbox) == IN_FLIGHT == 3
+    assert len(stage.outbox) == IN_FLIGHT == 4
     stage.is_frozen = False
     stage.pass_on()  # it comes back, and only the newest follows
     stage.pass_on()
-    assert [order[1] for order in moving(stage)] == [0.01, 0.02, 0.03, 0.09]
-    assert stage.base.counters["dropped"] == 5
+    assert [order[1] for order in moving(stage)] == [0.01, 0.02, 0.03, 0.04, 0.09]
+    assert stage.base.counters["dropped"] == 4
+
+
+def test_the_echo_of_one_order_confirms_no_later_one_that_is_equal():
+    orders = Orders()
+    orders.order(STILL, 0.0)
+    assert orders.due(0.0) == STILL
+    orders.handle_echo(STILL)
+    orders.order(STILL, 0.02)
+
+    def send(now_s):
+        orders.order(Twist(0.1, 0), now_s)
+        return orders.due(now_s)
+
+    assert [send(0.04 + n / 100) for n in range(5)].count(None) == 1
+    orders.handle_echo(Twist(0.1, 0))
+    assert [send(0.1 + n / 100) for n in range(5)].count(None) == 4
 
 
 def test_what_arrives_late_is_followed_by_standing_still(stage):
