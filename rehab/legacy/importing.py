@@ -6,6 +6,9 @@ from collections import Counter
 from datetime import timedelta
 from zoneinfo import ZoneInfo
 
+from django.utils import timezone
+
+from rehab.boards.snapshots import freeze_boards
 from rehab.legacy.database import LegacyDatabase, LegacySession
 from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, Patient
@@ -40,7 +43,11 @@ class Importer:
         self._zone = ZoneInfo(clinic.time_zone)
 
     def run(self) -> None:
-        """Import everything that can be, except for participants who were erased here."""
+        """Import everything that can be, except for participants who were erased here.
+
+        Boards whose last day is over are stored first: no session that comes later is on them.
+        """
+        freeze_boards([self.clinic.pk], timezone.now())
         erased = {
             pk for pk in self.database.participants if is_reimport_blocked(self.clinic.pk, pk)
         }

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import ClassVar
 
 from django.db import models
+from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
 from rehab.people.networks import is_outside
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.sign_in.tokens import TokenModel
+
+WORN_LIFETIME = timedelta(hours=12)  # of the token of a sensor that is worn: a day in the clinic
 
 
 class Station(ClinicModel):
@@ -120,6 +123,8 @@ class Device(TokenModel):
         """Set and return a new token, as if there had been none before."""
         self.successor_hash = self.retired_hash = self.given_hash = ""
         self.rotated_at = self.token_expires_at = self.copy_seen_at = None
+        if self.place:
+            self.token_expires_at = timezone.now() + WORN_LIFETIME
         return super().new_token()
 
 

@@ -47,7 +47,7 @@ def find_device(token: str, now: datetime, address: str = "") -> Device | None:
 
 def is_successor_due(device: Device, now: datetime) -> bool:
     """Return whether a device that can store one is to get another token."""
-    return not device.builtin and (
+    return not (device.builtin or device.place) and (  # one that is worn is paired for a day
         device.rotated_at is None or now - device.rotated_at >= ROTATE_AFTER
     )
 

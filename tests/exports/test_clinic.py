@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -15,7 +16,7 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.exports.clinic import arrival
+from rehab.exports.clinic import arrival, departure
 from rehab.exports.clinic.rows import ClinicRows
 from rehab.exports.clinic.sealed_file import seal_everything
 from rehab.exports.clinic.tables import STAYS, clinic_paths, moving_models, moving_tables
@@ -367,6 +368,53 @@ def test_a_removed_clinic_leaves_a_certificate_and_nothing_else(world, file, key
     entry = AuditEntry.everywhere.get(clinic=None, act=Act.CLINIC_OUT)
     assert digest in entry.about
     assert digest in told
+
+
+@pytest.mark.parametrize("at", ["the end", "half way"])
+def test_a_removal_that_stops_keeps_its_certificate_and_is_completed(
+    world, file, key, monkeypatch, at
+):
+    """A full disk, or a killed process: what is gone stands in a pending certificate."""
+    name, pk, paper = world.clinic.name, world.clinic.pk, file.with_suffix(".json")
+    run("export", name, file)
+    steps = ClinicRows(pk).count()["rehab.step"]
+    given = ("remove", name, paper, "--file", file, "--key", key)
+    with monkeypatch.context() as patched:
+        if at == "the end":
+            patched.setattr(departure, "REMOVED", "\ud800")  # cannot be written
+        else:
+            patched.setattr(departure, "_hand_accounts_on", lambda _: 1 / 0)
+        with pytest.raises((UnicodeEncodeError, ZeroDivisionError)):
+            run(*given)
+    pending = json.loads(paper.read_text())
+    assert pending["certificate"] == departure.PENDING
+    assert pending["rows"]["rehab.step"] == steps
+    run(*given)
+    gone = json.loads(paper.read_text())
+    assert not Clinic.everywhere.filter(pk=pk).exists()
+    assert (gone["certificate"], gone["rows"]) == (departure.REMOVED, pending["rows"])
+    assert gone["digests_of_rows"] == pending["digests_of_rows"]
+    entries = AuditEntry.everywhere.filter(clinic=None, act=Act.CLINIC_OUT)
+    assert hashlib.sha256(paper.read_bytes()).hexdigest() in entries.last().about
+    with pytest.raises(CommandError, match="There is no clinic|is there already"):
+        run(*given)
+
+
+def test_a_full_disk_at_the_end_of_a_removal_is_told_with_the_cure(world, file, monkeypatch):
+    paper, replace, times = file.with_suffix(".json"), Path.replace, iter([True])
+
+    def once(self: Path, target: Path) -> Path:
+        if next(times, False):
+            return replace(self, target)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", once)
+        with pytest.raises(CommandError, match=r"is gone, but .* pending.*No space.*Make room"):
+            run("remove", world.clinic.name, paper, "--destroy")
+    assert json.loads(paper.read_text())["rows"]["rehab.step"]
+    run("remove", world.clinic.name, paper, "--destroy")
+    assert json.loads(paper.read_text())["certificate"] == departure.REMOVED
 
 
 def test_what_was_added_since_the_file_is_not_lost(world, file, key):

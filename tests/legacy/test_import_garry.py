@@ -14,12 +14,14 @@ from zoneinfo import ZoneInfo
 import pytest
 from django.core.management import CommandError, call_command
 
+from rehab.boards.models import Leaderboard
 from rehab.patients.erasure import erase
 from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, ErasureReason, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from tests.support.boards import board_of, figures_of
 from tests.support.programs import Program, bearer_token
 from tests.support.world import NOW, signed_in
 
@@ -179,6 +181,17 @@ def test_importing_again_takes_only_what_is_new(file, clinic):
     patient.save()
     run(file)
     assert Patient.everywhere.get(legacy_id=5).nickname == "Rosa"
+
+
+def test_no_imported_session_enters_a_board_whose_last_day_is_over(short_file, clinic):
+    run(short_file)
+    Patient.everywhere.update(boards="clinic")
+    frozen = NOW.date() - timedelta(days=2)
+    board = board_of(clinic, types="all", metric="hit_rate", display="top", names="code")
+    Leaderboard.everywhere.update(frozen_on=frozen)  # as if that day were over since
+    TrainingSession.everywhere.all().delete()
+    assert run(short_file)
+    assert figures_of(board) == {}
 
 
 def test_who_was_erased_stays_away_with_all_sessions(file, clinic):

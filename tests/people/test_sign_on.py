@@ -15,7 +15,7 @@ from rehab.people.models import Clinic, SignOnGroup, User
 from rehab.people.roles import Role
 from rehab.people.sign_in import sign_on
 from rehab.people.sign_in.sign_on import LOGOUT_EVENT, SignOnRefused
-from tests.support.world import NOW
+from tests.support.world import NOW, signed_in
 
 ISSUER = "https://hospital.example"
 KEY = RSAKey.generate_key(2048, {"kid": "1"})
@@ -150,3 +150,11 @@ def test_without_a_hospital_its_addresses_do_not_exist(world, client, settings):
     for name in ("sign-on", "sign-on-complete"):
         assert client.get(reverse(name)).status_code == 404
     assert client.post(reverse("sign-on-ended")).status_code == 404
+
+
+def test_a_host_says_which_clinic_a_group_gives(linked):
+    host = signed_in(User.everywhere.create_user("host", role=Role.HOST))
+    url = reverse("admin:rehab_signongroup_add")
+    assert host.get(url).status_code == 200
+    host.post(url, {"name": "gait", "clinic": linked.clinic_id, "role": Role.PT})
+    assert SignOnGroup.everywhere.get().clinic == linked.clinic

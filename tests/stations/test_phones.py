@@ -12,8 +12,7 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
-from rehab.stations.models import Device
-from rehab.stations.pages.phones import LIFETIME
+from rehab.stations.models import WORN_LIFETIME, Device
 from tests.support.world import World
 
 pytestmark = pytest.mark.django_db
@@ -32,9 +31,19 @@ def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     device = Device.everywhere.filter(station=station).order_by("pk")[0]
     assert (device.kind, device.name) == ("source", "Phone, left shin")
     assert (device.place, device.side) == ("shank", "left")
-    assert timedelta(0) < device.token_expires_at - timezone.now() <= LIFETIME
-    assert device.has_expired(timezone.now() + LIFETIME)
+    assert timedelta(0) < device.token_expires_at - timezone.now() <= WORN_LIFETIME
+    assert device.has_expired(timezone.now() + WORN_LIFETIME)
     assert AuditEntry.everywhere.filter(act=Act.TOKEN, about__contains=device.name).exists()
+
+
+def test_a_new_token_of_a_phone_ends_as_early_as_the_first(pt: Client, world: World):
+    station = world.add_station()
+    pt.post("/phones/pair/", {"station": station.pk, "place": "shank", "side": "left"})
+    device = Device.everywhere.get(station=station)
+    first = device.token_expires_at
+    pt.post(f"/devices/{device.pk}/")
+    device.refresh_from_db()
+    assert first <= device.token_expires_at <= timezone.now() + WORN_LIFETIME
 
 
 @pytest.mark.parametrize("wrong", [{"station": "0"}, {"place": "head"}, {"side": "both"}])

@@ -163,6 +163,11 @@ class Trial:
 
     def exchange(self) -> None:
         """Let each participant have walked what the other one has."""
+        with guards.lifted("default"):  # once: PostgreSQL locks each trigger until the end
+            self._exchange()
+        clear_cache()
+
+    def _exchange(self) -> None:
         for one, other in zip(self.sessions[::2], self.sessions[1::2], strict=True):
             exchange([one], [other], {"patient_id", "created_at", "station_id"})
             for model in OF_SESSIONS:
@@ -174,7 +179,6 @@ class Trial:
         rows = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
         allocations = list(rows)
         exchange(allocations[::2], allocations[1::2], {"enrollment_id"})
-        clear_cache()
 
     def addresses(self) -> list[str]:
         """Return the addresses of what the participants walked, and of their stations' tablets."""
@@ -265,5 +269,4 @@ def exchange(some: list[Any], others: list[Any], kept: set[str]) -> None:
         names = {f.attname for f in one._meta.concrete_fields if not f.primary_key} - kept
         for row, values in ((one, vars(other).copy()), (other, vars(one).copy())):
             found = type(row).everywhere.filter(pk=row.pk)
-            with guards.lifted("default"):
-                found.update(**{name: values[name] for name in names})
+            found.update(**{name: values[name] for name in names})

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
@@ -32,6 +33,8 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device
 
+PENDING = "This clinic is being removed from this installation of GARRY: pending."
+REMOVED = "This clinic was removed from this installation of GARRY."
 BATCH_ROWS = 1000
 LEAVES_WITHIN_S = 90.0  # until servers have closed the sockets of accounts and devices
 # What only says how the server is used: it grows by being looked at.
@@ -39,13 +42,19 @@ GROWS = {"auditentry", "logseal", "sessionseal", "user", "device", "apitoken", "
 
 
 def remove_clinic(
-    clinic: Clinic, content: Content | None, by: str, now: datetime, *, wait_s: float
-) -> dict[str, Any]:
-    """Remove a clinic and all that is its; return the certificate.
+    clinic: Clinic,
+    content: Content | None,
+    by: str,
+    now: datetime,
+    *,
+    wait_s: float,
+    store: Callable[[str], None],
+) -> str:
+    """Remove a clinic and all that is its; return the digest of its certificate.
 
-    ``content``: of the file that it leaves with; None: its data is to be destroyed. Raises
-    CannotMove while sessions run, where the file is not of this clinic as it is, and where servers
-    do not let it go.
+    ``content``: of the file that it leaves with; None: its data is to be destroyed. ``store``:
+    writes the certificate, as pending before anything is deleted. Raises CannotMove while sessions
+    run, where the file is not of this clinic as it is, and where servers do not let it go.
     """
     check_no_session_runs(clinic)
     _read_all(clinic, content, now)  # first, so that nobody is shut out in vain
@@ -53,26 +62,45 @@ def remove_clinic(
         _wait_for_servers(clinic, wait_s)
         check_no_session_runs(clinic)
         rows = _read_all(clinic, content, now)
-    certificate = {
-        "certificate": "This clinic was removed from this installation of GARRY.",
-        "clinic": clinic.name,
-        "removed_at": now,
-        "by": by,
-        "left_with_file": content.header["file"] if content else None,
-        "rows": rows.counts,
-        "digests_of_rows": rows.digests,
-        "last_seals": last_seals(clinic.pk),
-        "recordings": _delete_recordings(clinic),
-        "not_in_here": "Backups from before hold it until they are deleted: see docs/hosting.md.",
-    }
-    name = clinic.name
-    certificate["deleted"] = delete_rows(clinic.pk)
-    text = json.dumps(certificate, cls=DjangoJSONEncoder, indent=1, ensure_ascii=False)
-    digest = hashlib.sha256(f"{text}\n".encode()).hexdigest()
-    audit_log.record(
-        Act.CLINIC_OUT, None, about=f"{name[:100]}: {by[:30]}, certificate {digest}", now=now
-    )
-    return {"text": f"{text}\n", "digest": digest}
+        certificate = {
+            "certificate": PENDING,
+            "clinic": clinic.name,
+            "removed_at": now,
+            "by": by,
+            "left_with_file": content.header["file"] if content else None,
+            "rows": rows.counts,
+            "digests_of_rows": rows.digests,
+            "last_seals": last_seals(clinic.pk),
+            "recordings": [path.name for path in _own_recordings(clinic)],
+            "not_in_here": "Backups from before hold it until they are deleted: docs/hosting.md.",
+        }
+        store(_to_text(certificate))
+    return finish_removal(clinic, certificate, now, store=store)
+
+
+def finish_removal(
+    clinic: Clinic | None,
+    certificate: dict[str, Any],
+    now: datetime,
+    *,
+    store: Callable[[str], None],
+) -> str:
+    """Delete what is left of a clinic (None: nothing); complete its certificate, as above."""
+    deleted = {}
+    if clinic is not None:
+        for path in _own_recordings(clinic):
+            path.unlink(missing_ok=True)
+        deleted = delete_rows(clinic.pk)
+    text = _to_text(certificate | {"certificate": REMOVED, "deleted": deleted})
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    about = f"{certificate['clinic'][:100]}: {certificate['by'][:30]}, certificate {digest}"
+    audit_log.record(Act.CLINIC_OUT, None, about=about, now=now)
+    store(text)
+    return digest
+
+
+def _to_text(certificate: dict[str, Any]) -> str:
+    return json.dumps(certificate, cls=DjangoJSONEncoder, indent=1, ensure_ascii=False) + "\n"
 
 
 def _read_all(clinic: Clinic, content: Content | None, now: datetime) -> ClinicRows:
@@ -144,15 +172,14 @@ def last_seals(clinic_id: int) -> dict[str, str]:
     return {log: seal.digest for log, seal in found.items() if seal is not None}
 
 
-def _delete_recordings(clinic: Clinic) -> list[str]:
-    """Delete the recordings that only this clinic's sessions name; return their names."""
-    gone = []
-    for path in recordings_of(clinic):
-        others = TrainingSession.everywhere.exclude(clinic=clinic)
-        if not others.filter(source=f"recording {path.name}").exists():
-            path.unlink(missing_ok=True)
-            gone.append(path.name)
-    return gone
+def _own_recordings(clinic: Clinic) -> list[Path]:
+    """Return the recordings that only this clinic's sessions name."""
+    others = TrainingSession.everywhere.exclude(clinic=clinic)
+    return [
+        path
+        for path in recordings_of(clinic)
+        if not others.filter(source=f"recording {path.name}").exists()
+    ]
 
 
 def delete_rows(clinic_id: int) -> dict[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import json
 import os
 from argparse import ArgumentParser
 from collections.abc import Iterator
@@ -15,7 +16,13 @@ from django.core.management import BaseCommand, CommandError
 from django.utils import timezone
 
 from rehab.exports.clinic.arrival import import_clinic
-from rehab.exports.clinic.departure import LEAVES_WITHIN_S, compare_with_file, remove_clinic
+from rehab.exports.clinic.departure import (
+    LEAVES_WITHIN_S,
+    PENDING,
+    compare_with_file,
+    finish_removal,
+    remove_clinic,
+)
 from rehab.exports.clinic.rows import CannotMove, ClinicRows
 from rehab.exports.clinic.sealed_file import inspect, write_clinic
 from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities, read_recipients
@@ -95,19 +102,35 @@ class Command(BaseCommand):
         destroy: bool,
         **_: Any,
     ) -> None:
+        now = timezone.now()
+
+        def store(text: str) -> None:
+            with new_file(certificate) as out:
+                out.write(text.encode())
+
+        pending = _read_pending(certificate, clinic)
+        half = Clinic.everywhere.filter(name=clinic).first()
+        if pending and (half is None or half.removing_at):  # a run before did not come to its end
+            digest = finish_removal(half, pending, now, store=store)
+            self.stdout.write(f"{clinic} is gone. {certificate}: SHA-256 {digest}.")
+            return
         one, content = _find(clinic), None
         if file is None and not destroy:
             raise CommandError("Name the file that it leaves with: --file FILE --key KEYFILE.")
         if file is not None:
             with _opened(file) as opened:
                 content = inspect(opened, _keys(key))
-        if certificate.exists():
-            raise CommandError(f"{certificate} is there already. Name another file.")
         by = f"{getpass.getuser()}, server console"
-        with new_file(certificate) as out:  # first: a place that cannot be written costs nothing
-            gone = remove_clinic(one, content, by, timezone.now(), wait_s=LEAVES_WITHIN_S)
-            out.write(gone["text"].encode())
-        self.stdout.write(f"{clinic} is gone. {certificate}: SHA-256 {gone['digest']}.")
+        try:
+            digest = remove_clinic(one, content, by, now, wait_s=LEAVES_WITHIN_S, store=store)
+        except CommandError as problem:
+            if _read_pending(certificate, clinic) is None:
+                raise
+            raise CommandError(
+                f"{clinic} is gone, but its certificate is pending yet. {problem} Make room, then "
+                "run the same again to complete it."
+            ) from problem
+        self.stdout.write(f"{clinic} is gone. {certificate}: SHA-256 {digest}.")
 
     def _verify(self, clinic: str, file: Path | None, key: Path | None, **_: Any) -> None:
         one = _find(clinic)
@@ -141,6 +164,19 @@ def _find(name: str) -> Clinic:
         names = ", ".join(Clinic.everywhere.values_list("name", flat=True)) or "none"
         raise CommandError(f"There is no clinic {name}. Clinics here: {names}.")
     return clinic
+
+
+def _read_pending(certificate: Path, clinic: str) -> dict[str, Any] | None:
+    """Return a clinic's certificate that is pending; None where there is no file."""
+    if not certificate.exists():
+        return None
+    try:
+        found: dict[str, Any] = json.loads(certificate.read_text())
+        if (found["certificate"], found["clinic"]) == (PENDING, clinic):
+            return found
+    except (OSError, ValueError, LookupError, TypeError):
+        pass
+    raise CommandError(f"{certificate} is there already. Name another file.")
 
 
 def _keys(path: Path | None) -> Any:

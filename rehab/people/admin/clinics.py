@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django.contrib import admin
+from django.http import HttpRequest
 
 from rehab.people.models import Clinic, SignOnGroup
 from rehab.people.web.admin_base import ScopedAdmin
@@ -28,3 +31,7 @@ class SignOnGroupAdmin(ScopedAdmin):
     list_display = ("name", "clinic", "role")
     list_select_related = ("clinic",)
     fields = ("name", "clinic", "role")
+
+    def get_exclude(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return nothing: a host, who has no clinic, chooses one."""
+        return ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,6 @@ from rehab.stations.pages.https import certificate_square
 from rehab.training.measures import WORN
 from rehab.training.steps import Side
 
-LIFETIME = timedelta(hours=12)  # of a phone's token: a day in the clinic
 STANDS_S, RATE_HZ = 5.0, 60.0  # of the simulated leg
 LEGS = {Side.LEFT: gettext_lazy("left"), Side.RIGHT: gettext_lazy("right")}
 PLACES = {"shank": gettext_lazy("shin"), "foot": gettext_lazy("foot")}
@@ -64,7 +62,6 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
                 place=place,
             )
             token = device.new_token()
-            device.token_expires_at = now + LIFETIME
             device.save()
             record_security_change(Act.TOKEN, request, device, now)
             # Behind the # nothing of it reaches a server's log.
