@@ -69,12 +69,7 @@ def verify_second_factor(request: HttpRequest) -> HttpResponse:
     form = FactorForm(request, user, request.POST if request.method == "POST" else None)
     if form.is_valid():
         return HttpResponseRedirect(flow.finish(request, user, now, second_factor_verified=True))
-    own = factors.authenticators_of(user)
-    context = {
-        "form": form,
-        "has_app": own.filter(kind=factors.Authenticator.Kind.APP).exists(),
-        "passkey": passkeys.authentication_options(request, user),
-    }
+    context = {"form": form, "passkey": passkeys.authentication_options(request, user)}
     return render(request, "people/sign_in/second_factor.html", context)
 
 

@@ -52,13 +52,16 @@ class CodeField(forms.CharField):
 class FactorForm(forms.Form):
     """A second factor of an account: a code, or a passkey's signature."""
 
-    code = CodeField(label=_("Code"), required=False)
+    code = CodeField(label=_("Recovery code"), required=False)
     passkey = forms.CharField(required=False, widget=forms.HiddenInput)
 
     def __init__(self, request: HttpRequest, user: User, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.request, self.user = request, user
         next(iter(self.fields.values())).widget.attrs["autofocus"] = True
+        if factors.authenticators_of(user).filter(kind=factors.Authenticator.Kind.APP).exists():
+            self.fields["code"].label = _("Code in your authenticator app")
+            self.fields["code"].help_text = _("Six digits, or one of your recovery codes.")
 
     def clean(self) -> dict[str, Any]:
         """Refuse what is wrong or was used before, and everything during a lockout."""
@@ -105,6 +108,9 @@ class NewPasswordForm(PasswordChangeForm):
     def __init__(self, request: HttpRequest, user: User, *args: Any, **kwargs: Any) -> None:
         super().__init__(user, *args, **kwargs)
         self.request = request
+        self.fields["new_password1"].help_text = _(
+            "At least 12 characters; a few words are easy to keep. Other devices are signed out."
+        )
 
     def clean_old_password(self) -> str:
         """Refuse a wrong old password."""
