@@ -121,7 +121,7 @@ format: setup ## Format the code and mend what can be mended
 bench: setup ## Measure speed (tests/bench)
 	$(PYTHON) -m pytest -m bench -s tests/bench $(ARGS)
 
-mutate: setup ## Change the code a little, many times, and name what no test notices (an hour)
+mutate: setup ## Change the code a little, many times, and name what no test notices (half an hour)
 	$(PYTHON) -m tests.bench.mutate $(ARGS)
 
 size: setup ## Say how large the project is: code by room, modules, circles, tests, styles, documents
