@@ -1,4 +1,4 @@
-"""A passkey at a real server: nobody signs in with what was signed before, elsewhere, or by a copy."""
+"""A passkey at a real server: nobody signs in with one signed before, elsewhere, or by a copy."""
 
 from __future__ import annotations
 
