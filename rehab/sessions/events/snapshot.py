@@ -27,16 +27,16 @@ CHART_FIELDS = ("number", "performance", "hit", "close", "points", "valid", "pha
 
 
 def history_entry(
-    audience: Audience, plan: SessionPlan, step: StoredStep, told: Container[int]
+    audience: Audience, plan: SessionPlan, step: StoredStep, with_feedback: Container[int]
 ) -> Message | None:
     """Return a past step as a chart needs it; None where this audience sees none.
 
-    ``told``: the latest steps with feedback, where the schedule leaves some without.
+    ``with_feedback``: the latest steps with feedback, where the schedule leaves some without.
     """
     if audience is Audience.PATIENT:
         if not plan.phases[step.phase].feedback:
             return None
-        if not (plan.schedule.answers_all or step.number in told):
+        if not (plan.schedule.answers_all or step.number in with_feedback):
             return None
     if step.side != plan.trained_side:
         return None
@@ -113,19 +113,19 @@ def _controls_for(audience: Audience, fold: SessionFold) -> Message:
 def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:
     """Return what the patient was last shown of a step; None before the first."""
     plan, context = fold.plan, StepContext.of(fold)
-    told = fold.delivery.reported
+    with_feedback = fold.delivery.reported
     if plan.schedule.kind is ScheduleKind.SUMMARY:
         return None  # of a summary only its last step is stored
     switched_after = fold.valences.switches[-1][0] if fold.valences.switches else 0
     for step in reversed(recent):
         if step.number <= switched_after:
             return None  # it meant something else
-        if not (plan.schedule.answers_all or step.number in told):
+        if not (plan.schedule.answers_all or step.number in with_feedback):
             continue
         if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
-            phase, before = plan.phases[step.phase], context.told - 1
-            context = context._replace(phase=phase, told=before)
+            phase, before = plan.phases[step.phase], context.answer_count - 1
+            context = context._replace(phase=phase, answer_count=before)
             return patient_step(
                 plan, context, step, score, streak, live=False, answer=FeedbackSummary(steps=1)
             )

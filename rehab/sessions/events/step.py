@@ -38,12 +38,14 @@ class StepContext(NamedTuple):
     valence: Valence
     words_shown: bool
     chart_style: str
-    told: int  # answers before it
+    answer_count: int  # answers before it
 
     @classmethod
     def of(cls, fold: SessionFold) -> StepContext:
         """Return the context of the next step."""
-        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style, fold.delivery.told)
+        return cls(
+            fold.phase, fold.valence, fold.words_shown, fold.chart_style, fold.delivery.answer_count
+        )
 
 
 def step_event(
@@ -140,7 +142,7 @@ def patient_step(
         "performance": round(step.performance, 4),
         "hit": step.hit,
         "close": step.close,
-        "words": plan.choose_words(band, context.told) if context.words_shown else "",
+        "words": plan.choose_words(band, context.answer_count) if context.words_shown else "",
         "chart": context.chart_style,
         "emblem": Emblem.NEUTRAL if step.close else valence.emblem(step.hit),
         "confetti": band.confetti,
@@ -171,7 +173,7 @@ def _summary(
         "live": live,
         "performance": round(mean, 4),
         "hit": mean >= 1,
-        "words": plan.choose_words(band, context.told) if context.words_shown else "",
+        "words": plan.choose_words(band, context.answer_count) if context.words_shown else "",
         "chart": context.chart_style,
         "emblem": valence.emblem(mean >= 1),
         "confetti": band.confetti,

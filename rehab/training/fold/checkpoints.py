@@ -18,7 +18,7 @@ from rehab.training.schedules import FeedbackSummary
 from rehab.training.steps import Side
 
 # Rises with every change of the fold that an older checkpoint would not fit; such a one is ignored.
-CHECKPOINT_VERSION = 5
+CHECKPOINT_VERSION = 6
 # What is plain data already.
 PLAIN = (
     *("last_number", "last_time_s", "active_s", "goal", "was_walking"),
@@ -49,7 +49,7 @@ def fold_to_json(fold: SessionFold) -> dict[str, Any]:
         "adapted": following.moved,
         "pending": asdict(delivery.pending),
         "answer": None if delivery.answer is None else asdict(delivery.answer),
-        "told": delivery.told,
+        "answer_count": delivery.answer_count,
         "reported": list(delivery.reported),
         "trained": asdict(fold.trained),
         "feedback": asdict(fold.feedback),
@@ -92,7 +92,7 @@ def fold_from_json(plan: SessionPlan, data: Mapping[str, Any]) -> SessionFold | 
     following.latest.extend(data["latest"])
     delivery.pending = FeedbackSummary(**data["pending"])
     delivery.answer = None if data["answer"] is None else FeedbackSummary(**data["answer"])
-    delivery.told = data["told"]
+    delivery.answer_count = data["answer_count"]
     delivery.reported.extend(data["reported"])
     fold.trained, fold.feedback = Tally(**data["trained"]), Tally(**data["feedback"])
     fold.phases = tuple(Tally(**tally) for tally in data["phases"])

@@ -24,7 +24,7 @@ class FeedbackDelivery:
         Judged steps since the last answer.
     answer
         The feedback that the last step brought; None where it brought none.
-    told
+    answer_count
         How many answers there were.
     reported
         Numbers of the latest steps with feedback; unused where all have it.
@@ -33,7 +33,7 @@ class FeedbackDelivery:
     schedule: Schedule
     pending: FeedbackSummary = field(default_factory=FeedbackSummary)
     answer: FeedbackSummary | None = None
-    told: int = 0
+    answer_count: int = 0
     reported: deque[int] = field(default_factory=lambda: deque(maxlen=REPORTED_MAX))
 
     def add(self, step: ScoredStep, judged: int) -> None:
@@ -52,6 +52,6 @@ class FeedbackDelivery:
         self.pending.add(step.performance, step.shown, step.hit, step.close, points)
         if self.schedule.answers(judged, step.performance):
             self.answer, self.pending = self.pending, FeedbackSummary()
-            self.told += 1
+            self.answer_count += 1
             if not self.schedule.answers_all:
                 self.reported.append(step.number)
