@@ -83,6 +83,7 @@ def calls(lead: User, pt: User) -> dict[str, tuple[str, str, dict[str, Any]]]:
         "another's role": ("post", account, {"username": "rosa", "role": "lead"}),
         "letting a tablet in": ("get", reverse("pair"), {}),
         "a phone as a sensor": ("get", reverse("pair-phone"), {}),
+        "trying a phone": ("post", reverse("try-phone"), {}),
         "letting the first tablet in": ("post", first_tablet, {"code": "XXXXXX"}),
         "a family's link": ("get", reverse("family-links", args=[patient.pk]), {}),
         "a patient's file": ("get", reverse("patient-data", args=[patient.pk]), {}),

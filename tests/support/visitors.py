@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import ssl
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import urlencode, urlsplit
@@ -25,11 +26,17 @@ class Visitor:
     cookies: dict[str, str] = field(default_factory=dict)
     token: str = ""  # of a program or a device
     headers: dict[str, str] = field(default_factory=dict)  # others of each request
+    tls: ssl.SSLContext | None = None  # that trusts the server, where it encrypts
 
     def request(self, method: str, path: str, body: str | bytes = b"", **headers: str) -> Answer:
         """Send a request; keep the cookies of its answer."""
         place = urlsplit(self.url)
+        assert place.hostname is not None
         connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
+        if self.tls is not None:
+            connection = http.client.HTTPSConnection(
+                place.hostname, place.port, timeout=60, context=self.tls
+            )
         try:
             connection.request(method, path, body, self._headers() | headers)
             response = connection.getresponse()
@@ -67,6 +74,18 @@ class Visitor:
         with self.dial(path) as socket:
             try:
                 while '"snapshot"' not in said:
+                    said = str(socket.recv(PATIENCE_S))
+            except ConnectionClosed as closed:
+                return closed.rcvd.code if closed.rcvd else 0, said
+        return 0, said
+
+    def greet(self, path: str) -> tuple[int, str]:
+        """Say hello as a source; return 0 and the welcome, or the close code and the refusal."""
+        with self.dial(path) as socket:
+            said = ""
+            try:
+                socket.send('{"type": "hello", "version": 1, "run": "r", "last": 0}')
+                while '"welcome"' not in said:
                     said = str(socket.recv(PATIENCE_S))
             except ConnectionClosed as closed:
                 return closed.rcvd.code if closed.rcvd else 0, said
