@@ -12,18 +12,21 @@ from typing import Any
 from urllib.parse import urlencode
 
 import pytest
+from django.http import HttpRequest, HttpResponse
 from django.test import Client
-from django.urls import reverse
+from django.urls import path, reverse
 
 from rehab.boards.choices import Participants
+from rehab.people.access import for_roles
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES
 from rehab.studies.unblinding import Task, give_mark
 from rehab.training.valences import VALENCES
 from tests.support.archives import words_of
-from tests.support.tenancy import all_routes
+from tests.support.tenancy import add_routes, all_routes
 from tests.support.trials import ARMS, LEFT_OUT, Trial, answers, become
 from tests.support.world import NOW, World, build_world, signed_in
 
@@ -70,6 +73,10 @@ def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
                 yield f"{preview}?{urlencode(asked | {'seen_as': patient.pk}, doseq=True)}"
     for patient in patients:
         yield f"{reverse('api:list_sessions')}?patient={patient.pk}"
+    both = urlencode(
+        [("of", one.pk) for one in TrainingSession.everywhere.filter(patient__in=patients)]
+    )
+    yield f"{reverse('side-by-side')}?{both}"
     yield f"{reverse('insight')}?by=patient"
     yield reverse("insight-file")
     for study in Study.everywhere.filter(clinic=world.clinic):
@@ -182,6 +189,21 @@ def test_an_interim_look_tells_nobodys_group():
         words = words_of(client.get(url))
         assert "Group 1" in words
         assert not any(secret in words for secret in (*ARMS, "VAL-0")), url
+
+
+def test_a_new_address_is_opened_too(settings):
+    """Whatever it names a row of, the trial has one for each arm; else `all_routes` fails."""
+
+    @for_roles(Role.PT)
+    def show(request: HttpRequest, session_id: int) -> HttpResponse:
+        return HttpResponse(TrainingSession.everywhere.get(pk=session_id).valence)
+
+    add_routes(settings, path("new/<int:session_id>/", show, name="new"))
+    trial = Trial()
+    urls = [url for url in whole_site(trial) if url.startswith("/new/")]
+    account = {"account": signed_in(trial.assessor)}
+    leaky = {f"/new/{session.pk}/" for session in trial.sessions}
+    assert find_differences(trial, account, urls) == {"account": leaky}
 
 
 @pytest.mark.long
