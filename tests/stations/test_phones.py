@@ -71,6 +71,16 @@ def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
+def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way):
+    wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
+    type(world.clinic).everywhere.update(networks="192.168.7.0/24")
+    answer = world.pt.post(WAYS[way], wish, follow=True, REMOTE_ADDR="203.0.113.9")
+    page = answer.content.decode()
+    assert "Connect it to the clinic’s network" in page
+    assert not token_from(page)
+
+
+@pytest.mark.parametrize("way", WAYS)
 def test_a_phones_token_ends_with_who_paired_it_and_after_a_day(world: World, way):
     """Also one that was only tried: it is the station's, whatever is walked there next."""
     station, who = world.add_station(), world.people[Role.PT]
