@@ -21,7 +21,7 @@ from tests.support.visitors import Visitor
 
 pytestmark = [pytest.mark.server, pytest.mark.timeout(300)]  # of three servers
 SETTINGS = {"GARRY_PROXIES": "1"}
-SOURCE = "/ws/source/"
+SOURCE, HELLO = "/ws/source/", '{"type": "hello", "version": 1, "run": "r", "last": 0}'
 Seed = Callable[[bool], tuple[Path, dict[str, Any]]]  # whether the sessions have ended
 SEED = """
 import json, os
@@ -90,7 +90,7 @@ def look(server: Server, trial: dict[str, Any]) -> dict[tuple[str, ...], str]:
                 place = answer.headers.get("Location", "")
                 seen[name, method, url] = f"{answer.status} {place} {answer.text}"
         if name in PHONES:
-            seen[name, "socket", SOURCE] = str(visitor.greet(SOURCE))
+            seen[name, "socket", SOURCE] = str(visitor.watch(SOURCE, HELLO))
         for url in sockets:
             seen[name, "socket", url] = str(visitor.watch(url))
     return {key: VARYING.sub("", said) for key, said in seen.items()}

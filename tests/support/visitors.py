@@ -68,24 +68,16 @@ class Visitor:
             max_size=None,
         )
 
-    def watch(self, path: str) -> tuple[int, str]:
-        """Open a socket. Return 0 and the snapshot, or the close code and the refusal."""
+    def watch(self, path: str, hello: str = "") -> tuple[int, str]:
+        """Open a socket, and say hello as a source. Return 0 and the snapshot or welcome, or the
+        close code and the refusal.
+        """
         said = ""
         with self.dial(path) as socket:
             try:
-                while '"snapshot"' not in said:
-                    said = str(socket.recv(PATIENCE_S))
-            except ConnectionClosed as closed:
-                return closed.rcvd.code if closed.rcvd else 0, said
-        return 0, said
-
-    def greet(self, path: str) -> tuple[int, str]:
-        """Say hello as a source; return 0 and the welcome, or the close code and the refusal."""
-        with self.dial(path) as socket:
-            said = ""
-            try:
-                socket.send('{"type": "hello", "version": 1, "run": "r", "last": 0}')
-                while '"welcome"' not in said:
+                if hello:
+                    socket.send(hello)
+                while '"snapshot"' not in said and '"welcome"' not in said:
                     said = str(socket.recv(PATIENCE_S))
             except ConnectionClosed as closed:
                 return closed.rcvd.code if closed.rcvd else 0, said
