@@ -13,6 +13,7 @@ from django.db.models import BooleanField, ExpressionWrapper, F, Q, QuerySet
 from django.db.models.functions import Coalesce
 from django.utils.translation import gettext as _
 
+from rehab.people.audit.audit_log import Act, record, truncate_address
 from rehab.people.models import User
 from rehab.people.models.blinding import assessors
 from rehab.people.networks import is_outside
@@ -32,22 +33,25 @@ def approvers() -> QuerySet[User]:
     return carers.exclude(pk__in=assessors().values("pk"))
 
 
-def check_approval(by: User, address: str) -> None:
-    """Raise NotTrusted where a person may let no device in, or none that asks from an address."""
+def check_approval(by: User, address: str, device: str, now: datetime) -> None:
+    """Raise NotTrusted where a person may let no device in, or none that asks from an address.
+
+    The audit log has what was refused, with the words for the device.
+    """
     if not approvers().filter(pk=by.pk).exists():
-        raise NotTrusted(
-            _(
-                "You are an assessor of a running study, and what a tablet or phone gets would "
-                "tell you an arm. Ask a lead or a treating therapist to let it in."
-            )
+        refusal = _(
+            "You are an assessor of a running study, and what a tablet or phone gets would tell "
+            "you an arm. Ask a lead or a treating therapist to let it in."
         )
-    if is_outside(by.clinic.networks if by.clinic else "", address):
-        raise NotTrusted(
-            _(
-                "This device asks from outside the clinic’s networks. Connect it to the clinic’s "
-                "network and open its page again. If you do not have it before you, let nothing in."
-            )
+    elif is_outside(by.clinic.networks if by.clinic else "", address):
+        refusal = _(
+            "This device asks from outside the clinic’s networks. Connect it to the clinic’s "
+            "network and open its page again. If you do not have it before you, let nothing in."
         )
+    else:
+        return
+    record(Act.REFUSED, by, about=f"{device}: {truncate_address(address)}", now=now)
+    raise NotTrusted(refusal)
 
 
 def is_trusted() -> Q:

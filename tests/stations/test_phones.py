@@ -67,6 +67,7 @@ def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
     page = signed_in(assessor).post(WAYS[way], wish, follow=True).content.decode()
     assert "assessor" in page
     assert not token_from(page)
+    assert AuditEntry.everywhere.filter(act=Act.REFUSED, by=assessor).exists()
     assert token_from(world.pt.post(WAYS[way], wish, follow=True).content.decode())
 
 

@@ -17,11 +17,10 @@ import pytest
 
 from tests.support.servers import Server, serve
 from tests.support.trials import AS_ACCOUNT, FAMILY, LEFT_OUT, PHONES, STALE, TABLETS, VARYING
-from tests.support.visitors import Visitor
+from tests.support.visitors import HELLO, SOURCE, Visitor
 
 pytestmark = [pytest.mark.server, pytest.mark.timeout(300)]  # of three servers
 SETTINGS = {"GARRY_PROXIES": "1"}
-SOURCE, HELLO = "/ws/source/", '{"type": "hello", "version": 1, "run": "r", "last": 0}'
 Seed = Callable[[bool], tuple[Path, dict[str, Any]]]  # whether the sessions have ended
 SEED = """
 import json, os

@@ -14,6 +14,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 CSRF = "c" * 32
+SOURCE, HELLO = "/ws/source/", '{"type": "hello", "version": 1, "run": "r", "last": 0}'
 PATIENCE_S = 15.0
 
 

@@ -6,6 +6,7 @@ from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.urls import reverse
+from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST
 
@@ -39,7 +40,7 @@ def try_phone(request: HttpRequest) -> HttpResponse:
     user = user_of(request)
     clinic = clinic_of(user)
     try:
-        check_approval(user, client_address(request))
+        check_approval(user, client_address(request), "phone", timezone.now())
     except NotTrusted as refused:
         messages.error(request, str(refused))
         return redirect("first-steps")

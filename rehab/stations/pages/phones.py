@@ -64,7 +64,7 @@ def _pair(request: HttpRequest, user: User) -> dict[str, Any]:
     Raises NotTrusted.
     """
     now = timezone.now()
-    check_approval(user, client_address(request))
+    check_approval(user, client_address(request), "phone", now)
     stations = Station.objects.visible_to(user)
     station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
     place, side = request.POST.get("place"), request.POST.get("side")
