@@ -142,7 +142,7 @@ STATES = {"open": {"ended": False}, "ended": {}, "withdrawn": {"withdrawn": True
 
 
 @pytest.mark.long
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("state", STATES)
 def test_who_must_not_know_an_arm_sees_the_same_whichever_is_walked(state):
     trial = Trial(**STATES[state])
