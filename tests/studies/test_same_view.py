@@ -17,6 +17,7 @@ from django.test import Client
 from django.urls import path, reverse
 
 from rehab.boards.choices import Participants
+from rehab.exports import views
 from rehab.people.access import for_roles
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
@@ -25,7 +26,7 @@ from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES
 from rehab.studies.unblinding import Task, give_mark
 from rehab.training.valences import VALENCES
-from tests.support.archives import words_of
+from tests.support.archives import body_of, open_archive, words_of
 from tests.support.tenancy import add_routes, all_routes
 from tests.support.trials import ARMS, LEFT_OUT, Trial, answers, become
 from tests.support.world import NOW, World, build_world, signed_in
@@ -37,6 +38,7 @@ OTHERWISE_EACH_TIME = (
     *("own-sign-ins", "tablet"),
 )
 INTERIM = "researcher who may look"
+EXPORTS = ("prepare-research", "advance-research", "download-research")
 Found = dict[str, set[str]]
 
 
@@ -105,18 +107,24 @@ def everybody(trial: Trial) -> dict[str, Client]:
     for name, user in others.items():
         actors[name] = signed_in(user, raise_request_exception=False)
     for name in ("researcher", INTERIM):
-        export(actors[name], trial.study)
+        export(actors[name])
     # What is recorded once: a look of each day, and that a tablet has ended.
     actors[INTERIM].get(reverse("study-results", args=[trial.study.pk]))
     actors["its token"].get(reverse("tablet-state"))
     return actors | {"stranger": Client(raise_request_exception=False)}
 
 
-def export(client: Client, study: Study) -> None:
-    """Have the export for analysis made, of all sessions that its account may have."""
-    client.post(reverse("prepare-research"), {"study": study.pk, "shift_dates": "on"})
+def export(client: Client) -> None:
+    """Have the export for analysis made, as each look does again by its POSTs."""
+    client.post(reverse("prepare-research"))
     reached = client.post(reverse("advance-research")).json()
     assert reached["done"] == reached["total"]
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let an export be made in one call."""
+    monkeypatch.setattr(views, "SECONDS_OF_A_CALL", 600)
 
 
 def find_differences(trial: Trial, actors: dict[str, Client], urls: Sequence[str] = ()) -> Found:
@@ -183,8 +191,11 @@ def test_an_interim_look_tells_nobodys_group():
     client = everybody(trial)[INTERIM]
     results = reverse("study-results", args=[trial.study.pk])
     urls = [results, *files_of(trial.study), reverse("study", args=[trial.study.pk])]
-    urls += [reverse("download-research"), reverse("export-sessions"), reverse("export")]
+    urls += [reverse(name) for name in (*EXPORTS, "export-sessions", "export")]
     assert find_differences(trial, {INTERIM: client}, urls) == {}
+    files = open_archive(body_of(client.get(reverse("download-research"))))
+    for kind in ("fhir/", ".parquet", "protocol.json", "_motion.json"):
+        assert any(kind in name for name in files), kind
     for url in (results, f"{results}download/?file=differences.csv"):
         words = words_of(client.get(url))
         assert "Group 1" in words
