@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import override
 
-from rehab.people.models import Clinic
-from rehab.stations.models import Device, Station
+from rehab.people.models import Clinic, User
+from rehab.stations.models import WORN_LIFETIME, Device, Station
 
 
 def first_station(clinic: Clinic) -> Station:
@@ -18,8 +19,11 @@ def first_station(clinic: Clinic) -> Station:
         return Station.everywhere.create(clinic=clinic, name=_("Station 1"))
 
 
-def issue_builtin_token(station: Station, kind: Device.Kind) -> str:
-    """Return a new token of the station's built-in device; the one before stops working."""
+def issue_builtin_token(station: Station, kind: Device.Kind, by: User | None = None) -> str:
+    """Return a new token of the station's built-in device; the one before stops working.
+
+    A person who gets it (``by``) answers for it, and it ends after a day in the clinic.
+    """
     device = Device.everywhere.filter(station=station, kind=kind, builtin=True).first()
     if device is None:
         with override(station.clinic.language):
@@ -28,6 +32,10 @@ def issue_builtin_token(station: Station, kind: Device.Kind) -> str:
             clinic_id=station.clinic_id, station=station, kind=kind, name=name, builtin=True
         )
     token = device.new_token()
-    device.revoked_at = None
+    device.revoked_at, device.approver = None, by
+    if by is not None:
+        now = timezone.now()
+        device.note_issuer(by, now)
+        device.token_expires_at = now + WORN_LIFETIME
     device.save()
     return token

@@ -1,7 +1,7 @@
-"""Who may let a tablet in, and how long it is trusted: as long as the person who let it in.
+"""Who may let a tablet or phone in, and how long it is trusted: as long as who let it in.
 
-What a tablet shows would tell an assessor the arm, and what its person must not see, it must not
-show that person either. Sources and robots are programs without a screen, and not meant here.
+What a tablet shows, and a phone is told as a source, would tell an assessor the arm; what a person
+must not see, their devices must not get. Other sources, and robots, have their tokens from a lead.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from django.db.models import BooleanField, ExpressionWrapper, F, Q, QuerySet
 from django.db.models.functions import Coalesce
 from django.utils.translation import gettext as _
 
+from rehab.people.audit.audit_log import Act, record, truncate_address
 from rehab.people.models import User
 from rehab.people.models.blinding import assessors
 from rehab.people.networks import is_outside
@@ -23,37 +24,40 @@ UNUSED_FOR = timedelta(days=30)  # an unused tablet ends then
 
 
 class NotTrusted(ValueError):
-    """A person or place that no tablet is let in by or from; the message says what to do."""
+    """A person or place that no device is let in by or from; the message says what to do."""
 
 
 def approvers() -> QuerySet[User]:
-    """Return the accounts that may let a tablet of their clinic in."""
+    """Return the accounts that may let a tablet or phone of their clinic in."""
     carers = User.everywhere.filter(is_active=True, role__in=[Role.LEAD, Role.PT])
     return carers.exclude(pk__in=assessors().values("pk"))
 
 
-def check_approval(by: User, address: str) -> None:
-    """Raise NotTrusted where a person may let no tablet in, or none that asks from an address."""
+def check_approval(by: User, address: str, device: str, now: datetime) -> None:
+    """Raise NotTrusted where a person may let no device in, or none that asks from an address.
+
+    The audit log has what was refused, with the words for the device.
+    """
     if not approvers().filter(pk=by.pk).exists():
-        raise NotTrusted(
-            _(
-                "You are an assessor of a running study, and what a tablet shows would tell you "
-                "an arm. Ask a lead or a treating therapist to let it in."
-            )
+        refusal = _(
+            "You are an assessor of a running study, and what a tablet or phone gets would tell "
+            "you an arm. Ask a lead or a treating therapist to let it in."
         )
-    if is_outside(by.clinic.networks if by.clinic else "", address):
-        raise NotTrusted(
-            _(
-                "This tablet asks from outside the clinic’s networks. Connect it to the clinic’s "
-                "network and open its page again. If you do not have it before you, let nothing in."
-            )
+    elif is_outside(by.clinic.networks if by.clinic else "", address):
+        refusal = _(
+            "This device asks from outside the clinic’s networks. Connect it to the clinic’s "
+            "network and open its page again. If you do not have it before you, let nothing in."
         )
+    else:
+        return
+    record(Act.REFUSED, by, about=f"{device}: {truncate_address(address)}", now=now)
+    raise NotTrusted(refusal)
 
 
 def is_trusted() -> Q:
-    """Return the condition on devices that are no tablets, or whose approver still may be one."""
-    approved = Q(approver__in=approvers(), approver__clinic=F("clinic"))
-    return ~Q(kind=Device.Kind.TABLET) | approved
+    """Return the condition on devices that nobody let in, or whose approver still may do so."""
+    let_in = Q(kind=Device.Kind.TABLET) | ~Q(place="") | Q(approver__isnull=False)
+    return ~let_in | Q(approver__in=approvers(), approver__clinic=F("clinic"))
 
 
 def with_trust(devices: QuerySet[Device]) -> QuerySet[Device]:
@@ -63,10 +67,10 @@ def with_trust(devices: QuerySet[Device]) -> QuerySet[Device]:
 
 
 def find_ended(devices: Iterable[Device], now: datetime) -> set[int]:
-    """Return the keys of those tablets that have lost their approver or were not used for long."""
-    tablets = {device.pk: device for device in devices if device.kind == Device.Kind.TABLET}
-    trusted = {pk for pk, device in tablets.items() if device.is_trusted}
-    if unknown := [pk for pk, device in tablets.items() if device.is_trusted is None]:
+    """Return the keys of those let in that have lost their approver or were unused for long."""
+    let_in = {device.pk: device for device in devices if device.is_let_in}
+    trusted = {pk for pk, device in let_in.items() if device.is_trusted}
+    if unknown := [pk for pk, device in let_in.items() if device.is_trusted is None]:
         known = Device.everywhere.filter(is_trusted(), pk__in=unknown)
         trusted |= set(known.values_list("pk", flat=True))
 
@@ -75,6 +79,6 @@ def find_ended(devices: Iterable[Device], now: datetime) -> set[int]:
 
     return {
         pk
-        for pk, device in tablets.items()
+        for pk, device in let_in.items()
         if pk not in trusted or now - used_at(device) >= UNUSED_FOR
     }

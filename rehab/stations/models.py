@@ -77,7 +77,7 @@ class Device(TokenModel):
     token_expires_at = models.DateTimeField(_("valid until"), null=True, editable=False)
     copy_seen_at = models.DateTimeField(_("old token seen"), null=True, editable=False)
 
-    # Of a tablet: who let it in (``device_trust``), and what it was then.
+    # Who let a tablet or phone in (``device_trust``), and what a tablet was then.
     approver = models.ForeignKey(
         User,
         on_delete=models.SET_NULL,
@@ -114,9 +114,14 @@ class Device(TokenModel):
         """Return whether it is outside its clinic's networks, or nobody knows where."""
         return is_outside(self.clinic.networks, self.address)
 
+    @property
+    def is_let_in(self) -> bool:
+        """Return whether a person answers for it: a tablet, a phone, what a person tries."""
+        return self.kind == self.Kind.TABLET or bool(self.place) or self.approver_id is not None
+
     def note_issuer(self, by: User, now: datetime) -> None:
-        """Make the person who gives a tablet its token the one who answers for it."""
-        if self.kind == self.Kind.TABLET:
+        """Make the person who gives a tablet or phone its token the one who answers for it."""
+        if self.is_let_in:
             self.approver, self.approved_at, self.last_seen_at = by, now, None
 
     def new_token(self) -> str:

@@ -16,7 +16,7 @@ from rehab.people.rate_limits import TokenBuckets
 from rehab.people.row_values import read_values, save_changes
 from rehab.people.sign_in.known import is_known_network
 from rehab.people.sign_in.tokens import hash_token
-from rehab.stations.device_trust import NotTrusted, check_approval
+from rehab.stations.device_trust import check_approval
 from rehab.stations.models import Device, Pairing, Station
 
 LIFETIME = timedelta(minutes=5)
@@ -95,12 +95,7 @@ def find_by_code(code: str, by: User, now: datetime) -> Pairing:
         raise PairingRefused(
             _("No tablet shows this code now. Codes last five minutes; look at the tablet again.")
         )
-    try:
-        check_approval(by, pairing.address)
-    except NotTrusted:
-        about = " ".join(("tablet:", truncate_address(pairing.address), pairing.browser))
-        record(Act.REFUSED, by, about=about, now=now)
-        raise
+    check_approval(by, pairing.address, f"tablet, {pairing.browser}", now)
     return pairing
 
 

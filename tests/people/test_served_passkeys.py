@@ -1,4 +1,4 @@
-"""A passkey at a real server: nobody signs in with one signed before, elsewhere, or by a copy."""
+"""Second factors at a real server: none counts twice, from elsewhere, or in a planted session."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ from tests.support.visitors import Visitor
 pytestmark = pytest.mark.server
 
 SEED = """
-from tests.support.accounts import add_account
+import json
+from tests.support.accounts import add_account, add_app
 from tests.support.world import signed_in
-print(signed_in(add_account()).cookies["sessionid"].value)
+cookie = signed_in(add_account()).cookies["sessionid"].value
+print(json.dumps([cookie, add_app(add_account("rolf"))[1]]))
 """
 SIGN_IN, SECOND_FACTOR, ADD = "/sign-in/", "/sign-in/code/", "/account/second-factor/passkey/"
 
@@ -38,6 +40,13 @@ def visitor(server: Server, cookie: str = "") -> Visitor:
     )
 
 
+@pytest.fixture(scope="module")
+def seeded(server: Server) -> tuple[str, list[str]]:
+    """Return the cookie of rosa, who is signed in, and the recovery codes of rolf."""
+    cookie, codes = json.loads(server.run_shell(SEED).splitlines()[-1])
+    return cookie, codes
+
+
 def options_of(browser: Visitor, path: str) -> dict[str, Any]:
     found = re.search(r'data-passkey="([^"]*)"', browser.get(path).text)
     assert found
@@ -45,22 +54,49 @@ def options_of(browser: Visitor, path: str) -> dict[str, Any]:
     return asked
 
 
-def pending(server: Server) -> tuple[Visitor, dict[str, Any]]:
-    """Return a browser that has shown the password, and what its passkey is to sign."""
-    browser = visitor(server)
-    shown = browser.post(SIGN_IN, username="rosa", password=PASSWORD)
+def half_way(server: Server, username: str, cookie: str = "") -> Visitor:
+    """Return a browser that has shown the password."""
+    browser = visitor(server, cookie)
+    shown = browser.post(SIGN_IN, username=username, password=PASSWORD)
     assert shown.headers["Location"] == SECOND_FACTOR
+    return browser
+
+
+def pending(server: Server) -> tuple[Visitor, dict[str, Any]]:
+    """Return a browser that has shown rosa's password, and what her passkey is to sign."""
+    browser = half_way(server, "rosa")
     return browser, options_of(browser, SECOND_FACTOR)
+
+
+def is_in(browser: Visitor) -> bool:
+    return browser.get("/start/").status == 200
 
 
 def proves(browser: Visitor, answer: str) -> bool:
     browser.post(SECOND_FACTOR, passkey=answer)
-    return browser.get("/start/").status == 200
+    return is_in(browser)
 
 
-def test_only_the_own_passkey_signs_in_here_and_once(server):
+def test_a_recovery_code_counts_once(server, seeded):
+    for counts in (True, False):
+        browser = half_way(server, "rolf")
+        browser.post(SECOND_FACTOR, code=seeded[1][0])
+        assert is_in(browser) == counts
+
+
+def test_a_session_that_somebody_planted_stays_a_strangers(server, seeded):
+    planted = half_way(server, "rolf").cookies["sessionid"]
+    victim = half_way(server, "rolf", planted)
+    between = victim.cookies["sessionid"]
+    victim.post(SECOND_FACTOR, code=seeded[1][1])
+    assert is_in(victim)
+    assert len({planted, between, victim.cookies["sessionid"]}) == 3
+    assert not any(is_in(visitor(server, key)) for key in (planted, between))
+
+
+def test_only_the_own_passkey_signs_in_here_and_once(server, seeded):
     key = SoftPasskey(f"http://localhost:{server.port}", counter=7)
-    owner = visitor(server, server.run_shell(SEED).splitlines()[-1])
+    owner = visitor(server, seeded[0])
     made = key.create(options_of(owner, ADD))
     assert owner.post(ADD, name="Key", passkey=made).status in (200, 302)
 

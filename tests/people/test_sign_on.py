@@ -15,6 +15,8 @@ from rehab.people.models import Clinic, SignOnGroup, User
 from rehab.people.roles import Role
 from rehab.people.sign_in import sign_on
 from rehab.people.sign_in.sign_on import LOGOUT_EVENT, SignOnRefused
+from rehab.studies.unblinding import Task, give_mark
+from tests.support.studies import running_study
 from tests.support.world import NOW, signed_in
 
 ISSUER = "https://hospital.example"
@@ -65,6 +67,14 @@ def test_the_strongest_group_of_the_own_clinic_gives_the_role(linked):
         with pytest.raises(SignOnRefused, match="no group of your clinic"):
             sign_on.find_account({"sub": "4711", "groups": groups})
     assert User.everywhere.get(pk=linked.pk).get_session_auth_hash() != before  # signed out
+
+
+def test_no_group_makes_an_assessor_a_lead(linked, world):
+    give_mark(running_study(world), linked, Task.ASSESSOR, None, NOW)
+    group(linked, "chiefs", Role.LEAD)
+    with pytest.raises(SignOnRefused, match="end the mark"):
+        sign_on.find_account({"sub": "4711", "groups": ["chiefs"]})
+    assert User.everywhere.get(pk=linked.pk).role == Role.PT
 
 
 def test_an_account_that_is_off_stays_off(linked):

@@ -9,10 +9,9 @@ import pytest
 from django.contrib.admin.views.autocomplete import AutocompleteJsonView
 from django.db.models import Q
 from django.http import HttpRequest, HttpResponse
-from django.urls import URLPattern, path, reverse
+from django.urls import path, reverse
 from django.views.decorators.http import require_POST
 
-from garry_site import urls as site_urls
 from rehab.boards.admin import LeaderboardAdmin
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels import formatting, shared_panels
@@ -29,6 +28,7 @@ from rehab.sessions import api as sessions_api
 from rehab.sessions import corrections
 from tests.support.foreign_writes import find_foreign_writes
 from tests.support.tenancy import (
+    add_routes,
     all_routes,
     find_leaks,
     find_offers,
@@ -135,12 +135,12 @@ def test_an_unscoped_admin_queryset_is_caught(worlds, monkeypatch):
     assert "pt of birch: /admin/rehab/patient/ shows Patient of amber" in leaks
 
 
-def test_an_unscoped_page_is_caught(worlds, settings, monkeypatch):
+def test_an_unscoped_page_is_caught(worlds, settings):
     @for_roles(Role.PT)
     def leaky(request: HttpRequest) -> HttpResponse:
         return HttpResponse(", ".join(str(patient) for patient in Patient.everywhere.all()))
 
-    with_patterns(settings, monkeypatch, path("leaky", leaky, name="leaky"))
+    add_routes(settings, path("leaky", leaky, name="leaky"))
     leaks, _ = find_leaks(
         worlds, some_actors(worlds, "pt of amber", "researcher of amber"), under="/leaky"
     )
@@ -148,12 +148,12 @@ def test_an_unscoped_page_is_caught(worlds, settings, monkeypatch):
     assert not any("researcher" in leak for leak in leaks)  # the role table held
 
 
-def test_a_public_page_with_patients_is_caught(worlds, settings, monkeypatch):
+def test_a_public_page_with_patients_is_caught(worlds, settings):
     @public
     def leaky(request: HttpRequest) -> HttpResponse:
         return HttpResponse(str(Patient.everywhere.first()))
 
-    with_patterns(settings, monkeypatch, path("leaky", leaky, name="leaky"))
+    add_routes(settings, path("leaky", leaky, name="leaky"))
     leaks, _ = find_leaks(worlds, some_actors(worlds, "stranger"), under="/leaky")
     assert "stranger: /leaky shows Patient of amber" in leaks
 
@@ -216,17 +216,17 @@ def test_a_pseudonym_for_a_number_is_caught(worlds, monkeypatch):
     assert f"researcher of amber: {url} opens" in leaks
 
 
-def test_a_page_that_declares_nothing_is_closed_and_caught(worlds, settings, monkeypatch):
+def test_a_page_that_declares_nothing_is_closed_and_caught(worlds, settings):
     def silent(request: HttpRequest) -> HttpResponse:
         return HttpResponse("open")
 
-    with_patterns(settings, monkeypatch, path("silent", silent, name="silent"))
+    add_routes(settings, path("silent", silent, name="silent"))
     client = signed_in(worlds[0].people[Role.LEAD])
     assert client.get("/silent").status_code == 403
     assert undeclared_views() == ["silent"]
 
 
-def test_forms_that_act_on_any_clinics_rows_are_caught(worlds, settings, monkeypatch):
+def test_forms_that_act_on_any_clinics_rows_are_caught(worlds, settings):
     """By a key in the address, which a page for forms alone never shows when it is opened."""
 
     @for_roles(Role.PT)
@@ -246,8 +246,9 @@ def test_forms_that_act_on_any_clinics_rows_are_caught(worlds, settings, monkeyp
         Patient.everywhere.filter(pk=request.POST["patient"]).update(end_reason="moved")
         return HttpResponse(status=204)
 
-    with_patterns(
-        *(settings, monkeypatch, path("leaky/move", move, name="move")),
+    add_routes(
+        settings,
+        path("leaky/move", move, name="move"),
         path("leaky/<int:patient_id>/rename", rename, name="rename"),
         path("leaky/<int:patient_id>/accept", accept, name="accept"),
     )
@@ -260,20 +261,7 @@ def test_forms_that_act_on_any_clinics_rows_are_caught(worlds, settings, monkeyp
     assert "pt of amber: /leaky/move changes Patient of birch" in leaks
 
 
-def test_an_address_with_an_unknown_parameter_is_caught(worlds, settings, monkeypatch):
-    with_patterns(
-        settings, monkeypatch, path("thing/<int:thing_id>", public(lambda r: None), name="thing")
-    )
+def test_an_address_with_an_unknown_parameter_is_caught(worlds, settings):
+    add_routes(settings, path("thing/<int:thing_id>", public(lambda r: None), name="thing"))
     with pytest.raises(pytest.fail.Exception, match="thing"):
         list(all_routes(worlds))
-
-
-def with_patterns(settings: Any, monkeypatch: pytest.MonkeyPatch, *extra: URLPattern) -> None:
-    """Add addresses to the site for one test."""
-    import sys
-    import types
-
-    module = types.ModuleType("seeded_urls")
-    module.urlpatterns = [*extra, *site_urls.urlpatterns]  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "seeded_urls", module)
-    settings.ROOT_URLCONF = "seeded_urls"

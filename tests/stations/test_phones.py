@@ -9,11 +9,15 @@ from django.test import Client
 from django.utils import timezone
 
 from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
 from rehab.stations.models import WORN_LIFETIME, Device
-from tests.support.world import World
+from rehab.stations.tokens import find_device
+from rehab.studies.unblinding import Task, give_mark
+from tests.support.studies import running_study
+from tests.support.world import NOW, World, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -44,6 +48,52 @@ def test_a_new_token_of_a_phone_ends_as_early_as_the_first(pt: Client, world: Wo
     pt.post(f"/devices/{device.pk}/")
     device.refresh_from_db()
     assert first <= device.token_expires_at <= timezone.now() + WORN_LIFETIME
+
+
+WAYS = {"paired": "/phones/pair/", "tried": "/first-steps/phone/"}
+
+
+def token_from(page: str) -> str:
+    """Return the token behind the square, or of the trial; empty where none is given."""
+    return page.partition("token=")[2].partition("&")[0]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
+    """A source is told the feedback type of the session that is open at its station."""
+    wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
+    assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
+    give_mark(running_study(world), assessor, Task.ASSESSOR, None, NOW)
+    page = signed_in(assessor).post(WAYS[way], wish, follow=True).content.decode()
+    assert "assessor" in page
+    assert not token_from(page)
+    assert AuditEntry.everywhere.filter(act=Act.REFUSED, by=assessor).exists()
+    assert token_from(world.pt.post(WAYS[way], wish, follow=True).content.decode())
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way):
+    wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
+    type(world.clinic).everywhere.update(networks="192.168.7.0/24")
+    answer = world.pt.post(WAYS[way], wish, follow=True, REMOTE_ADDR="203.0.113.9")
+    page = answer.content.decode()
+    assert "Connect it to the clinic’s network" in page
+    assert not token_from(page)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_phones_token_ends_with_who_paired_it_and_after_a_day(world: World, way):
+    """Also one that was only tried: it is the station's, whatever is walked there next."""
+    station, who = world.add_station(), world.people[Role.PT]
+    wish = {"station": station.pk, "place": "shank", "side": "left"}
+    token = token_from(world.pt.post(WAYS[way], wish).content.decode())
+    now = timezone.now()
+    assert find_device(token, now) is not None
+    assert find_device(token, now + WORN_LIFETIME + timedelta(minutes=1)) is None
+    User.everywhere.filter(pk=who.pk).update(is_active=False)
+    assert find_device(token, now) is None
+    User.everywhere.filter(pk=who.pk).update(is_active=True)
+    assert find_device(token, now) is None
 
 
 @pytest.mark.parametrize("wrong", [{"station": "0"}, {"place": "head"}, {"side": "both"}])

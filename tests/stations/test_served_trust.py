@@ -1,4 +1,4 @@
-"""Tablets at a real server: who lets them in, and when their open sockets end."""
+"""Tablets and phones at a real server: who lets them in, and when their open sockets end."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from tests.support.servers import Server, serve
-from tests.support.visitors import Visitor, until_closed
+from tests.support.visitors import HELLO, SOURCE, Visitor, until_closed
 
 pytestmark = pytest.mark.server
 
 CLINIC, HOME = "192.168.7.20", "203.0.113.9"  # addresses
-# Therapists who are signed in, an open session each, and whose tablet shows it.
+# Therapists who are signed in, an open session each, whose tablet shows it and phone measures it.
 SEED = """
 import json, os
 os.environ["GARRY_TEST_CLOCK"] = "{now}"
@@ -38,9 +38,11 @@ for name in {names}:
     session = world.begin_session(patient, station=station)
     cookie = signed_in(who).cookies["sessionid"].value
     _, token = approved(station, name, approver=who)
+    worn = {{"kind": "source", "place": "shank", "side": "left"}}
+    _, phone = approved(station, name, approver=who, **worn)
     made[name] = {{
         "user": who.pk, "station": station.pk, "patient": patient.pk, "session": session.pk,
-        "cookie": cookie, "token": token,
+        "cookie": cookie, "token": token, "phone": phone,
     }}
 give_mark(study, User.everywhere.get(username="assessor"), Task.ASSESSOR, None, NOW)
 print(json.dumps(made | {{"clinic": world.clinic.pk, "study": study.pk}}))
@@ -106,22 +108,28 @@ def test_a_blinded_assessor_lets_no_browser_of_hers_in(server, seeded):
     assert own.watch(socket(seeded["treating"]))[0] == 0
 
 
-def test_a_tablets_open_socket_ends_with_its_approvers_account_role_or_mark(server, seeded):
+def test_open_sockets_of_devices_end_with_their_approvers_account_role_or_mark(server, seeded):
     rows = {name: seeded[name] for name in ENDS}
     ends = [ENDS[name].format(**row, study=seeded["study"]) for name, row in rows.items()]
     with ExitStack() as sockets:
         open_ones = [
             sockets.enter_context(tablet_of(server, row).dial(socket(row))) for row in rows.values()
         ]
+        phones = [Visitor(server.url, CLINIC, token=row["phone"]) for row in rows.values()]
+        for phone in phones:
+            assert phone.watch(SOURCE, HELLO)[0] == 0
+            open_ones.append(sockets.enter_context(phone.dial(SOURCE)))
+            open_ones[-1].send(HELLO)
         for name, row in rows.items():
             assert tablet_of(server, row).get(walk(row)).status == 200, name
         change_rows(server, *ends)
-        assert [until_closed(one) for one in open_ones] == [4001] * len(ENDS)
+        assert [until_closed(one) for one in open_ones] == [4001] * 2 * len(ENDS)
     for name, row in rows.items():
         assert tablet_of(server, row).get(walk(row)).status == 302, name
         assert tablet_of(server, row).watch(socket(row))[0] == 4001, name
         program = Visitor(server.url, CLINIC, token=row["token"])
         assert program.watch(socket(row))[0] == 4001, name
+    assert {phone.watch(SOURCE, HELLO)[0] for phone in phones} == {4001}
 
 
 def test_outside_the_clinics_networks_a_tablet_gets_nothing_also_once_they_are_named(

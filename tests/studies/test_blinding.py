@@ -29,6 +29,7 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from tests.support.archives import words_of
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.tenancy import walk_patterns
 from tests.support.world import NOW, World, build_world, signed_in
@@ -46,6 +47,21 @@ def walked(enrollment: Enrollment, by: User | None = None) -> TrainingSession:
     session.active_s = 60
     session.save()
     return session
+
+
+# --- who assesses ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("role", [Role.LEAD, Role.RESEARCHER])
+def test_an_assessor_becomes_no_lead(world, role):
+    """A lead could give herself a robot's token, which is told the feedback type."""
+    assessor = new_pt(world)
+    give_mark(running_study(world), assessor, Task.ASSESSOR, None, NOW)
+    url = reverse("admin:rehab_user_change", args=[assessor.pk])
+    answer = world.lead.post(url, {"username": "assessor", "role": role, "is_active": "on"})
+    assessor.refresh_from_db()
+    assert ("end the mark" in words_of(answer)) == (role == Role.LEAD)
+    assert assessor.role == (Role.PT if role == Role.LEAD else role)
 
 
 # --- enrollment -----------------------------------------------------------------------------------

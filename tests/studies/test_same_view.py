@@ -12,18 +12,22 @@ from typing import Any
 from urllib.parse import urlencode
 
 import pytest
+from django.http import HttpRequest, HttpResponse
 from django.test import Client
-from django.urls import reverse
+from django.urls import path, reverse
 
 from rehab.boards.choices import Participants
+from rehab.exports import views
+from rehab.people.access import for_roles
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES
 from rehab.studies.unblinding import Task, give_mark
 from rehab.training.valences import VALENCES
-from tests.support.archives import words_of
-from tests.support.tenancy import all_routes
+from tests.support.archives import body_of, open_archive, words_of
+from tests.support.tenancy import add_routes, all_routes
 from tests.support.trials import ARMS, LEFT_OUT, Trial, answers, become
 from tests.support.world import NOW, World, build_world, signed_in
 
@@ -34,6 +38,7 @@ OTHERWISE_EACH_TIME = (
     *("own-sign-ins", "tablet"),
 )
 INTERIM = "researcher who may look"
+EXPORTS = ("prepare-research", "advance-research", "download-research")
 Found = dict[str, set[str]]
 
 
@@ -70,6 +75,10 @@ def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
                 yield f"{preview}?{urlencode(asked | {'seen_as': patient.pk}, doseq=True)}"
     for patient in patients:
         yield f"{reverse('api:list_sessions')}?patient={patient.pk}"
+    both = urlencode(
+        [("of", one.pk) for one in TrainingSession.everywhere.filter(patient__in=patients)]
+    )
+    yield f"{reverse('side-by-side')}?{both}"
     yield f"{reverse('insight')}?by=patient"
     yield reverse("insight-file")
     for study in Study.everywhere.filter(clinic=world.clinic):
@@ -98,18 +107,24 @@ def everybody(trial: Trial) -> dict[str, Client]:
     for name, user in others.items():
         actors[name] = signed_in(user, raise_request_exception=False)
     for name in ("researcher", INTERIM):
-        export(actors[name], trial.study)
+        export(actors[name])
     # What is recorded once: a look of each day, and that a tablet has ended.
     actors[INTERIM].get(reverse("study-results", args=[trial.study.pk]))
     actors["its token"].get(reverse("tablet-state"))
     return actors | {"stranger": Client(raise_request_exception=False)}
 
 
-def export(client: Client, study: Study) -> None:
-    """Have the export for analysis made, of all sessions that its account may have."""
-    client.post(reverse("prepare-research"), {"study": study.pk, "shift_dates": "on"})
+def export(client: Client) -> None:
+    """Have the export for analysis made, as each look does again by its POSTs."""
+    client.post(reverse("prepare-research"))
     reached = client.post(reverse("advance-research")).json()
     assert reached["done"] == reached["total"]
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let an export be made in one call."""
+    monkeypatch.setattr(views, "SECONDS_OF_A_CALL", 600)
 
 
 def find_differences(trial: Trial, actors: dict[str, Client], urls: Sequence[str] = ()) -> Found:
@@ -135,7 +150,7 @@ STATES = {"open": {"ended": False}, "ended": {}, "withdrawn": {"withdrawn": True
 
 
 @pytest.mark.long
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("state", STATES)
 def test_who_must_not_know_an_arm_sees_the_same_whichever_is_walked(state):
     trial = Trial(**STATES[state])
@@ -176,12 +191,30 @@ def test_an_interim_look_tells_nobodys_group():
     client = everybody(trial)[INTERIM]
     results = reverse("study-results", args=[trial.study.pk])
     urls = [results, *files_of(trial.study), reverse("study", args=[trial.study.pk])]
-    urls += [reverse("download-research"), reverse("export-sessions"), reverse("export")]
+    urls += [reverse(name) for name in (*EXPORTS, "export-sessions", "export")]
     assert find_differences(trial, {INTERIM: client}, urls) == {}
+    files = open_archive(body_of(client.get(reverse("download-research"))))
+    for kind in ("fhir/", ".parquet", "protocol.json", "_motion.json"):
+        assert any(kind in name for name in files), kind
     for url in (results, f"{results}download/?file=differences.csv"):
         words = words_of(client.get(url))
         assert "Group 1" in words
         assert not any(secret in words for secret in (*ARMS, "VAL-0")), url
+
+
+def test_a_new_address_is_opened_too(settings):
+    """Whatever it names a row of, the trial has one for each arm; else `all_routes` fails."""
+
+    @for_roles(Role.PT)
+    def show(request: HttpRequest, session_id: int) -> HttpResponse:
+        return HttpResponse(TrainingSession.everywhere.get(pk=session_id).valence)
+
+    add_routes(settings, path("new/<int:session_id>/", show, name="new"))
+    trial = Trial()
+    urls = [url for url in whole_site(trial) if url.startswith("/new/")]
+    account = {"account": signed_in(trial.assessor)}
+    leaky = {f"/new/{session.pk}/" for session in trial.sessions}
+    assert find_differences(trial, account, urls) == {"account": leaky}
 
 
 @pytest.mark.long

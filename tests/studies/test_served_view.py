@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from tests.support.servers import Server, serve
-from tests.support.trials import AS_ACCOUNT, FAMILY, LEFT_OUT, STALE, TABLETS, VARYING
-from tests.support.visitors import Visitor
+from tests.support.trials import AS_ACCOUNT, FAMILY, LEFT_OUT, PHONES, STALE, TABLETS, VARYING
+from tests.support.visitors import HELLO, SOURCE, Visitor
 
 pytestmark = [pytest.mark.server, pytest.mark.timeout(300)]  # of three servers
 SETTINGS = {"GARRY_PROXIES": "1"}
@@ -88,6 +88,8 @@ def look(server: Server, trial: dict[str, Any]) -> dict[tuple[str, ...], str]:
                 assert answer.status < 500, url
                 place = answer.headers.get("Location", "")
                 seen[name, method, url] = f"{answer.status} {place} {answer.text}"
+        if name in PHONES:
+            seen[name, "socket", SOURCE] = str(visitor.watch(SOURCE, HELLO))
         for url in sockets:
             seen[name, "socket", url] = str(visitor.watch(url))
     return {key: VARYING.sub("", said) for key, said in seen.items()}
@@ -104,7 +106,7 @@ def find_differences(
             server.run_shell(EXCHANGE.format(**trial))
     before, after = looks
     assert before.keys() == after.keys()
-    assert {name for name, *_ in before} == {*AS_ACCOUNT, *TABLETS, FAMILY, STALE}
+    assert {name for name, *_ in before} == {*AS_ACCOUNT, *TABLETS, *PHONES, FAMILY, STALE}
     return {key for key, said in before.items() if after[key] != said}
 
 
@@ -119,7 +121,7 @@ def test_whatever_an_assessor_becomes_is_answered_the_same(seed, tmp_path, is_en
 @pytest.mark.parametrize(
     ("rule", "is_ended", "how"),
     [
-        ("an assessor lets no tablet in", False, "socket"),
+        ("an assessor lets no device in", False, "socket"),
         ("an assessor sees no sessions", False, "socket"),
         ("a family sees nothing", True, "POST"),  # its page asks for a tap first
     ],
@@ -128,6 +130,6 @@ def test_a_rule_that_is_left_out_is_found(seed, tmp_path, rule, is_ended, how):
     folder, trial = seed(is_ended)
     leaky = ["-m", "tests.support.leaky_server", rule]
     found = find_differences(shutil.copytree(folder, tmp_path / "data"), trial, leaky)
-    refused = {"tablet"}  # while the rule held
+    refused = {"tablet", "phone"}  # while the rule held
     assert {name for name, *_ in found} == LEFT_OUT[rule][-1] - refused
     assert how in {method for _, method, _ in found}

@@ -17,15 +17,16 @@ def open_archive(data: bytes) -> dict[str, str]:
     """Return the files of an archive by name."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         assert archive.testzip() is None
-        return {name: archive.read(name).decode() for name in archive.namelist()}
+        names = archive.namelist()  # some are Parquet
+        return {name: archive.read(name).decode(errors="backslashreplace") for name in names}
 
 
 def words_of(response: Any) -> str:
-    """Return all text of a response, also in the files of an archive."""
+    """Return all text of a response, also the files of an archive and their names."""
     data = body_of(response)
     if data.startswith(b"PK"):
-        return "\n".join(open_archive(data).values())
-    return data.decode(errors="replace")
+        return "\n".join(f"{name}\n{text}" for name, text in open_archive(data).items())
+    return data.decode(errors="backslashreplace")
 
 
 def rows_of(text: str) -> list[dict[str, str]]:

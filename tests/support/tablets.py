@@ -1,4 +1,4 @@
-"""Tablets to test with: one shows a code, and a person compares it and lets the tablet in."""
+"""Tablets and phones to test with: a person lets them in."""
 
 from __future__ import annotations
 
@@ -37,6 +37,13 @@ def pair_tablet(person: Client, station: Station, tablet: Client | None = None) 
     let_in(person, shown_code(tablet), station)
     tablet.get("/tablet/state/")
     return tablet
+
+
+def pair_phone(person: Client, station: Station) -> str:
+    """Return the token of a phone that a person pairs as a sensor; empty where it is refused."""
+    worn = {"station": station.pk, "place": "shank", "side": "left"}
+    page = person.post("/phones/pair/", worn).content.decode()
+    return page.partition("token=")[2].partition("&")[0]
 
 
 def is_paired(tablet: Client) -> bool:

@@ -15,6 +15,7 @@ from django.db.models import Model
 from django.test import Client, RequestFactory
 from django.urls import URLPattern, URLResolver, get_resolver, reverse
 
+from garry_site import urls as site_urls
 from rehab.boards.models import Leaderboard
 from rehab.patients.family import FamilyLink
 from rehab.people.models import Patient
@@ -95,6 +96,11 @@ def walk_patterns(
             yield from walk_patterns(entry, inner, here)
         else:
             yield ":".join((*names, entry.name or "")), here, entry
+
+
+def add_routes(settings: Any, *patterns: URLPattern) -> None:
+    """Add addresses to the site for one test."""
+    settings.ROOT_URLCONF = (*patterns, *site_urls.urlpatterns)
 
 
 def undeclared_views() -> list[str]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
+from copy import copy
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
 
 from django.contrib.sessions.models import Session
+from django.db import transaction
 from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
@@ -35,10 +37,12 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.stations import device_trust
 from rehab.stations.models import Station
-from rehab.stations.tablets import COOKIE, find_tablet
+from rehab.stations.tablets import COOKIE
+from rehab.stations.tokens import find_device
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.enrolling import withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.record.adverse_events import AdverseEvent
 from rehab.studies.registration.sealing import seal
 from rehab.studies.unblinding import Task, give_mark
 from rehab.studies.visits import Place, start_session
@@ -48,7 +52,7 @@ from robot.wire.incident import pack
 from tests.support.archives import words_of
 from tests.support.incidents import BUMPED
 from tests.support.studies import SEED, enrolled, new_patient, running_study
-from tests.support.tablets import pair_tablet
+from tests.support.tablets import pair_phone, pair_tablet
 from tests.support.tenancy import all_routes
 from tests.support.world import NOW, build_world, fill_board, signed_in, store
 
@@ -58,6 +62,7 @@ addresses = itertools.count()  # of families
 STALE = "stale screen of who treats"
 AS_ACCOUNT = {"account", "program", "program of a researcher"}
 TABLETS = {"tablet", "earlier tablet", "its token"}
+PHONES = {"phone", "earlier phone"}  # sources, which are told what is walked
 # A nonce, a number of each answer, and the length of the words, which have both.
 OF_EACH_ANSWER = {"Content-Security-Policy", "X-Request-ID", "Content-Length"}
 OF_SESSIONS: tuple[type[Any], ...] = (
@@ -66,7 +71,12 @@ OF_SESSIONS: tuple[type[Any], ...] = (
 YESTERDAY = SimpleNamespace(now=lambda: datetime.now(UTC) - timedelta(days=1))
 # Rules of blinding: where each stands, what leaves it out, and who then sees the arm.
 LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
-    "an assessor lets no tablet in": (device_trust, "assessors", User.everywhere.none, TABLETS),
+    "an assessor lets no device in": (
+        device_trust,
+        "assessors",
+        User.everywhere.none,
+        TABLETS | PHONES,
+    ),
     "an assessor sees no sessions": (
         consents,
         "hidden_patients",
@@ -105,7 +115,7 @@ def walk_visit(
     return session
 
 
-def add_records(session: TrainingSession) -> list[Any]:
+def add_records(session: TrainingSession, enrollment: Enrollment) -> list[Any]:
     """Return what else is stored of a session, other things for each arm; some tell the arm."""
     arm = ARMS.index(session.valence)
     lead = User.everywhere.get(clinic=session.clinic_id, role=Role.LEAD)
@@ -122,6 +132,9 @@ def add_records(session: TrainingSession) -> list[Any]:
         QuestionnaireResponse.everywhere.create(
             session=session, slug="own-1", instrument=asked, answers=[(5, 1)[arm]], finished_at=NOW
         ),
+        AdverseEvent.everywhere.create(
+            enrollment=enrollment, what=f"Fell, {session.valence}", grade=arm + 1, relation="none"
+        ),
     ]
 
 
@@ -134,7 +147,9 @@ class Trial:
         self.study = running_study(world, *ARMS, sealed=seal(Secret(SEED, (2,))))
         self.assessor = User.everywhere.create_user("zz", role=Role.PT, clinic=world.clinic)
         self.stations = [world.add_station(name) for name in ("Bay 1", "Bay 2")]
-        self.earlier = pair_tablet(signed_in(self.assessor), self.stations[0])
+        before = signed_in(self.assessor)
+        self.earlier = pair_tablet(before, self.stations[0])
+        self.earlier_phone = pair_phone(before, self.stations[0])
         give_mark(self.study, self.assessor, Task.ASSESSOR, None, NOW)
         self.patients = [new_patient(world, number) for number in range(1, 2 * pairs + 1)]
         self.sessions, self.family = [], []
@@ -148,7 +163,7 @@ class Trial:
             self.sessions.append(walk_visit(enrollment, station, ended=ended))
             if withdrawn:
                 withdraw(enrollment, None, NOW)
-            records = add_records(self.sessions[-1])
+            records = add_records(self.sessions[-1], enrollment)
             world.more += [patient, enrollment, self.sessions[-1], *records]
         assert {session.valence for session in self.sessions} == set(ARMS)
         world.more.append(self.study)
@@ -176,9 +191,9 @@ class Trial:
                     list(rows.filter(session=one)), list(rows.filter(session=other)), {"session_id"}
                 )
             exchange_metrics(one, other)
-        rows = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
-        allocations = list(rows)
-        exchange(allocations[::2], allocations[1::2], {"enrollment_id"})
+        for of_enrollment in (Allocation, AdverseEvent):
+            rows = of_enrollment.everywhere.filter(enrollment__study=self.study).order_by("pk")
+            exchange(list(rows[::2]), list(rows[1::2]), {"enrollment_id"})
 
     def addresses(self) -> list[str]:
         """Return the addresses of what the participants walked, and of their stations' tablets."""
@@ -195,6 +210,11 @@ def program_of(user: User, role: Role) -> Client:
     row.may_steer = row.may_export = True
     token = row.new_token()
     row.save()
+    return bearing(token)
+
+
+def bearing(token: str) -> Client:
+    """Return a program that shows a token."""
     return Client(headers={"Authorization": f"Bearer {token}"}, raise_request_exception=False)
 
 
@@ -209,7 +229,6 @@ def stale_screen(user: User) -> Client:
 def become(trial: Trial, who: User, tablet: Client) -> dict[str, Client]:
     """Return everything an account can become, given the tablet that it let in earlier."""
     account = signed_in(who, raise_request_exception=False)
-    bearer = {"Authorization": f"Bearer {tablet.cookies[COOKIE].value}"}
     refused_or_new = pair_tablet(account, trial.stations[0])
     account.get(reverse("start"))  # which reports that once
     return {
@@ -219,7 +238,9 @@ def become(trial: Trial, who: User, tablet: Client) -> dict[str, Client]:
         "account": account,
         "tablet": refused_or_new,
         "earlier tablet": tablet,
-        "its token": Client(headers=bearer),
+        "its token": bearing(tablet.cookies[COOKIE].value),
+        "phone": bearing(pair_phone(account, trial.stations[0])),
+        "earlier phone": bearing(trial.earlier_phone),
         "program": program_of(who, Role.PT),
         "program of a researcher": program_of(who, Role.RESEARCHER),
     }
@@ -228,18 +249,20 @@ def become(trial: Trial, who: User, tablet: Client) -> dict[str, Client]:
 def answers(
     trial: Trial, actors: dict[str, Client], urls: Sequence[str] = ()
 ) -> dict[tuple[str, str, str], str]:
-    """Return what every address answers each actor: to GET, and to POST the participants' own."""
+    """Return what every address answers each actor, and nothing stays of it: to GET; to POST, too,
+    but for pages of the admin that are not the participants' own.
+    """
     seen = {}
     for name, client in actors.items():
-        for url in [*trial.addresses(), *(trial.family if name == FAMILY else [])]:
-            for method in ("get", "post"):
-                seen[name, method, url] = read(client, method, url)
-        for url in urls:
+        own = [*trial.addresses(), *(trial.family if name == FAMILY else [])]
+        for url in dict.fromkeys([*own, *urls]):
             seen[name, "get", url] = read(client, "get", url)
+            if url in own or not url.startswith("/admin/"):
+                seen[name, "post", url] = read(client, "post", url)
     for name, client in actors.items():  # the sockets, which ask the same of their token
         bearer = client.defaults.get("HTTP_AUTHORIZATION", "").removeprefix("Bearer ")
         token = client.cookies[COOKIE].value if COOKIE in client.cookies else bearer
-        device = find_tablet(token, timezone.now())
+        device = find_device(token, timezone.now())
         rows = TrainingSession.objects.visible_to(device).order_by("pk")
         seen[name, "socket", ""] = str(list(rows.values_list("pk", "valence")))
     return seen
@@ -247,10 +270,15 @@ def answers(
 
 def read(client: Client, method: str, url: str) -> str:
     """Return an answer with its headers, file names among them, without what always differs."""
-    answer = getattr(client, method)(url)
+    cookies = copy(client.cookies)
+    with transaction.atomic():  # undone, so that no answer depends on one before it
+        answer = getattr(client, method)(url)
+        words = words_of(answer)
+        transaction.set_rollback(True)
+    client.cookies = cookies
     assert answer.status_code < 500 or "readyz" in url, url
     said = {name: value for name, value in answer.headers.items() if name not in OF_EACH_ANSWER}
-    return VARYING.sub("", f"{answer.status_code} {said} {words_of(answer)}")
+    return VARYING.sub("", f"{answer.status_code} {said} {words}")
 
 
 def exchange_metrics(one: TrainingSession, other: TrainingSession) -> None:

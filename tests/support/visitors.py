@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import ssl
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import urlencode, urlsplit
@@ -13,6 +14,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 CSRF = "c" * 32
+SOURCE, HELLO = "/ws/source/", '{"type": "hello", "version": 1, "run": "r", "last": 0}'
 PATIENCE_S = 15.0
 
 
@@ -25,11 +27,17 @@ class Visitor:
     cookies: dict[str, str] = field(default_factory=dict)
     token: str = ""  # of a program or a device
     headers: dict[str, str] = field(default_factory=dict)  # others of each request
+    tls: ssl.SSLContext | None = None  # that trusts the server, where it encrypts
 
     def request(self, method: str, path: str, body: str | bytes = b"", **headers: str) -> Answer:
         """Send a request; keep the cookies of its answer."""
         place = urlsplit(self.url)
+        assert place.hostname is not None
         connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
+        if self.tls is not None:
+            connection = http.client.HTTPSConnection(
+                place.hostname, place.port, timeout=60, context=self.tls
+            )
         try:
             connection.request(method, path, body, self._headers() | headers)
             response = connection.getresponse()
@@ -61,12 +69,16 @@ class Visitor:
             max_size=None,
         )
 
-    def watch(self, path: str) -> tuple[int, str]:
-        """Open a socket. Return 0 and the snapshot, or the close code and the refusal."""
+    def watch(self, path: str, hello: str = "") -> tuple[int, str]:
+        """Open a socket, and say hello as a source. Return 0 and the snapshot or welcome, or the
+        close code and the refusal.
+        """
         said = ""
         with self.dial(path) as socket:
             try:
-                while '"snapshot"' not in said:
+                if hello:
+                    socket.send(hello)
+                while '"snapshot"' not in said and '"welcome"' not in said:
                     said = str(socket.recv(PATIENCE_S))
             except ConnectionClosed as closed:
                 return closed.rcvd.code if closed.rcvd else 0, said

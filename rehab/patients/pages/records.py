@@ -47,6 +47,7 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
 
 
 @for_roles(Role.LEAD, Role.PT)
+@step_up.required
 @require_POST
 def end_patient_program(request: HttpRequest, patient_id: int) -> HttpResponse:
     """End a patient's program, so that the patient is no longer listed."""

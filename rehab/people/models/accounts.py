@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from django.contrib.auth.base_user import BaseUserManager
 from django.contrib.auth.models import AbstractUser, UserManager
+from django.core.exceptions import ValidationError
 from django.db import models
 from django.db.models import F, Q
 from django.utils.crypto import salted_hmac
@@ -80,6 +81,19 @@ class User(AbstractUser):
             ),
             models.CheckConstraint(condition=Q(role__in=Role.values), name="user_role_is_known"),
         ]
+
+    def clean(self) -> None:
+        """Refuse a role in which an assessor of a running study would learn the arms."""
+        from rehab.people.models.blinding import assessors
+
+        super().clean()
+        if self.role in {Role.LEAD, Role.HOST} and assessors().filter(pk=self.pk).exists():
+            raise ValidationError(
+                _(
+                    "This account assesses in a running study, and in that role would know the "
+                    "arms. First end the mark on the study’s page."
+                )
+            )
 
     def save(self, *args: Any, **kwargs: Any) -> None:
         """Save the account. Django's own flags follow from the role."""

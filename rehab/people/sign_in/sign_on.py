@@ -16,6 +16,7 @@ from typing import Any
 from authlib.integrations.base_client.errors import OAuthError
 from authlib.integrations.django_client import OAuth
 from django.conf import settings
+from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.utils.translation import gettext as _
@@ -124,8 +125,8 @@ def find_account(claims: Mapping[str, Any]) -> User:
     """Return the account of a person who signed on, with the role that the groups give.
 
     Without groups in the admin, roles are what this server's leads made them. Raises SignOnRefused
-    for an account that is not linked, is switched off, or is in no group any more; that one's
-    sign-ins end.
+    for an account that is not linked, is switched off, must not have the role, or is in no group
+    any more; that one's sign-ins end.
     """
     accounts = User.everywhere.select_related("clinic")
     user = accounts.filter(subject=claims["sub"]).first()
@@ -150,6 +151,10 @@ def find_account(claims: Mapping[str, Any]) -> User:
             )
         if own[0].role != user.role:
             user.role = own[0].role
+            try:
+                user.clean()
+            except ValidationError as problem:
+                raise SignOnRefused(problem.message) from problem
             user.save(update_fields=["role"])
     return user
 

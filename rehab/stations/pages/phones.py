@@ -17,12 +17,14 @@ from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import clinic_of, for_roles, public, user_of
 from rehab.people.audit.audit_log import Act, record_security_change
-from rehab.people.models import LANGUAGES, Clinic
+from rehab.people.models import LANGUAGES, Clinic, User
+from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
 from rehab.sources.synthetic.leg import STRIDE_S, Floats, stand, walk_foot
 from rehab.stations.builtin import first_station
+from rehab.stations.device_trust import NotTrusted, check_approval
 from rehab.stations.https.certificate import secure_host
 from rehab.stations.models import Device, Station
 from rehab.stations.pages.https import certificate_square
@@ -40,40 +42,55 @@ PLACES = {"shank": gettext_lazy("shin"), "foot": gettext_lazy("foot")}
 @require_http_methods(["GET", "HEAD", "POST"])
 def pair_phone(request: HttpRequest) -> HttpResponse:
     """Choose where a phone is worn; then show the code to scan, once."""
-    user, now = user_of(request), timezone.now()
+    user = user_of(request)
     first_station(clinic_of(user))
-    stations = Station.objects.visible_to(user)
-    host = secure_host()
-    context: dict[str, Any] = {"stations": stations, "legs": LEGS.items(), "places": PLACES.items()}
-    context["is_secure"] = host is not None or request.is_secure()
+    context: dict[str, Any] = {
+        "stations": Station.objects.visible_to(user),
+        "legs": LEGS.items(),
+        "places": PLACES.items(),
+        "is_secure": secure_host() is not None or request.is_secure(),
+    }
     if request.method == "POST":
-        station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
-        place, side = request.POST.get("place"), request.POST.get("side")
-        if station is None or place not in WORN or side not in LEGS:
-            context["problem"] = _("Choose a station, a place and a leg.")
-        else:
-            where = {"leg": LEGS[Side(side)], "place": PLACES[place]}
-            device = Device(
-                clinic_id=station.clinic_id,
-                station=station,
-                kind=Device.Kind.SOURCE,
-                name=_("Phone, %(leg)s %(place)s") % where,
-                side=side,
-                place=place,
-            )
-            token = device.new_token()
-            device.save()
-            record_security_change(Act.TOKEN, request, device, now)
-            # Behind the # nothing of it reaches a server's log.
-            here = f"https://{host}" if host else f"{request.scheme}://{request.get_host()}"
-            page = sensor_path(clinic_of(user))
-            worn = f"#token={token}&place={place}&side={side}"
-            drawing = segno.make(f"{here}{page}{worn}", micro=False).svg_inline(
-                omitsize=True, border=2
-            )
-            context["trial"] = f"{page}&trial{worn}"
-            context |= {"device": device, "qr": drawing, **certificate_square()}
+        try:
+            context |= _pair(request, user)
+        except NotTrusted as refused:
+            context["problem"] = str(refused)
     return render(request, "stations/phone.html", context)
+
+
+def _pair(request: HttpRequest, user: User) -> dict[str, Any]:
+    """Return a new phone with the code that opens its page, or what is missing to pair one.
+
+    Raises NotTrusted.
+    """
+    now = timezone.now()
+    check_approval(user, client_address(request), "phone", now)
+    stations = Station.objects.visible_to(user)
+    station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
+    place, side = request.POST.get("place"), request.POST.get("side")
+    if station is None or place not in WORN or side not in LEGS:
+        return {"problem": _("Choose a station, a place and a leg.")}
+    where = {"leg": LEGS[Side(side)], "place": PLACES[place]}
+    device = Device(
+        clinic_id=station.clinic_id,
+        station=station,
+        kind=Device.Kind.SOURCE,
+        name=_("Phone, %(leg)s %(place)s") % where,
+        side=side,
+        place=place,
+    )
+    token = device.new_token()
+    device.note_issuer(user, now)
+    device.save()
+    record_security_change(Act.TOKEN, request, device, now)
+    # Behind the # nothing of it reaches a server's log.
+    host = secure_host()
+    here = f"https://{host}" if host else f"{request.scheme}://{request.get_host()}"
+    page = sensor_path(clinic_of(user))
+    worn = f"#token={token}&place={place}&side={side}"
+    drawing = segno.make(f"{here}{page}{worn}", micro=False).svg_inline(omitsize=True, border=2)
+    trial = f"{page}&trial{worn}"
+    return {"device": device, "qr": drawing, "trial": trial, **certificate_square()}
 
 
 def sensor_path(clinic: Clinic) -> str:
