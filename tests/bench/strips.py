@@ -17,11 +17,7 @@ from typing import Any, NamedTuple
 
 from PIL import Image, ImageDraw
 
-from robot.base_options import VirtualClock
-from robot.bases.kinematic import KinematicBase
 from robot.bases.twin.renderer import WALKER, Renderer
-from robot.behavior.cue import QUIET, QUIET_PACE
-from robot.behavior.performer import Performer
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import BUILT_IN
@@ -30,6 +26,8 @@ from robot.motion.looks import REST, find_act, look_at
 from robot.motion.pools import IDLE, POOLS
 from robot.motion.preview import ANNOUNCED_S
 from robot.wire.cue_limits import VARIED
+from tests.support.robot_stage import walk_ten_minutes
+from tests.support.variants import LEVELS, at_level
 
 # What a viewer names, and the pools that it is.
 CLASSES = {
@@ -38,10 +36,8 @@ CLASSES = {
     "greeting": ("greeting",),
     "idle or rest": ("idle", "rest"),
 }
-# A strong answer, one to a weak window, and one in a quiet room: share of the size, and pace.
-LEVELS = {"full": (1.0, 1.0), "least": (0.5, 1.0), "gentle": (QUIET, QUIET_PACE)}
 FRAMES, ACROSS, LABEL_PX = 10, 5, 22
-MINUTES, SESSION_ACROSS = 10, 8  # of a session, and answers in a row of its sheet
+SESSION_ACROSS = 8  # answers in a row of a session's sheet
 
 
 class Strip(NamedTuple):
@@ -82,10 +78,10 @@ def choose(seed: int, *, each: int | None, has_face: bool) -> list[Strip]:
 
 def film(strip: Strip, renderer: Renderer, frames: int) -> list[tuple[float, Image.Image]]:
     """Return pictures of a gesture, from announcement to end, and when each was taken [s]."""
-    share, pace = LEVELS[strip.level]
-    gesture = strip.gesture
-    size = 1.0 if strip.gesture in IDLE else max(share, gesture.least)
-    played = dry_run(gesture.scaled(size), pace=pace)
+    gesture, pace = at_level(strip.gesture, strip.level)
+    if strip.gesture in IDLE:  # never scaled
+        gesture = strip.gesture
+    played = dry_run(gesture, pace=pace)
     took_s = ANNOUNCED_S + played.took_s
     _, script = find_act(gesture.name, is_glad=gesture.score.mood == "glad")
     taken = []
@@ -111,36 +107,15 @@ def draw(strip: Strip, renderer: Renderer) -> Image.Image:
     return sheet
 
 
-def answers_of_a_session(above: str, below: str, seed: int) -> list[Gesture]:
-    """Return what answers ten minutes of good and weak walking, by a cue and its seed."""
-    clock = VirtualClock()
-    performer = Performer(KinematicBase(clock.monotonic))
-    cue = {"above": above, "below": below, "threshold": 0.9, "window_s": 5, "rest_s": 5}
-    welcome = {"type": "welcome", "session": seed, "state": "running", "watched": True}
-    performer.handle(welcome | {"cue": cue | {"intensity": 1, "seed": seed}}, 0.0)
-    chance, seen = random.Random(seed), list[Gesture]()
-    for second in range(60 * MINUTES):
-        performance = chance.gauss(1.0 if second // 40 % 3 < 2 else 0.8, 0.12)
-        step = {"type": "step", "time_s": second, "performance": performance}
-        performer.handle(step, clock.now_s)
-        for _ in range(round(1 / TICK_S)):
-            clock.sleep(TICK_S)
-            performer.handle({"type": "heartbeat"}, clock.now_s)
-            performer.tick(clock.now_s)
-        while performer.reports:
-            report = performer.reports.popleft()
-            if report["kind"] == "decision" and report["gesture"]:
-                seen.append(BUILT_IN[report["gesture"]])
-    return seen
-
-
-def draw_session(answers: Sequence[Gesture], renderer: Renderer) -> Image.Image:
+def draw_session(answers: Sequence[str], renderer: Renderer) -> Image.Image:
     """Return a session's answers in their order, each at its beginning and at its farthest."""
     rows, wide, high = -(-len(answers) // SESSION_ACROSS), 2 * 90 + 6, 152
     sheet = Image.new("RGB", (SESSION_ACROSS * wide, rows * high), "white")
-    for number, gesture in enumerate(answers):
+    for number, name in enumerate(answers):
         x, y = number % SESSION_ACROSS * wide, number // SESSION_ACROSS * high
-        for half, (_, picture) in enumerate(film(Strip(gesture, "", "full"), renderer, 7)[1:4:2]):
+        for half, (_, picture) in enumerate(
+            film(Strip(BUILT_IN[name], "", "full"), renderer, 7)[1:4:2]
+        ):
             sheet.paste(picture.resize((90, 146)), (x + half * 90, y))
     return sheet
 
@@ -167,9 +142,9 @@ def main(arguments: Sequence[str]) -> None:
     sessions = [("celebrate", "droop"), (VARIED, VARIED)]
     random.Random(options.seed).shuffle(sessions)
     for name, (above, below) in zip("XY", sessions, strict=True):
-        answers = answers_of_a_session(above, below, options.seed)
-        draw_session(answers, renderer).save(options.folder / f"session-{name}.png")
-        seen = [gesture.name for gesture in answers]
+        stage = walk_ten_minutes(options.seed, above=above, below=below)
+        seen = [one["gesture"] for one in stage.of("decision") if one["gesture"]]
+        draw_session(seen, renderer).save(options.folder / f"session-{name}.png")
         key.append({"session": name, "above": above, "below": below, "answers": seen})
     options.key.write_text(json.dumps({"seed": options.seed, "strips": key}, indent=1) + "\n")
 
