@@ -61,7 +61,10 @@ class BesideAnswers:
             Whether the order allows it, and a decision could move the robot now.
         """
         can = self._body.base.abilities.closed_loop and self._body.base.abilities.moves
-        if not (can and may_idle) or self._body.player.is_busy:
+        if not (can and may_idle):
+            self._idle.forbid()
+            return
+        if self._body.player.is_busy:
             self._idle.disturb(now_s)
             return
         gesture = self._idle.next(now_s, free_s, is_quiet=cue.is_quiet)

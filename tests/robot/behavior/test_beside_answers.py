@@ -195,6 +195,22 @@ def test_it_idles_while_somebody_rests_and_not_after_a_stop_or_a_pause():
     assert idles(stage) == seen
 
 
+@pytest.mark.parametrize("when_s", [3, 6, 9, 12])
+def test_an_arming_is_followed_by_no_idle_motion_that_was_due(when_s):
+    stage = Stage(RealBase)
+    stage.hear(**WELCOME | {"cue": FREE_CUE})
+    stage.hear(type="arm")
+    stage.wait(when_s)
+    stage.hear(type="stop")
+    stage.wait(30)
+    seen = began(stage)
+    stage.hear(type="arm")
+    stage.wait(4.9)
+    assert began(stage) == seen
+    stage.wait(30)
+    assert len(began(stage)) > len(seen)
+
+
 def test_idle_motions_are_small_and_slow_and_make_no_sound():
     for gesture in IDLE:
         assert gesture.reach_m <= 0.05
