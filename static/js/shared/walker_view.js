@@ -8,6 +8,7 @@ const EYE = [2, 0, 1.55];
 const TARGET = [0, 0, 0.42];
 const [HALF_M, TILE_M] = [0.6, 0.1]; // of the floor that is drawn, and of a tile
 const [BASE_M, TOP_M, SCREEN_M] = [0.175, 0.125, 0.785];
+const HULL_M = [0.015, 0.05, 0.09]; // heights of the discs that stand for its side
 const FACE_SCALE = 1.3; // of the face as seen from above, on the screen
 
 const minus = (a, b) => a.map((one, axis) => one - b[axis]);
@@ -15,7 +16,7 @@ const dot = (a, b) => a.reduce((sum, one, axis) => sum + one * b[axis], 0);
 const unit = (a) => a.map((one) => one / Math.hypot(...a));
 
 const AHEAD = unit(minus(TARGET, EYE));
-const RIGHT = unit([-AHEAD[1], AHEAD[0], 0].map((one) => -one));
+const RIGHT = unit([AHEAD[1], -AHEAD[0], 0]);
 const UP = [0, 1, 2].map(
   (axis) => RIGHT[(axis + 1) % 3] * AHEAD[(axis + 2) % 3] - RIGHT[(axis + 2) % 3] * AHEAD[(axis + 1) % 3],
 );
@@ -49,19 +50,19 @@ function floor() {
 
 export class WalkerView {
   #home;
-  #foot;
+  #hull;
   #mast;
   #top;
   #screen;
 
   constructor(svg) {
-    svg.setAttribute("viewBox", "-.25 -.27 .5 .47");
+    svg.setAttribute("viewBox", "-.25 -.22 .5 .5");
     svg.innerHTML = floor();
     const add = (inside) => Object.assign(append(svg, "g"), { innerHTML: inside });
     const disc = (opacity) => shape("circle", { r: BASE_M, fill: "currentColor", opacity });
     this.#home = add(disc(0.12));
     this.#home.setAttribute("transform", lay([0, 0, 0], [0, -1, 0], [-1, 0, 0]));
-    this.#foot = add(shape("circle", { r: BASE_M, fill: "#2a333b" }));
+    this.#hull = HULL_M.map(() => add(shape("circle", { r: BASE_M, fill: "#2a333b" })));
     this.#top = add(
       shape("circle", { r: BASE_M, fill: "#46525c" }) +
         shape("path", { d: "M-.03 -.09L0 -.15L.03 -.09Z", fill: "#f2b84b" }) +
@@ -83,7 +84,8 @@ export class WalkerView {
     const left = [-ahead[1], ahead[0], 0];
     const back = ahead.map((one) => -one);
     const at = (z_m) => [x_m, y_m, z_m];
-    this.#foot.setAttribute("transform", lay(at(0.015), left, back));
+    for (const [index, disc] of this.#hull.entries())
+      disc.setAttribute("transform", lay(at(HULL_M[index]), left, back));
     this.#top.setAttribute("transform", lay(at(TOP_M), left, back));
     this.#mast.setAttribute("d", line(at(TOP_M), at(SCREEN_M)));
     this.#screen.setAttribute("transform", lay(at(SCREEN_M), left, [0, 0, -1]));
