@@ -4,7 +4,6 @@
 `python -m robot calibrate --base NAME` measures how a base answers, once for each;
 `python -m robot doctor` finds a Kobuki's port and says what is wrong on the way to it;
 `python -m robot replay FILE --base NAME` gives a simulated base the orders of an incident again;
-`python -m robot strips FOLDER` draws each gesture as a walker sees it;
 `python -m robot twin` is a simulated one at a port of its own.
 
 Exit status: 0 ended by SIGTERM or SIGHUP (--child: standard input closed); 1 the base does not
@@ -29,7 +28,7 @@ from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
-from robot import calibrate, doctor, play_gesture, replay, strips
+from robot import calibrate, doctor, play_gesture, replay
 from robot.base_options import (
     add_base_arguments,
     make_base,
@@ -63,7 +62,6 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "doctor": doctor.main,
     "gesture": play_gesture.main,
     "replay": replay.main,
-    "strips": strips.main,
     "twin": run_twin,
 }
 DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130

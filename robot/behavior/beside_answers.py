@@ -31,7 +31,7 @@ class BesideAnswers:
         self._idle.disturb(now_s)
 
     def perform(self, moment: str, cue: Cue, now_s: float) -> None:
-        """Perform one of ``MOMENTS``, unless the robot is busy or refuses it: then leave it out.
+        """Perform one of ``MOMENTS``; leave it out where the robot is busy, driven, or refuses.
 
         Parameters
         ----------
@@ -42,7 +42,9 @@ class BesideAnswers:
         now_s
             The time [s].
         """
-        choice = None if self._body.player.is_busy else self._variety.take(moment)
+        is_driven = not self._body.manual_drive.twist(now_s).is_still  # somebody stands beside it
+        busy = self._body.player.is_busy or is_driven
+        choice = None if busy else self._variety.take(moment)
         if choice is not None and self._start(choice, cue, now_s):
             self._variety.mark_started(choice)
 
@@ -61,7 +63,10 @@ class BesideAnswers:
             Whether the order allows it, and a decision could move the robot now.
         """
         can = self._body.base.abilities.closed_loop and self._body.base.abilities.moves
-        if not (can and may_idle) or self._body.player.is_busy:
+        if not (can and may_idle):
+            self._idle.forbid()
+            return
+        if self._body.player.is_busy:
             self._idle.disturb(now_s)
             return
         gesture = self._idle.next(now_s, free_s, is_quiet=cue.is_quiet)

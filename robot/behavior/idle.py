@@ -49,8 +49,12 @@ class IdleLife:
         self._gesture = IDLE[0]
 
     def disturb(self, now_s: float) -> None:
-        """Note that something else moves, was decided, or forbids it now [s]."""
+        """Note that something else moves or was decided [s]."""
         self._disturbed_s = now_s
+
+    def forbid(self) -> None:
+        """Drop what was due: after a stop and an arming, too, the least time passes first."""
+        self._due_s = None
 
     def next(self, now_s: float, free_s: float, *, is_quiet: bool) -> Gesture | None:
         """Return the motion that begins now; None for none.

@@ -129,8 +129,8 @@ ACTS: dict[str, tuple[Script, ...]] = {
         ),
     ),
     "resting": (
-        (Look("smile", 0.1, nod=0.3), Look("smile", 0.1, nod=0.5)),
-        (Look("smile", 0.3, tilt_deg=6, nod=0.3), Look("smile", 0.1, tilt_deg=7, nod=0.4)),
+        (Look(eyes=0.1, nod=0.3), Look(eyes=0.1, nod=0.5)),
+        (Look(eyes=0.3, tilt_deg=6, nod=0.3), Look(eyes=0.1, tilt_deg=7, nod=0.4)),
     ),
     "idling": (
         (REST, REST, Look(eyes=0.1), REST),

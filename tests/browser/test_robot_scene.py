@@ -141,14 +141,19 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, visit):
     page.add_init_script(LISTEN)
     page.goto(f"/admin/rehab/composedgesture/{made}/change/")
     scene, base = page.locator(".gesture-floor svg"), page.locator(".gesture-floor .robot-base")
+    scene, film = scene.first, scene.last
     box = scene.bounding_box()
     assert box is not None
     assert min(box["width"], box["height"]) >= 280
+    at_home = [part.get_attribute("transform") for part in film.locator("> g").all()]
     page.get_by_role("button", name="Play it, with lights and sound").click()
     expect(base.locator(".light").first).to_have_attribute("data-color", "orange")
     page.wait_for_function(
         "() => parseFloat(document.querySelector('.robot-base').dataset.pose) > 0.05"
     )
+    seen = [part.get_attribute("transform") for part in film.locator("> g").all()]
+    stays = [now == before for now, before in zip(seen, at_home, strict=True)]
+    assert stays == [True, *[False] * 5]  # its mark; three discs of its side, top and face
     expect(page.get_by_role("button", name="Play it, with lights and sound")).to_be_enabled(
         timeout=20_000
     )
@@ -187,6 +192,7 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, visit):
     expect(page.locator(".gesture-floor .errornote")).to_contain_text("ends turned by 45°")
     page.get_by_role("button", name="Lead it home").click()
     expect(page.locator(".gesture-floor .words")).to_contain_text("up to 0.14 m from home")
+    page.screenshot(path="/tmp/robot36/editor.png", full_page=True)
     page.click("[name=_save]")
     expect(page.locator("#result_list")).to_contain_text("big-hello")
 

@@ -11,6 +11,7 @@ from robot.bases import BASES, BaseLost
 from robot.black_box import recorder
 from robot.black_box.recorder import BlackBox
 from robot.link import REFUSALS, Link, LinkRefused, Timing
+from robot.motion.pose import HOME
 from robot.motion.twist import STILL
 from robot.wire.close_codes import CloseCode
 from robot.wire.incident import unpack
@@ -66,6 +67,27 @@ async def test_it_says_hello_decides_performs_and_reports(garry):
         moving = await garry.until(is_kind("status", state="performing"))
         assert moving["gesture"] == "celebrate"
         await garry.until(is_kind("gesture", phase="ended", outcome="done"))
+
+
+@pytest.mark.realtime
+async def test_it_greets_rests_and_takes_leave_as_the_state_changes(garry):
+    garry.welcome |= {"state": "ready", "watched": True}
+    base = IdealBase(time.monotonic)
+    async with working(garry, base):
+        await garry.until_hello(1)
+        await garry.until(is_kind("status", state="idle"))
+        for state, moment in (
+            ("running", "greeting"),
+            ("paused", "rest"),
+            ("running", None),
+            ("finished", "farewell"),
+        ):
+            await garry.tell(type="state", state=state, gesture=moment)
+            if moment is not None:
+                begun = await garry.until(is_kind("gesture", phase="started", pool=moment))
+                assert begun["name"].startswith(moment)
+                await garry.until(is_kind("gesture", name=begun["name"], outcome="done"))
+                assert base.read().pose.distance_m(HOME) < 0.02
 
 
 @pytest.mark.essential

@@ -9,7 +9,8 @@ from robot.base_options import VirtualClock
 from robot.bases.kinematic import Imperfections, KinematicBase
 from robot.motion.base_response import Response
 from robot.motion.gesture import Gesture
-from robot.motion.limits import TICK_S
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S
+from robot.motion.player import Player
 from robot.motion.pose import HOME
 from robot.play_gesture import play_gesture
 
@@ -62,3 +63,27 @@ def play_in_a_row(
         if played["outcome"] != "done":
             break
     return results
+
+
+class Seen(NamedTuple):
+    """How far a gesture went, in truth."""
+
+    outcome: str
+    took_s: float
+    away_m: float
+    turned_deg: float
+
+
+def play_seen(gesture: Gesture, faults: Imperfections, pace: float) -> Seen:
+    """Play a gesture once, on a base that nobody has measured, and return how far it went."""
+    clock = VirtualClock()
+    base, player = OrdinaryBase(clock.monotonic, faults), Player(DEFAULT_LIMITS, Response())
+    player.start(gesture, clock.now_s, base.read().pose, pace=pace)
+    away_m = turned_rad = 0.0
+    while player.is_busy:
+        base.drive(player.step(clock.now_s, base.read().pose))
+        clock.sleep(TICK_S)
+        there = base.ground_truth().pose
+        away_m = max(away_m, there.distance_m(HOME))
+        turned_rad = max(turned_rad, abs(there.heading_rad))
+    return Seen(player.outcome, clock.now_s, away_m, math.degrees(turned_rad))

@@ -1,5 +1,6 @@
 """A performer on a clock that a test moves, and bases for it."""
 
+import random
 from dataclasses import replace
 from typing import ClassVar
 
@@ -89,6 +90,15 @@ class Stage:
         assert self.robot.body.player.is_busy
         assert not self.base.read().twist.is_still
         return self
+
+
+def walk_ten_minutes(seed, **cue):
+    """Return the stage after ten minutes of good and weak walking, as a seed has it."""
+    stage, chance = Stage(KinematicBase), random.Random(seed)
+    stage.hear(**WELCOME | {"cue": CUE | {"seed": seed} | cue})
+    good = [1.0 if second // 40 % 3 < 2 else 0.8 for second in range(600)]
+    stage.walk(*[chance.gauss(mean, 0.12) for mean in good])
+    return stage
 
 
 class FeelingBase(RealBase):

@@ -7,7 +7,18 @@ from typing import Any
 
 import pytest
 
+from robot.behavior.cue import QUIET, QUIET_PACE
+from robot.motion.gesture import Gesture
 from robot.motion.pools import POOLS, TABLE, VARIANTS
+
+# A strong answer, one to a weak window, and one in a quiet room: share of the size, and pace.
+LEVELS = {"full": (1.0, 1.0), "least": (0.5, 1.0), "gentle": (QUIET, QUIET_PACE)}
+
+
+def at_level(gesture: Gesture, level: str) -> tuple[Gesture, float]:
+    """Return a variant in the size in which it is performed at a level, and its pace."""
+    share, pace = LEVELS[level]
+    return gesture.scaled(max(share, gesture.least)), pace
 
 
 def _first_of_each_path() -> set[str]:

@@ -24,13 +24,6 @@ class Wheel(IntFlag):
     LEFT = 0x02
 
 
-class OverCurrent(IntFlag):
-    """Bits of ``over_current``: the other way round."""
-
-    LEFT = 0x01
-    RIGHT = 0x02
-
-
 class Button(IntFlag):
     """Bits of ``buttons``."""
 
@@ -53,7 +46,7 @@ class CoreSensors(NamedTuple):
     buttons: int = 0  # Button
     charger: int = 0  # 0 discharging; low nibble 2 full, 6 charging; 0x10 by adapter, else dock
     battery: int = 167  # tenths of a volt
-    over_current: int = 0  # OverCurrent
+    over_current: int = 0  # left 1, right 2
 
     @property
     def battery_v(self) -> float:

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from robot.bases.twin.face import draw_face
 from robot.motion.looks import REST, Look
@@ -57,6 +57,16 @@ class Renderer:
             self._world.GEOM_BOX, halfExtents=(5, 5, 0.005), rgbaColor=(0.86, 0.88, 0.9, 1)
         )
         self._world.createMultiBody(baseVisualShapeIndex=floor, basePosition=(0, 0, -0.006))
+        self._textures: dict[Look, int] = {}
+        tiles = self._world.createVisualShape(
+            self._world.GEOM_MESH,
+            vertices=[(x, y, -0.0005) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))],
+            indices=[0, 1, 2, 0, 2, 3],
+            uvs=[(0, 0), (1, 0), (1, 1), (0, 1)],
+            normals=[(0, 0, 1)] * 4,
+        )
+        mat = self._world.createMultiBody(baseVisualShapeIndex=tiles)
+        self._world.changeVisualShape(mat, -1, textureUniqueId=self._load(_draw_tiles()))
         home = self._world.createVisualShape(
             self._world.GEOM_CYLINDER, radius=0.2, length=0.002, rgbaColor=(0.3, 0.62, 0.8, 1)
         )
@@ -75,7 +85,6 @@ class Renderer:
                 normals=[(1, 0, 0)] * 4,
             )
         )
-        self._textures: dict[Look, int] = {}
         self._view = self._world.computeViewMatrix(view.eye_m, view.target_m, (0, 0, 1))
         self._lens = self._world.computeProjectionMatrixFOV(
             view.field_deg, view.width_px / view.height_px, 0.1, 10
@@ -107,8 +116,21 @@ class Renderer:
 
     def _texture(self, look: Look) -> int:
         if look not in self._textures:
-            with TemporaryDirectory() as folder:
-                file = Path(folder) / "face.png"
-                draw_face(look).save(file)
-                self._textures[look] = self._world.loadTexture(str(file))
+            self._textures[look] = self._load(draw_face(look))
         return self._textures[look]
+
+    def _load(self, picture: Image.Image) -> int:
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "texture.png"
+            picture.save(file)
+            return int(self._world.loadTexture(str(file)))
+
+
+def _draw_tiles() -> Image.Image:
+    """Return 2 m of floor in tiles of 10 cm, against which a motion is seen."""
+    tiles = Image.new("RGB", (1000, 1000), "#dbe0e6")
+    pen = ImageDraw.Draw(tiles)
+    for at in range(0, 1001, 50):
+        pen.line([(at, 0), (at, 1000)], "#8c97a3", 3)
+        pen.line([(0, at), (1000, at)], "#8c97a3", 3)
+    return tiles

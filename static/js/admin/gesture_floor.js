@@ -4,6 +4,7 @@
 import { playPreview } from "garry/shared/gesture_preview";
 import { append } from "garry/shared/svg";
 import { RobotScene } from "garry/shared/robot_scene";
+import { WalkerView } from "garry/shared/walker_view";
 
 const PAUSE_MS = 250; // after the last change, before the server is asked
 const STRAIGHT_RAD = 0.02; // what still counts as straight back
@@ -87,9 +88,10 @@ class Rows {
 export function setUpFloor(place) {
   const form = place.closest("form");
   const rows = new Rows(form);
-  const svg = place.querySelector("svg");
+  const [svg, film] = place.querySelectorAll("svg");
   const [words, problem, play] = [".words", ".errornote", "[data-play]"].map((one) => place.querySelector(one));
   const scene = new RobotScene(svg, { isFollowed: false });
+  const walker = new WalkerView(film);
   const handles = append(svg, "g");
   const reach = Number(place.dataset.reach);
   let preview, timer, dragged, audio;
@@ -188,7 +190,7 @@ export function setUpFloor(place) {
   play.addEventListener("click", async () => {
     play.disabled = true;
     audio ??= new AudioContext();
-    await playPreview(scene, preview, audio);
+    await playPreview([scene, walker], preview, audio);
     play.disabled = false;
   });
   for (const kind of ["input", "formset:added", "formset:removed"]) form.addEventListener(kind, changed);

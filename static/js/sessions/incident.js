@@ -15,7 +15,7 @@ for (const place of document.querySelectorAll("[data-replay]")) {
   scene.draw({ poses: replay.poses.map(([, x_m, y_m, heading_rad]) => ({ x_m, y_m, heading_rad })) });
   button.addEventListener("click", async () => {
     button.disabled = true;
-    await playPreview(scene, replay);
+    await playPreview([scene], replay);
     button.disabled = false;
   });
 }

@@ -1,6 +1,6 @@
 // A gesture as its robot would play it: the scene moves, the lights change, the notes sound.
 
-import { RobotScene } from "garry/shared/robot_scene";
+import { WalkerView } from "garry/shared/walker_view";
 
 const LOUDNESS = 0.15;
 const FADE_S = 0.02; // so that a note does not click
@@ -35,7 +35,7 @@ export function scheduleNotes(audio, notes) {
   return oscillators;
 }
 
-// Draw a preview (robot/motion/preview.py) as it is at a moment; return whether it is over.
+// Draw a preview (robot/motion/preview.py) as it is at a moment.
 export function drawMoment(scene, { took_s, poses, lights, mood, looks = [] }, at_s) {
   const passed = poses.filter(([from_s]) => from_s <= at_s);
   const shown = (passed.length ? passed : poses.slice(0, 1)).map(([, x_m, y_m, heading_rad]) => ({
@@ -47,16 +47,17 @@ export function drawMoment(scene, { took_s, poses, lights, mood, looks = [] }, a
   const [, first, second] = (!isOver && sinceOf(lights, at_s)) || [0, "off", "off"];
   const look = isOver ? undefined : sinceOf(looks, at_s)?.slice(1);
   scene.draw({ poses: shown, lights: [first, second], mood: isOver ? "calm" : mood, look });
-  return isOver;
 }
 
-// Play a preview in a drawing; `audio` may be missing. Resolves at its end.
-export function playPreview(scene, preview, audio) {
+// Play a preview in drawings; `audio` may be missing. Resolves at its end.
+export function playPreview(scenes, preview, audio) {
   if (audio) scheduleNotes(audio, preview.notes);
   const began = performance.now();
   return new Promise((resolve) => {
     const step = () => {
-      if (drawMoment(scene, preview, (performance.now() - began) / 1000)) resolve();
+      const at_s = (performance.now() - began) / 1000;
+      for (const scene of scenes) drawMoment(scene, preview, at_s);
+      if (at_s >= preview.took_s) resolve();
       else requestAnimationFrame(step);
     };
     step();
@@ -67,13 +68,13 @@ export function playPreview(scene, preview, audio) {
 export function setUpPreviews(root = document) {
   for (const place of root.querySelectorAll("[data-preview]")) {
     const preview = JSON.parse(place.dataset.preview);
-    const scene = new RobotScene(place.querySelector("svg"), { isFollowed: false });
+    const scene = new WalkerView(place.querySelector("svg"));
     const button = place.querySelector("button");
     let audio;
     button.addEventListener("click", async () => {
       button.disabled = true;
       audio ??= new AudioContext();
-      await playPreview(scene, preview, audio);
+      await playPreview([scene], preview, audio);
       button.disabled = false;
     });
   }

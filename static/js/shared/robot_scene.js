@@ -7,7 +7,7 @@ const TETHER_M = 0.3; // it never leaves this circle (docs/safety.md)
 const BASE_M = 0.175;
 const HALF_M = 0.5; // of the drawing, to each side
 const MOVE_MS = 250; // between two reports of a robot that moves
-const COLORS = { off: "none", green: "#1f9d55", orange: "#e0861a", red: "#d03434" };
+export const COLORS = { off: "none", green: "#1f9d55", orange: "#e0861a", red: "#d03434" };
 // The mouth of each look (robot/motion/looks.py), seen as the robot's face is seen by who stands before it.
 const MOUTHS = {
   calm: "M-.045 -.02h.09",
@@ -64,11 +64,7 @@ const treadmill = () =>
   shape("path", { d: "M-.46 .39h.34M-.46 .48h.34", stroke: "currentColor", "stroke-width": 0.004, opacity: 0.4 }) +
   label(_("treadmill"), -0.29, 0.45);
 
-const BASE =
-  shape("circle", { r: BASE_M, fill: "currentColor", opacity: 0.22 }) +
-  shape("path", { class: "heading", d: `M-.05 -.13L0 -.215L.05 -.13Z`, fill: "currentColor" }) +
-  shape("circle", { class: "light", cx: -0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
-  shape("circle", { class: "light", cx: 0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
+export const FACE =
   shape("ellipse", { class: "eye", cx: -0.03, cy: -0.065, rx: EYE_M, ry: EYE_M, fill: "currentColor" }) +
   shape("ellipse", { class: "eye", cx: 0.03, cy: -0.065, rx: EYE_M, ry: EYE_M, fill: "currentColor" }) +
   shape("path", {
@@ -79,14 +75,30 @@ const BASE =
     "stroke-linecap": "round",
   });
 
+const BASE =
+  shape("circle", { r: BASE_M, fill: "currentColor", opacity: 0.22 }) +
+  shape("path", { class: "heading", d: `M-.05 -.13L0 -.215L.05 -.13Z`, fill: "currentColor" }) +
+  shape("circle", { class: "light", cx: -0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
+  shape("circle", { class: "light", cx: 0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
+  FACE;
+
+// Let a drawing of `FACE` show a look (a mouth, and how far its eyes are open), or else a mood.
+export function showFace(drawing, mood, look) {
+  const [mouth, open] = look ?? [OF_MOODS[mood], 1];
+  const drawn = drawing.querySelector(".mood");
+  drawn.dataset.mood = mood ?? "calm";
+  drawn.dataset.look = mouth ?? "calm";
+  drawn.setAttribute("d", MOUTHS[mouth] ?? MOUTHS.calm);
+  for (const eye of drawing.querySelectorAll(".eye"))
+    eye.setAttribute("ry", EYE_M * Math.max(Math.min(open, 1.2), 0.2));
+}
+
 const point = ({ x_m: x, y_m: y }) => `${(-y).toFixed(4)} ${(-x).toFixed(4)}`;
 
 export class RobotScene {
   #way;
   #base;
   #lights;
-  #mouth;
-  #eyes;
 
   // `isFollowed`: whether reports come now and then, so that it glides from one to the next.
   constructor(svg, { isFollowed = true } = {}) {
@@ -107,8 +119,6 @@ export class RobotScene {
     this.#base.setAttribute("class", "robot-base");
     this.#base.innerHTML = BASE;
     this.#lights = this.#base.querySelectorAll(".light");
-    this.#mouth = this.#base.querySelector(".mood");
-    this.#eyes = this.#base.querySelectorAll(".eye");
     const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.#base.style.transition = isCalm || !isFollowed ? "none" : `transform ${MOVE_MS}ms linear`;
     this.draw({ poses: [] });
@@ -127,10 +137,6 @@ export class RobotScene {
       light.dataset.color = lights?.[index] ?? "off";
       light.setAttribute("fill", COLORS[light.dataset.color] ?? "none");
     }
-    this.#mouth.dataset.mood = mood ?? "calm";
-    const [mouth, open] = look ?? [OF_MOODS[mood], 1];
-    this.#mouth.dataset.look = mouth ?? "calm";
-    this.#mouth.setAttribute("d", MOUTHS[mouth] ?? MOUTHS.calm);
-    for (const eye of this.#eyes) eye.setAttribute("ry", EYE_M * Math.max(Math.min(open, 1.2), 0.2));
+    showFace(this.#base, mood, look);
   }
 }

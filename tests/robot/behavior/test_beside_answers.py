@@ -195,6 +195,36 @@ def test_it_idles_while_somebody_rests_and_not_after_a_stop_or_a_pause():
     assert idles(stage) == seen
 
 
+@pytest.mark.parametrize("released_s", [0.0, 0.4])
+def test_nobody_is_greeted_while_a_person_drives_it_to_its_mark(released_s):
+    stage = Stage(RealBase)
+    stage.hear(**READY)
+    stage.hear(type="arm")
+    stage.hear(type="drive", ahead=1, left=0)
+    stage.wait(0.1)
+    assert not stage.robot.body.ordered.is_still
+    stage.wait(released_s)
+    stage.hear(type="state", state="running", gesture="greeting")
+    stage.wait(2)
+    assert len(began(stage)) == (released_s > 0)
+
+
+@pytest.mark.parametrize("when_s", [3, 6, 9, 12])
+def test_an_arming_is_followed_by_no_idle_motion_that_was_due(when_s):
+    stage = Stage(RealBase)
+    stage.hear(**WELCOME | {"cue": FREE_CUE})
+    stage.hear(type="arm")
+    stage.wait(when_s)
+    stage.hear(type="stop")
+    stage.wait(30)
+    seen = began(stage)
+    stage.hear(type="arm")
+    stage.wait(4.9)
+    assert began(stage) == seen
+    stage.wait(30)
+    assert len(began(stage)) > len(seen)
+
+
 def test_idle_motions_are_small_and_slow_and_make_no_sound():
     for gesture in IDLE:
         assert gesture.reach_m <= 0.05

@@ -1,21 +1,14 @@
 """Sticky floors: wheels that follow no slow order, on bases that nobody has measured."""
 
-import math
-
 import pytest
 
-from robot.base_options import VirtualClock
 from robot.bases.kinematic import Imperfections
-from robot.behavior.cue import QUIET, QUIET_PACE
-from robot.motion.base_response import AT_ONCE, Response
+from robot.motion.base_response import AT_ONCE
 from robot.motion.gestures import BUILT_IN
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S
-from robot.motion.player import Player
 from robot.motion.pools import VARIANTS
-from robot.motion.pose import HOME
-from tests.support.gesture_runs import OrdinaryBase, play_in_a_row
+from tests.support.gesture_runs import OrdinaryBase, play_in_a_row, play_seen
 from tests.support.robot_stage import CUE, WELCOME, Stage
-from tests.support.variants import cases
+from tests.support.variants import at_level, cases
 
 pytestmark = pytest.mark.matrix
 LATE = 0.2
@@ -53,21 +46,12 @@ def test_gentle_answers_are_no_smaller_for_it(name, stiction_m_s):
 @pytest.mark.parametrize("name", cases(VARIANTS))
 @pytest.mark.parametrize("stiction_m_s", [0.008, 0.0495])
 def test_gentle_variants_are_seen_in_time(name, stiction_m_s):
-    clock = VirtualClock()
     faults = Imperfections(0.25, 0.06, stiction_m_s, left_scale=0.98, drift_deg_min=3.0)
-    base, player = OrdinaryBase(clock.monotonic, faults), Player(DEFAULT_LIMITS, Response())
-    gesture = VARIANTS[name].scaled(max(QUIET, VARIANTS[name].least))
-    player.start(gesture, clock.now_s, base.read().pose, pace=QUIET_PACE)
-    away_m = turned_rad = 0.0
-    while player.is_busy:
-        base.drive(player.step(clock.now_s, base.read().pose))
-        clock.sleep(TICK_S)
-        there = base.ground_truth().pose
-        away_m = max(away_m, there.distance_m(HOME))
-        turned_rad = max(turned_rad, abs(there.heading_rad))
-    assert player.outcome == "done"
-    assert clock.now_s <= 4.4
-    assert away_m >= 0.10 or turned_rad >= math.radians(45)
+    gesture, pace = at_level(VARIANTS[name], "gentle")
+    seen = play_seen(gesture, faults, pace)
+    assert seen.outcome == "done"
+    assert seen.took_s <= 4.4
+    assert seen.away_m >= 0.10 or seen.turned_deg >= 45
 
 
 def test_without_a_least_speed_they_would_not(monkeypatch):
