@@ -14,9 +14,8 @@ import numpy as np
 
 from rehab.gait.recordings.columns import REQUIRED
 from rehab.gait.recordings.readers import says_overground
-from rehab.gait.recordings.table import Table
+from rehab.gait.recordings.table import Table, find_time
 from rehab.gait.selfcheck.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
-from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ
 from rehab.gait.setup.find_forces import (
     find_force_unit,
     find_forces,
@@ -24,9 +23,9 @@ from rehab.gait.setup.find_forces import (
     name_sides,
 )
 from rehab.gait.setup.guess import Guess
-from rehab.gait.setup.names import Label, names_another, read_label, read_unit
-from rehab.gait.setup.units import TIME_UNITS, find_unit
-from rehab.gait.signals.clock import estimate_rate, find_period
+from rehab.gait.setup.names import Label, find_side, names_another, read_label, read_unit
+from rehab.gait.setup.units import CHANNEL_UNITS, find_unit, is_in_units
+from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError
@@ -34,7 +33,6 @@ from rehab.gait.strides import GaitInputError
 CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next shape
 OWN = "own."  # begins columns that ``recordings.c3d_plates`` computes
 OTHER_PLANE = 0.15  # by how much more alike another plane than the label's has to be
-LENGTH_UNITS = {"mm", "cm", "m"}
 # Of each channel, the shapes that a column may have instead.
 RIVALS = {"moment": ("force", "forward", "knee angle"), "angle": ("knee angle", "hip angle")}
 
@@ -95,10 +93,16 @@ def propose(
         With the cure, where no time goes on, no plate carries a walker or no mass is known.
     """
     table = columns if isinstance(columns, Table) else Table(columns)
-    time_name, time_factor = _find_time(table)
+    clock = find_time(table)
+    if clock is None:
+        raise GaitInputError(
+            "No column is a time that goes on. Export the samples with their times in seconds; one "
+            "row of names, then numbers."
+        )
+    time_name, time_factor = clock
     time_s = table[time_name] * time_factor
     labels = {name: read_label(name) for name in table if name != time_name}
-    labels = {name: one for name, one in labels.items() if one or not _is_place(table, name)}
+    labels = {name: one for name, one in labels.items() if one or not _is_other(table, name)}
     forces = find_forces(table, labels, time_s)
     if not forces:
         raise GaitInputError(_describe_no_force(labels))
@@ -140,9 +144,13 @@ def propose(
     )
 
 
-def _is_place(table: Table, name: str) -> bool:
-    """Return whether a column without a label is a marker's position, or of our own making."""
-    return name.startswith(OWN) or table.units.get(name, "").strip() in LENGTH_UNITS
+def _is_other(table: Table, name: str) -> bool:
+    """Return whether a column without a label is of our own making, or in a unit of something else:
+    a marker's position, a muscle's volts.
+    """
+    return name.startswith(OWN) or bool(
+        table.units.get(name, "").strip() and not read_unit(name, table.units)
+    )
 
 
 def _describe_no_force(labels: dict[str, Label | None]) -> str:
@@ -180,29 +188,6 @@ def _find_frame(columns: Mapping[str, Floats], time_name: str, time_s: Floats) -
     return None
 
 
-def _find_time(columns: Mapping[str, Floats]) -> tuple[str, float]:
-    """Return the time's column and factor; what counts by one is a time if nothing else is."""
-    counts = [name for name, values in columns.items() if find_period(values[:1000]) == 1.0]
-    ranked = sorted(columns, key=lambda name: (name in counts, "time" not in name.lower()))
-    for name in ranked:
-        values = columns[name]
-        if len(values) < 30 or not np.isfinite(values).all():
-            continue
-        steps = np.diff(values)
-        period = find_period(values)
-        if not (steps > 0).mean() > 0.99 or not period or steps.std() > 20 * period:
-            continue
-        for factor in TIME_UNITS.values():
-            rate_hz = round(1 / (period * factor), 3)
-            is_frame = factor == 1.0 and period == 1.0
-            if RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ and not is_frame:
-                return name, factor
-    raise GaitInputError(
-        "No column is a time that goes on. Export the samples with their times in seconds; one row "
-        "of names, then numbers."
-    )
-
-
 def _find_channel(
     table: Table,
     labels: Mapping[str, Label | None],
@@ -220,7 +205,14 @@ def _find_channel(
     # What the lab's system computed comes before what plates and markers come to.
     named = {n: one for n, one in named.items() if not n.startswith(OWN)} or named
     profiles = {}
-    for name in named or [n for n, one in labels.items() if not one and not names_another(n)]:
+    for name in named or [
+        n
+        for n, one in labels.items()
+        if not one
+        and not names_another(n, channel)
+        and find_side(n) in {"", side}
+        and is_in_units(table, n, CHANNEL_UNITS[channel])
+    ]:
         profile = make_profile(time_s, table[name], stances)
         if profile is not None and np.ptp(profile) > 0:
             profiles[name] = (profile, find_likeness(profile))

@@ -10,6 +10,7 @@ import numpy as np
 
 from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.recordings.columns import SIDES
+from rehab.gait.recordings.table import Table
 from rehab.gait.selfcheck.shapes import (
     LIKE,
     NAMED_LIKE,
@@ -19,8 +20,15 @@ from rehab.gait.selfcheck.shapes import (
     make_profile,
 )
 from rehab.gait.settings import MASS_MAX_KG, MASS_MIN_KG
-from rehab.gait.setup.names import Label, names_another
-from rehab.gait.setup.units import BY_MASS, FORCE_SPREAD, FORCE_UNITS, MASS_USUAL_KG, STANCE_LOAD
+from rehab.gait.setup.names import Label, find_side, names_another
+from rehab.gait.setup.units import (
+    BY_MASS,
+    FORCE_SPREAD,
+    FORCE_UNITS,
+    MASS_USUAL_KG,
+    STANCE_LOAD,
+    is_in_units,
+)
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
@@ -44,14 +52,16 @@ class Force:
 
 
 def find_forces(
-    columns: Mapping[str, Floats], labels: Mapping[str, Label | None], time_s: Floats
+    columns: Table, labels: Mapping[str, Label | None], time_s: Floats
 ) -> list[Force]:
     """Return the one or two columns that are vertical forces: those assigned to legs, else those
-    with a label, else those with the shape.
+    with a label, else those with the shape. Of a plate's axes it is the one that bears the most.
     """
     found = []
     for name, label in labels.items():
-        if (label and label.channel != "force") or (not label and names_another(name)):
+        if (label and label.channel != "force") or (not label and names_another(name, "force")):
+            continue
+        if not is_in_units(columns, name, FORCE_UNITS) or _is_sideways(columns, name):
             continue
         for sign in (1.0, -1.0):
             force = _find_force(name, label, sign, time_s, columns[name])
@@ -65,6 +75,21 @@ def find_forces(
         if not is_same and len(kept) < 2 and (not kept or _rank(one) == _rank(kept[0])):
             kept.append(one)
     return kept
+
+
+def _is_sideways(columns: Mapping[str, Floats], name: str) -> bool:
+    """Return whether another axis of the same plate, by its name, bears more."""
+    for at, letter in enumerate(name):
+        axes = next((one for one in ("xyz", "XYZ") if letter in one), "")
+        names = [name[:at] + axis + name[at + 1 :] for axis in axes if axis != letter]
+        sizes = [_find_size(columns[one]) for one in names if one in columns]
+        if sizes:
+            return max(sizes) > _find_size(columns[name])
+    return False
+
+
+def _find_size(values: Floats) -> float:
+    return float(np.percentile(np.abs(np.nan_to_num(values)), 99.0))
 
 
 def _rank(force: Force) -> int:
@@ -127,7 +152,7 @@ def name_sides(
         # Half a swing after the toes have left, when only the other leg stands.
         return float(size[at].mean() - size.mean()) / max(float(size.mean()), 1e-12)
 
-    named = [force.label.side if force.label else "" for force in forces]
+    named = [find_side(force.name) for force in forces]
     if len(forces) == 2 and named[0] == named[1]:
         named = ["", ""]
     if not any(named):
@@ -204,7 +229,8 @@ def find_force_unit(
     unit = written[0]
     if mass_kg is not None:
         near = min(masses, key=lambda one: abs(math.log(masses[one] / mass_kg)))
-        unit = unit if unit in masses else near
+        # Many a file does not write that a force is by body mass; the two differ by tens.
+        unit = unit if unit in masses and near != f"{unit}/kg" else near
         off = abs(math.log(masses[unit] / mass_kg))
         doubt = ""
         if unit != near and off > 2 * FORCE_SPREAD:

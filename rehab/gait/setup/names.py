@@ -11,14 +11,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-# Words of English, German, French and Spanish labels.
+# Words of English, German, French, Spanish, Italian, Portuguese and Dutch labels.
 SIDE = re.compile(
-    r"\b(?:(left|lt|l|links|linke[rs]?|gauche|izq|izquierd[ao])"
-    r"|(right|rt|r|rechts|rechte[rs]?|droite?|derech[ao]))"
+    r"\b(?:(left|lt|l|links|linke[rs]?|gauche|izq|izquierd[ao]|sinistr[ao]|sx|esquerd[ao])"
+    r"|(right|rt|r|rechts|rechte[rs]?|droite?|derech[ao]|destr[ao]|dx|direit[ao]))"
     r"(?=\d?\b| ?ank)"
 )
 ANKLE = re.compile(
     r"\b[lr]?ank(le)?\b|\b[lr]?ankle|\b[lr]?ank(mom|ang)|sprunggelenk|knöchel|cheville|tobillo"
+    r"|caviglia|tornozelo|enkel"
 )
 # Joints and quantities that are none of ours, wherever they stand in a label.
 OTHER = [
@@ -56,17 +57,25 @@ OTHER = [
     *("knie", "hüft", "becken", "rumpf", "schulter", "ellenbogen", "handgelenk"),
     *("genou", "hanche", "bassin", "tronc", "épaule", "coude", "poignet"),
     *("rodilla", "cadera", "hombro", "codo", "cuello", "muñeca"),
+    *("ginocchio", "anca", "bacino", "joelho", "quadril", "heup", "bekken"),
 ]
-MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b")
+MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b|\bm ank")
 ANGLE = re.compile(
-    r"winkel|[aá]ngulo|\bang(le)?s?\b|[a-z]angles?v?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b"
+    r"winkel|hoek|[aáâ]ng[uo]lo|\bang(le)?s?\b|[a-z]angles?v?\b|[a-z]ang\b|flex|dorsi|plantar"
+    r"|\brot\b|\btheta\b|\bq ank"
 )
+# Of a plate's axes, the one upward is found by its size (``find_forces``).
 FORCE = re.compile(
-    r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?z ?\d*\b"
+    r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?\d* ?[yz] ?\d*\b"
     r"|\b(forces?|for|grfs?|fp ?\d*|plate ?\d*) ?\d*( [lr]| left| right)? ?v? ?[yz] ?\d*\b"
-    r"|\bv[yz]\b"
+    r"|\bv[yz]\b|\bv ?grfs?\b|\bgrfs? v\b"
 )
 NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank")
+OTHERS = {  # what a column without a label is not, by other words in its name
+    "force": (ANKLE, MOMENT, ANGLE),
+    "moment": (FORCE, ANGLE, re.compile(r"force|grf|kraft|kracht|fuerza|forza")),
+    "angle": (FORCE, MOMENT, re.compile(r"force|grf|kraft|kracht|fuerza|forza")),
+}
 AXIS = re.compile(r"[XYZ](Inf|Sup)?$")
 PLANE = re.compile(r"\b([xyz])\b(?: theia)?$")
 # Which direction a label counts as positive, by the program that writes it.
@@ -98,10 +107,7 @@ class Label:
 
 def read_label(column: str) -> Label | None:
     """Return what a column's label says, None where it names none of our channels."""
-    words = split_label(column)
-    found = SIDE.findall(words)
-    sides = {"left" if left else "right" for left, _ in found}
-    side = sides.pop() if len(sides) == 1 else ""
+    words, side = split_label(column), find_side(column)
     if any(other in words for other in OTHER):
         return None
     if FORCE.search(words) and not NO_FORCE.search(words):
@@ -118,11 +124,19 @@ def read_label(column: str) -> Label | None:
     return Label(channel, side, is_sagittal, signs[0] if signs else 0)
 
 
-def names_another(column: str) -> bool:
-    """Return whether a label names something that is none of our channels, or a marker's axis."""
+def find_side(column: str) -> str:
+    """Return the leg that a label names, or empty, whatever else it says."""
+    sides = {"left" if left else "right" for left, _ in SIDE.findall(split_label(column))}
+    return sides.pop() if len(sides) == 1 else ""
+
+
+def names_another(column: str, channel: str) -> bool:
+    """Return whether a label names something else than a channel, or a marker's axis."""
     words = split_label(column)
-    return any(other in words for other in OTHER) or bool(
-        re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words)
+    return (
+        any(other in words for other in OTHER)
+        or any(form.search(words) for form in OTHERS[channel])
+        or bool(re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words))
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from rehab.gait.selfcheck.shapes import Stances, make_profile
 from rehab.gait.setup.names import read_unit
 from rehab.gait.signals.filters import Floats
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
 # What one of each is in N, Nm and rad; of units by body mass, for 1 kg.
 FORCE_UNITS = {
     "N": 1.0, "kN": 1e3, "kgf": GRAVITY_M_S2, "lbf": 4.44822, "mN": 1e-3, "N/kg": 1.0,
@@ -33,7 +33,13 @@ ANGLE_RAD, ANGLE_SPREAD = (
     0.5,
     0.6,
 )  # range over a stride: 0.40 to 0.64 (the same); 0.3 in an orthosis
+CHANNEL_UNITS = {"force": FORCE_UNITS, "moment": MOMENT_UNITS, "angle": ANGLE_UNITS}
 MASS_USUAL_KG = (35.0, 160.0)
+
+
+def is_in_units(table: Table, name: str, units: Collection[str]) -> bool:
+    """Return whether a column's unit, by its file or its label, is one of some, or not known."""
+    return read_unit(name, table.units) in {"", *units}
 
 
 def find_unit(
