@@ -17,6 +17,7 @@ from rehab.gait.recordings.readers import says_overground
 from rehab.gait.recordings.table import Table, find_time
 from rehab.gait.selfcheck.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
 from rehab.gait.setup.find_forces import (
+    Force,
     find_force_unit,
     find_forces,
     looks_overground,
@@ -32,7 +33,7 @@ from rehab.gait.strides import GaitInputError
 
 CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next shape
 OWN = "own."  # begins columns that ``recordings.c3d_plates`` computes
-OTHER_PLANE = 0.15  # by how much more alike another plane than the label's has to be
+OTHER_PLANE = 0.15  # by how much more alike another axis than x has to be
 # Of each channel, the shapes that a column may have instead.
 RIVALS = {"moment": ("force", "forward", "knee angle"), "angle": ("knee angle", "hip angle")}
 
@@ -123,11 +124,13 @@ def propose(
             "; ".join(why),
         )  # fmt: skip
     taken = {time_name, *(force.name for force in forces)}
+    axis = _find_axis(table, labels, time_s, dict(zip(sides, forces, strict=True)))
     for force, side in zip(forces, sides, strict=True):
         force_n = table[force.name] * force.sign * scale
         for channel in RIVALS:
             rest = {name: label for name, label in labels.items() if name not in taken}
-            guess = _find_channel(table, rest, channel, side, time_s, force.stances, force_n, mass)
+            at = (time_s, force.stances, force_n, mass)
+            guess = _find_channel(table, rest, channel, side, axis, *at)
             if guess is not None:
                 guesses[side, channel] = guess
                 taken.add(guess.column)
@@ -188,11 +191,30 @@ def _find_frame(columns: Mapping[str, Floats], time_name: str, time_s: Floats) -
     return None
 
 
+def _find_axis(
+    table: Table, labels: Mapping[str, Label | None], time_s: Floats, forces: Mapping[str, Force]
+) -> str:
+    """Return the axis about which ankles flex by all moments and angles together: x, or z by ISB.
+
+    It is another than x only where that is clearly more like an ankle.
+    """
+    likes: dict[str, list[float]] = {}
+    for name, label in labels.items():
+        if label and label.axis and label.side in forces and label.channel in RIVALS:
+            profile = make_profile(time_s, table[name], forces[label.side].stances)
+            like = 0.0 if profile is None else abs(find_likeness(profile)[label.channel])
+            likes.setdefault(label.axis, []).append(like)
+    means = {axis: float(np.mean(found)) for axis, found in likes.items()}
+    means["x"] = means.get("x", 0.0) + OTHER_PLANE
+    return max(means, key=lambda axis: means[axis])
+
+
 def _find_channel(
     table: Table,
     labels: Mapping[str, Label | None],
     channel: str,
     side: str,
+    axis: str,
     time_s: Floats,
     stances: Stances,
     force_n: Floats,
@@ -204,6 +226,7 @@ def _find_channel(
     }
     # What the lab's system computed comes before what plates and markers come to.
     named = {n: one for n, one in named.items() if not n.startswith(OWN)} or named
+    named = {n: one for n, one in named.items() if one.axis in {"", axis}} or named
     profiles = {}
     for name in named or [
         n
@@ -225,11 +248,7 @@ def _find_channel(
     if not profiles:
         return None
 
-    def rank(name: str) -> tuple[float, str]:
-        plane = OTHER_PLANE if name in named and not named[name].is_sagittal else 0.0
-        return plane - abs(profiles[name][1][channel]), name
-
-    name, *others = sorted(profiles, key=rank)
+    name, *others = sorted(profiles, key=lambda one: (-abs(profiles[one][1][channel]), one))
     profile, like = profiles[name]
     label = named.get(name)
     own = like[channel]
@@ -238,7 +257,7 @@ def _find_channel(
         table, name, channel, profile, time_s, stances, force_n, mass_kg
     )
     sign = 1.0 if own > 0 else -1.0
-    if label and not label.is_sagittal:
+    if label and label.axis not in {"", axis}:
         doubts.append("its label names another plane")
     if label and label.sign and label.sign != sign:
         if abs(own) < NAMED_LIKE:

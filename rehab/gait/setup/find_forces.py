@@ -137,11 +137,9 @@ def name_sides(
     A leg's ankle moment is large while its own plate is loaded; where labels name no leg of a
     plate, this does, and where they name the other one, it is told.
     """
-    moments = {
-        label.side: name
-        for name, label in reversed(list(labels.items()))
-        if label and label.channel == "moment" and label.is_sagittal
-    }
+    named_moments = [(n, one) for n, one in labels.items() if one and one.channel == "moment"]
+    named_moments.sort(key=lambda pair: pair[1].is_sagittal)  # of a leg's, the last one is taken
+    moments = {label.side: name for name, label in named_moments}
 
     def share(force: Force, side: str) -> float:
         """Return how much more of a leg's moment falls in the stances than out of them."""

@@ -97,12 +97,17 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What a label says: a channel, the leg (or empty), whether its plane, and its sign (or 0)."""
+    """What a label says: a channel, the leg (or empty), its axis (or empty), its sign (or 0)."""
 
     channel: str
     side: str
-    is_sagittal: bool
+    axis: str
     sign: int
+
+    @property
+    def is_sagittal(self) -> bool:
+        """Whether the axis is that of flexion in most programs; by ISB's rules it is z."""
+        return self.axis in {"", "x"}
 
 
 def read_label(column: str) -> Label | None:
@@ -111,7 +116,7 @@ def read_label(column: str) -> Label | None:
     if any(other in words for other in OTHER):
         return None
     if FORCE.search(words) and not NO_FORCE.search(words):
-        return Label("force", side, True, 0)
+        return Label("force", side, "", 0)
     is_own = bool(re.search(r"\b(left|right) (moment nm|angle rad)$", words))
     if not side or not (ANKLE.search(words) or is_own):
         return None
@@ -120,8 +125,7 @@ def read_label(column: str) -> Label | None:
         return None
     plane = PLANE.search(words)
     signs = [sign for what, form, sign in SIGNS if what == channel and form.search(words)]
-    is_sagittal = plane is None or plane[1] == "x"
-    return Label(channel, side, is_sagittal, signs[0] if signs else 0)
+    return Label(channel, side, plane[1] if plane else "", signs[0] if signs else 0)
 
 
 def find_side(column: str) -> str:
