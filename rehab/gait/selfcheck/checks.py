@@ -18,7 +18,7 @@ from rehab.gait.selfcheck.unloaded import find_moment_zero, find_other_load
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
-from rehab.gait.stances.lag_watch import BRAKING_S
+from rehab.gait.stances.lag_watch import BRAKING_S, find_pace
 from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW
 
@@ -142,7 +142,8 @@ def check_signals(
             _compute_mean_load(time, leg, strides) / GRAVITY_M_S2, mass_kg, side
         )
     lag_s = _find_lag(decelerations, own_deceleration_s or {})
-    findings += _check_lag(lag_s) if own_deceleration_s else _check_braking(decelerations)
+    pace = find_pace(float(np.median([stride.stance_s for stride in strides] or [0.0])))
+    findings += _check_lag(lag_s) if own_deceleration_s else _check_braking(decelerations, pace)
     return SignalCheck(
         findings=tuple(findings),
         strides=len(strides),
@@ -249,9 +250,9 @@ def _find_lag(decelerations: dict[str, float | None], own: dict[str, float]) -> 
     return float(np.mean(lags)) if lags else None
 
 
-def _check_braking(decelerations: dict[str, float | None]) -> list[Finding]:
+def _check_braking(decelerations: dict[str, float | None], pace: float) -> list[Finding]:
     """Check when the ankles brake, which is unusual but may be a person's own way to walk."""
-    least_s, most_s = BRAKING_S
+    least_s, most_s = (pace * at_s for at_s in BRAKING_S)
     return [
         Finding(
             "timing_unusual",

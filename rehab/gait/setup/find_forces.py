@@ -51,9 +51,7 @@ class Force:
     stances: Stances
 
 
-def find_forces(
-    columns: Table, labels: Mapping[str, Label | None], time_s: Floats
-) -> list[Force]:
+def find_forces(columns: Table, labels: Mapping[str, Label | None], time_s: Floats) -> list[Force]:
     """Return the one or two columns that are vertical forces: those assigned to legs, else those
     with a label, else those with the shape. Of a plate's axes it is the one that bears the most.
     """
@@ -227,6 +225,8 @@ def find_force_unit(
     unit = written[0]
     if mass_kg is not None:
         near = min(masses, key=lambda one: abs(math.log(masses[one] / mass_kg)))
+        if abs(math.log(masses["N"] / mass_kg)) < NO_FORCE:  # a harness takes more than half of it
+            near = "N"
         # Many a file does not write that a force is by body mass; the two differ by tens.
         unit = unit if unit in masses and near != f"{unit}/kg" else near
         off = abs(math.log(masses[unit] / mass_kg))

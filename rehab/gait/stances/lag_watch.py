@@ -58,6 +58,11 @@ SLOPE_ERRORS, SLOPE_MOVED_S = 7.0, 0.01
 SCATTER_S, SCATTER_WEIGHT = 0.004, 4
 
 
+def find_pace(stance_s: float) -> float:
+    """Return how many times as long all takes for whom a stance takes so long."""
+    return max(1.0, stance_s / PACE_S)
+
+
 class LagWatch:
     """Follows a lag [s] over strides.
 
@@ -80,7 +85,7 @@ class LagWatch:
         """Add a stride's lag, None where it has none, and how long its foot stood."""
         if lag_s is None:
             return
-        self._pace = max(1.0, stance_s / PACE_S)
+        self._pace = find_pace(stance_s)
         lag_s /= self._pace
         self._newest.append(lag_s)
         self._run.append(lag_s)
