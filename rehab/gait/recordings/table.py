@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ
+from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ, RATE_TOLERANCE
 from rehab.gait.signals.clock import find_period
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
@@ -77,7 +77,7 @@ def find_time(columns: Mapping[str, Floats]) -> tuple[str, float] | None:
         for factor in TIME_UNITS.values():
             rate_hz = round(1 / (period * factor), 3)
             is_frame = factor == 1.0 and period == 1.0
-            if RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ and not is_frame:
+            if RATE_MIN_HZ / RATE_TOLERANCE <= rate_hz <= RATE_MAX_HZ and not is_frame:
                 return name, factor
     return None
 

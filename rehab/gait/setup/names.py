@@ -68,9 +68,10 @@ ANGLE = re.compile(
 FORCE = re.compile(
     r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?\d* ?[yz] ?\d*\b"
     r"|\b(forces?|for|grfs?|fp ?\d*|plate ?\d*) ?\d*( [lr]| left| right)? ?v? ?[yz] ?\d*\b"
-    r"|\bv[yz]\b|\bv ?grfs?\b|\bgrfs? v\b"
+    r"|\bv[yz]\b|\bv ?grfs?\b|\bgrfs? v\b|\b(kraft|kracht|fuerza|forza|força)\b"
+    r"|\b(force|grf) (l|r|left|right)\b|\b(l|r|left|right) (force|grf)$"
 )
-NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank")
+NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank|sprungg|cheville|tobillo")
 OTHERS = {  # what a column without a label is not, by other words in its name
     "force": (ANKLE, MOMENT, ANGLE),
     "moment": (FORCE, ANGLE, re.compile(r"force|grf|kraft|kracht|fuerza|forza")),

@@ -31,7 +31,7 @@ from rehab.gait.signals.filters import (
 # 35; an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside,
 # a stride is marked as unusual and stays valid: nothing proves that no person walks so.
 BRAKING_S = (-0.02, 0.075)
-PACE_S = 0.9  # the longest usual stance of the five people, by whom all limits here are known
+PACE_S = 1.1  # a fifth more than the longest usual stance of the five people of all limits here
 BRAKING_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.1, 0.2)
 SETTLE_S = 0.05  # of the filter

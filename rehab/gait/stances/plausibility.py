@@ -59,7 +59,7 @@ REVERSED_SHARE = 0.5
 # it pushes is the other leg's, which rolls over its foot by then (0.75 and more), or 100 ms early
 # (0.2-0.7).
 BACKWARD_RAD_S = (0.05, 0.8)
-BACKWARD_SHARE = 0.2  # of the velocity at A2, between these limits
+BACKWARD_SHARE = 0.15  # of the velocity at A2, between these limits
 BACKWARD_S = 0.04
 FULL_LOAD = 0.8  # of body weight; 1.0-1.14 (five people), even slow walking reaches 95 %
 CLONUS_TO = 0.8  # of stance; then the ankle pushes off
