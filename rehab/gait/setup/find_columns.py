@@ -15,7 +15,14 @@ import numpy as np
 from rehab.gait.recordings.columns import REQUIRED
 from rehab.gait.recordings.readers import says_overground
 from rehab.gait.recordings.table import Table, find_time
-from rehab.gait.selfcheck.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
+from rehab.gait.selfcheck.shapes import (
+    KNEE_LEAD,
+    LIKE,
+    NAMED_LIKE,
+    Stances,
+    find_likeness,
+    make_profile,
+)
 from rehab.gait.setup.find_forces import (
     Force,
     find_force_unit,
@@ -266,6 +273,8 @@ def _find_channel(
             doubts.append("its label names the other sign")
     if label and abs(own) < NAMED_LIKE:
         doubts.append(f"its curve over a stride is not an ankle {channel}'s")
+    if label and rival == "knee angle" and abs(like[rival]) > abs(own) + KNEE_LEAD:
+        doubts.append("its curve is more like a knee's")
     if not label and (abs(own) < CERTAIN_LIKE or abs(own) - abs(like[rival]) < CERTAIN_LEAD):
         doubts.append(f"it is almost as much like a {rival}")
     if not label and others and abs(own) - abs(profiles[others[0]][1][channel]) < CERTAIN_LEAD / 2:

@@ -72,7 +72,8 @@ def find_forces(columns: Table, labels: Mapping[str, Label | None], time_s: Floa
         is_same = any(_is_in_phase(one.stances, other.stances) for other in kept)
         if not is_same and len(kept) < 2 and (not kept or _rank(one) == _rank(kept[0])):
             kept.append(one)
-    return kept
+    order = list(columns)  # the left leg's comes first where nothing says whose it is
+    return sorted(kept, key=lambda one: order.index(one.name))
 
 
 def _is_sideways(columns: Mapping[str, Floats], name: str) -> bool:
@@ -106,7 +107,8 @@ def _find_force(
     high = float(np.percentile(force, 99.5))
     if not high > 0 or np.percentile(force, 0.5) < -0.3 * high:
         return None
-    quiet = float((np.abs(force) < 0.06 * high).mean())
+    zero = float(np.percentile(force, 10.0))  # of a plate that nobody has zeroed
+    quiet = float((np.abs(force - zero) < 0.06 * (high - zero)).mean())
     stances = find_stances(time_s, force)
     profile = make_profile(time_s, force, stances)
     if profile is None or (not SWING[0] < quiet < SWING[1] and not name.startswith("plates.")):

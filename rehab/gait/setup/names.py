@@ -44,6 +44,7 @@ OTHER = [
     "power",
     "pow",
     "vel",
+    "speed",
     "acc",
     "inver",
     "ever",
