@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rehab.gait.strides import GaitInputError
 
 RATE_MIN_HZ, RATE_MAX_HZ = 50.0, 5000.0
+RATE_TOLERANCE = 1.01  # 50 Hz by stamps are 49.9
 MASS_MIN_KG, MASS_MAX_KG = 10.0, 300.0
 LOOK_AHEAD_MAX_S = 0.2
 CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
@@ -82,7 +83,7 @@ def check_mass(mass_kg: float | None) -> None:
 
 def check_rate(rate_hz: float) -> None:
     """Raise GaitInputError, with the cure, for a rate [Hz] that nothing can be measured at."""
-    if not RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ:
+    if not RATE_MIN_HZ / RATE_TOLERANCE <= rate_hz <= RATE_MAX_HZ:
         raise GaitInputError(
             f"A rate of {rate_hz:g} Hz cannot be used. Give the samples' rate, "
             f"{RATE_MIN_HZ:g} to {RATE_MAX_HZ:g} Hz."

@@ -98,4 +98,4 @@ def test_limits_lie_beyond_what_five_people_reach(name):
 
 def test_no_ankle_turns_back_before_its_foot_leaves():
     turning = [one["turning"] for strides in measure_people().values() for one in strides]
-    assert min(turning) > plausibility.BACKWARD_SHARE
+    assert min(turning) > 0.1 > -plausibility.BACKWARD_SHARE

@@ -228,8 +228,8 @@ def test_a_moment_that_is_larger_than_the_force_is_none(force):
         names = next(csv.reader(file))
         table = np.loadtxt(file, delimiter=",", unpack=True)
     columns = dict(zip(names, table, strict=True))
-    for side in ("Left", "Right"):
-        columns[f"{side}GRF_y"] = columns[f"{side}GRF_y"] * force
+    for name in [one for one in columns if "GRF" in one]:
+        columns[name] = columns[name] * force
     guesses = check_setup(columns, MASS).proposal.guesses
 
     assert guesses["left", "force"].column == "LeftGRF_y"

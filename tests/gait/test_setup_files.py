@@ -155,7 +155,7 @@ def test_markers_of_a_c3d_have_the_unit_of_lengths():
 def test_units_and_signs_of_labels():
     assert read_unit("Fz [N]", {}) == "N"
     assert read_unit("LAnkleMoment.X", {"LAnkleMoment.X": "N.mm/kg"}) == "Nmm/kg"
-    assert read_label("ankle_angle_r") == Label("angle", "right", True, -1)
+    assert read_label("ankle_angle_r") == Label("angle", "right", "", -1)
     assert read_label("LeftAnklePlantarFlexionAngle").sign == 1
     assert read_label("LAnkleMoment.Y").is_sagittal is False
 

@@ -15,6 +15,8 @@ from rehab.gait.recordings.table import RATE_MOST_HZ, Table, resample_channel
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
+GROUND = ("GroundReactionForce", "NormalisedGRF")
+
 
 def read_table(path: Path) -> Table:
     """Return a C3D file's columns by name, with ``time`` [s], at the faster of its two rates.
@@ -63,6 +65,8 @@ def read_table(path: Path) -> Table:
         for label in read_labels(file, "POINT", f"{kind}S")
     }
     for place, label in enumerate(read_labels(file, "POINT")[: points.shape[1]]):
+        if label.endswith(GROUND):  # Plug-in Gait has none while the foot swings
+            points[:3, place] = np.nan_to_num(points[:3, place])
         for axis, name in enumerate("XYZ"):
             column = f"{label}.{name}"
             table[column] = resample_channel(points[axis, place], rates[0], time)

@@ -30,6 +30,7 @@ from rehab.gait.strides import GaitInputError
 
 MAX_HEADER = 64 * 1024
 HEAD_LINES = 40  # above and below the names
+AXES = {"", "X", "Y", "Z", "x", "y", "z"}
 
 
 def open_text(path: Path) -> TextIO:
@@ -99,7 +100,8 @@ def read_head(path: Path) -> Head:
     """Return what stands above a file's samples.
 
     The names are in the first line of words that has as many cells as the lines below it; what
-    stands above is passed over, a line of units below is read.
+    stands above is passed over, a line of units below is read. Names that stand over several
+    columns are joined with the axes in the line below them: ``LAnkleMoment.X``.
 
     Raises
     ------
@@ -120,9 +122,27 @@ def read_head(path: Path) -> Head:
     else:
         at, delimiter = 0, _find_delimiter(lines[0])
         names, below = _split(lines[0], delimiter), []
-    units = below[0] if below and any(map(_is_word, below[0])) else []
-    units = [] if any(unit and not _is_word(unit) for unit in units) else units
-    return Head(names, units, delimiter, at + 1 + bool(units))
+    words = []
+    for row in below:
+        if not any(map(_is_word, row)) or any(cell and not _is_word(cell) for cell in row):
+            break
+        words.append(row)
+    count = at + 1 + len(words)
+    over = _split(lines[at - 1], delimiter) if at else []
+    if len(over) > 1 and set(names[1:]) <= AXES:
+        names = _join_names(over + [""] * (len(names) - len(over)), names)
+    elif words and (len(set(names)) < len(names) or set(words[0][1:]) <= AXES):
+        names = _join_names(names, words.pop(0))
+    return Head(names, words[0] if words else [], delimiter, count)
+
+
+def _join_names(names: list[str], axes: list[str]) -> list[str]:
+    """Return names with what stands below them; a blank one is that before it."""
+    joined, name = [], ""
+    for over, axis in zip(names, axes, strict=False):
+        name = over or name
+        joined.append(f"{name}.{axis}" if name and axis else name or axis)
+    return joined
 
 
 def _find_delimiter(line: str) -> str | None:
@@ -168,8 +188,11 @@ def read_table(path: Path) -> Table:
         )
     if not rows.shape[0]:
         raise GaitInputError(f"{path.name} has a header but no samples. Export it again.")
-    columns = dict(zip(head.names, rows.T, strict=True))
-    return Table(columns, dict(zip(head.names, head.units, strict=False)))
+    names = [
+        name if name not in head.names[:at] else f"{name} ({at + 1})"
+        for at, name in enumerate(head.names)
+    ]
+    return Table(dict(zip(names, rows.T, strict=True)), dict(zip(names, head.units, strict=False)))
 
 
 def _prepare(lines: Iterator[str], delimiter: str | None) -> Iterable[str]:

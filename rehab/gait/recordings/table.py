@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ, RATE_TOLERANCE
+from rehab.gait.signals.clock import find_period
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
+TIME = re.compile(r"time|zeit|temps|tiempo|tempo|tijd")
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
 RATE_MOST_HZ = 100_000.0  # of any sensor; a larger one is damage
 OVERLAP_S = 0.5  # a stance; files that share less are of different walks
 
@@ -55,42 +60,62 @@ def resample_channel(values: Floats, rate_hz: float, time_s: Floats) -> Floats:
     return resampled
 
 
+def find_time(columns: Mapping[str, Floats]) -> tuple[str, float] | None:
+    """Return the column that is a time, and its factor to seconds; None where there is none.
+
+    What counts by one is a time only if nothing else is.
+    """
+    counts = [name for name, values in columns.items() if find_period(values[:1000]) == 1.0]
+    ranked = sorted(columns, key=lambda name: (name in counts, not TIME.search(name.lower())))
+    for name in ranked:
+        values = columns[name]
+        if len(values) < 30 or not np.isfinite(values).all():
+            continue
+        steps, period = np.diff(values), find_period(values)
+        if not (steps > 0).mean() > 0.99 or not period or steps.std() > 20 * period:
+            continue
+        for factor in TIME_UNITS.values():
+            rate_hz = round(1 / (period * factor), 3)
+            is_frame = factor == 1.0 and period == 1.0
+            if RATE_MIN_HZ / RATE_TOLERANCE <= rate_hz <= RATE_MAX_HZ and not is_frame:
+                return name, factor
+    return None
+
+
 def join_tables(tables: Mapping[str, Table]) -> Table:
     """Return the tables of one walk as one, at the common times of the one with most rows.
 
     Parameters
     ----------
     tables
-        The tables by file name, each with a column ``time`` [s] of the same clock.
+        The tables by file name, each with its times by the same clock.
 
     Raises
     ------
     GaitInputError
         With the cure, for files without a time or of different times.
     """
+    clocks = {}
     for name, table in tables.items():
-        if "time" not in table or not np.isfinite(table["time"]).all():
+        found = find_time(table)
+        if found is None:
             raise GaitInputError(f"{name} has no column time. Export it with its times.")
-    begin_s = max(table["time"].min() for table in tables.values())
-    end_s = min(table["time"].max() for table in tables.values())
+        clocks[name] = (found[0], table[found[0]] * found[1])
+    begin_s = max(time_s.min() for _, time_s in clocks.values())
+    end_s = min(time_s.max() for _, time_s in clocks.values())
     if not end_s - begin_s >= OVERLAP_S:
-        spans = ", ".join(
-            f"{n} {t['time'].min():g}-{t['time'].max():g} s" for n, t in tables.items()
-        )
+        spans = ", ".join(f"{n} {t.min():g}-{t.max():g} s" for n, (_, t) in clocks.items())
         raise GaitInputError(f"These files share no time: {spans}. Give the files of one walk.")
-
-    def count(table: Table) -> int:
-        return int(((table["time"] >= begin_s) & (table["time"] <= end_s)).sum())
-
-    time_s = max(tables.values(), key=count)["time"]
-    time_s = time_s[(time_s >= begin_s) & (time_s <= end_s)]
+    common = [t[(t >= begin_s) & (t <= end_s)] for _, t in clocks.values()]
+    time_s = max(common, key=len)
     joined = Table({"time": time_s})
     for name, table in tables.items():
-        order = np.argsort(table["time"], kind="stable")
+        clock, own_s = clocks[name]
+        order = np.argsort(own_s, kind="stable")
         for column, values in table.items():
-            if column != "time":
+            if column != clock:
                 own = column if column not in joined else f"{column} ({name})"
-                joined[own] = np.interp(time_s, table["time"][order], values[order])
+                joined[own] = np.interp(time_s, own_s[order], values[order])
                 joined.units |= {own: table.units[column]} if column in table.units else {}
         joined.mass_kg = joined.mass_kg or table.mass_kg
         joined.notes += table.notes

@@ -13,12 +13,12 @@ from rehab.gait.offline import make_detector
 from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.selfcheck.lag import find_deceleration_peak
 from rehab.gait.selfcheck.one_leg import check_force, check_strides
-from rehab.gait.selfcheck.shapes import find_likeness, find_stances, make_profile
+from rehab.gait.selfcheck.shapes import KNEE_LEAD, find_likeness, find_stances, make_profile
 from rehab.gait.selfcheck.unloaded import find_moment_zero, find_other_load
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
-from rehab.gait.stances.lag_watch import BRAKING_S
+from rehab.gait.stances.lag_watch import BRAKING_S, find_pace
 from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW
 
@@ -27,10 +27,6 @@ USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore201
 OWN_TOLERANCE_S = 0.003  # against the same person's earlier check
 # Beyond, A2 is off by more than a tenth if it is the mass that is wrong, and not a handrail.
 CERTAIN_LOAD = (0.9, 1.1)
-# By how much more like a knee's than like an ankle's an angle's curve over a stride is. Ankles of
-# the five people of ``stances.plausibility`` are less so, by 0.03 and more; knees of two of them
-# are, by 0.14 and more. (Hips are not told: an ankle that brakes late is as like one.)
-KNEE_LEAD = 0.08
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +138,8 @@ def check_signals(
             _compute_mean_load(time, leg, strides) / GRAVITY_M_S2, mass_kg, side
         )
     lag_s = _find_lag(decelerations, own_deceleration_s or {})
-    findings += _check_lag(lag_s) if own_deceleration_s else _check_braking(decelerations)
+    pace = find_pace(float(np.median([stride.stance_s for stride in strides] or [0.0])))
+    findings += _check_lag(lag_s) if own_deceleration_s else _check_braking(decelerations, pace)
     return SignalCheck(
         findings=tuple(findings),
         strides=len(strides),
@@ -249,9 +246,9 @@ def _find_lag(decelerations: dict[str, float | None], own: dict[str, float]) -> 
     return float(np.mean(lags)) if lags else None
 
 
-def _check_braking(decelerations: dict[str, float | None]) -> list[Finding]:
+def _check_braking(decelerations: dict[str, float | None], pace: float) -> list[Finding]:
     """Check when the ankles brake, which is unusual but may be a person's own way to walk."""
-    least_s, most_s = BRAKING_S
+    least_s, most_s = (pace * at_s for at_s in BRAKING_S)
     return [
         Finding(
             "timing_unusual",

@@ -14,27 +14,33 @@ import numpy as np
 
 from rehab.gait.recordings.columns import REQUIRED
 from rehab.gait.recordings.readers import says_overground
-from rehab.gait.recordings.table import Table
-from rehab.gait.selfcheck.shapes import LIKE, NAMED_LIKE, Stances, find_likeness, make_profile
-from rehab.gait.settings import RATE_MAX_HZ, RATE_MIN_HZ
+from rehab.gait.recordings.table import Table, find_time
+from rehab.gait.selfcheck.shapes import (
+    KNEE_LEAD,
+    LIKE,
+    NAMED_LIKE,
+    Stances,
+    find_likeness,
+    make_profile,
+)
 from rehab.gait.setup.find_forces import (
+    Force,
     find_force_unit,
     find_forces,
     looks_overground,
     name_sides,
 )
 from rehab.gait.setup.guess import Guess
-from rehab.gait.setup.names import Label, names_another, read_label, read_unit
-from rehab.gait.setup.units import TIME_UNITS, find_unit
-from rehab.gait.signals.clock import estimate_rate, find_period
+from rehab.gait.setup.names import Label, find_side, names_another, read_label, read_unit
+from rehab.gait.setup.units import CHANNEL_UNITS, find_unit, is_in_units
+from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError
 
 CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next shape
 OWN = "own."  # begins columns that ``recordings.c3d_plates`` computes
-OTHER_PLANE = 0.15  # by how much more alike another plane than the label's has to be
-LENGTH_UNITS = {"mm", "cm", "m"}
+OTHER_PLANE = 0.15  # by how much more alike another axis than x has to be
 # Of each channel, the shapes that a column may have instead.
 RIVALS = {"moment": ("force", "forward", "knee angle"), "angle": ("knee angle", "hip angle")}
 
@@ -95,10 +101,16 @@ def propose(
         With the cure, where no time goes on, no plate carries a walker or no mass is known.
     """
     table = columns if isinstance(columns, Table) else Table(columns)
-    time_name, time_factor = _find_time(table)
+    clock = find_time(table)
+    if clock is None:
+        raise GaitInputError(
+            "No column is a time that goes on. Export the samples with their times in seconds; one "
+            "row of names, then numbers."
+        )
+    time_name, time_factor = clock
     time_s = table[time_name] * time_factor
     labels = {name: read_label(name) for name in table if name != time_name}
-    labels = {name: one for name, one in labels.items() if one or not _is_place(table, name)}
+    labels = {name: one for name, one in labels.items() if one or not _is_other(table, name)}
     forces = find_forces(table, labels, time_s)
     if not forces:
         raise GaitInputError(_describe_no_force(labels))
@@ -119,11 +131,13 @@ def propose(
             "; ".join(why),
         )  # fmt: skip
     taken = {time_name, *(force.name for force in forces)}
+    axis = _find_axis(table, labels, time_s, dict(zip(sides, forces, strict=True)))
     for force, side in zip(forces, sides, strict=True):
         force_n = table[force.name] * force.sign * scale
         for channel in RIVALS:
             rest = {name: label for name, label in labels.items() if name not in taken}
-            guess = _find_channel(table, rest, channel, side, time_s, force.stances, force_n, mass)
+            at = (time_s, force.stances, force_n, mass)
+            guess = _find_channel(table, rest, channel, side, axis, *at)
             if guess is not None:
                 guesses[side, channel] = guess
                 taken.add(guess.column)
@@ -140,9 +154,13 @@ def propose(
     )
 
 
-def _is_place(table: Table, name: str) -> bool:
-    """Return whether a column without a label is a marker's position, or of our own making."""
-    return name.startswith(OWN) or table.units.get(name, "").strip() in LENGTH_UNITS
+def _is_other(table: Table, name: str) -> bool:
+    """Return whether a column without a label is of our own making, or in a unit of something else:
+    a marker's position, a muscle's volts.
+    """
+    return name.startswith(OWN) or bool(
+        table.units.get(name, "").strip() and not read_unit(name, table.units)
+    )
 
 
 def _describe_no_force(labels: dict[str, Label | None]) -> str:
@@ -180,27 +198,22 @@ def _find_frame(columns: Mapping[str, Floats], time_name: str, time_s: Floats) -
     return None
 
 
-def _find_time(columns: Mapping[str, Floats]) -> tuple[str, float]:
-    """Return the time's column and factor; what counts by one is a time if nothing else is."""
-    counts = [name for name, values in columns.items() if find_period(values[:1000]) == 1.0]
-    ranked = sorted(columns, key=lambda name: (name in counts, "time" not in name.lower()))
-    for name in ranked:
-        values = columns[name]
-        if len(values) < 30 or not np.isfinite(values).all():
-            continue
-        steps = np.diff(values)
-        period = find_period(values)
-        if not (steps > 0).mean() > 0.99 or not period or steps.std() > 20 * period:
-            continue
-        for factor in TIME_UNITS.values():
-            rate_hz = round(1 / (period * factor), 3)
-            is_frame = factor == 1.0 and period == 1.0
-            if RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ and not is_frame:
-                return name, factor
-    raise GaitInputError(
-        "No column is a time that goes on. Export the samples with their times in seconds; one row "
-        "of names, then numbers."
-    )
+def _find_axis(
+    table: Table, labels: Mapping[str, Label | None], time_s: Floats, forces: Mapping[str, Force]
+) -> str:
+    """Return the axis about which ankles flex by all moments and angles together: x, or z by ISB.
+
+    It is another than x only where that is clearly more like an ankle.
+    """
+    likes: dict[str, list[float]] = {}
+    for name, label in labels.items():
+        if label and label.axis and label.side in forces and label.channel in RIVALS:
+            profile = make_profile(time_s, table[name], forces[label.side].stances)
+            like = 0.0 if profile is None else abs(find_likeness(profile)[label.channel])
+            likes.setdefault(label.axis, []).append(like)
+    means = {axis: float(np.mean(found)) for axis, found in likes.items()}
+    means["x"] = means.get("x", 0.0) + OTHER_PLANE
+    return max(means, key=lambda axis: means[axis])
 
 
 def _find_channel(
@@ -208,6 +221,7 @@ def _find_channel(
     labels: Mapping[str, Label | None],
     channel: str,
     side: str,
+    axis: str,
     time_s: Floats,
     stances: Stances,
     force_n: Floats,
@@ -219,8 +233,16 @@ def _find_channel(
     }
     # What the lab's system computed comes before what plates and markers come to.
     named = {n: one for n, one in named.items() if not n.startswith(OWN)} or named
+    named = {n: one for n, one in named.items() if one.axis in {"", axis}} or named
     profiles = {}
-    for name in named or [n for n, one in labels.items() if not one and not names_another(n)]:
+    for name in named or [
+        n
+        for n, one in labels.items()
+        if not one
+        and not names_another(n, channel)
+        and find_side(n) in {"", side}
+        and is_in_units(table, n, CHANNEL_UNITS[channel])
+    ]:
         profile = make_profile(time_s, table[name], stances)
         if profile is not None and np.ptp(profile) > 0:
             profiles[name] = (profile, find_likeness(profile))
@@ -233,11 +255,7 @@ def _find_channel(
     if not profiles:
         return None
 
-    def rank(name: str) -> tuple[float, str]:
-        plane = OTHER_PLANE if name in named and not named[name].is_sagittal else 0.0
-        return plane - abs(profiles[name][1][channel]), name
-
-    name, *others = sorted(profiles, key=rank)
+    name, *others = sorted(profiles, key=lambda one: (-abs(profiles[one][1][channel]), one))
     profile, like = profiles[name]
     label = named.get(name)
     own = like[channel]
@@ -246,7 +264,7 @@ def _find_channel(
         table, name, channel, profile, time_s, stances, force_n, mass_kg
     )
     sign = 1.0 if own > 0 else -1.0
-    if label and not label.is_sagittal:
+    if label and label.axis not in {"", axis}:
         doubts.append("its label names another plane")
     if label and label.sign and label.sign != sign:
         if abs(own) < NAMED_LIKE:
@@ -255,6 +273,8 @@ def _find_channel(
             doubts.append("its label names the other sign")
     if label and abs(own) < NAMED_LIKE:
         doubts.append(f"its curve over a stride is not an ankle {channel}'s")
+    if label and rival == "knee angle" and abs(like[rival]) > abs(own) + KNEE_LEAD:
+        doubts.append("its curve is more like a knee's")
     if not label and (abs(own) < CERTAIN_LIKE or abs(own) - abs(like[rival]) < CERTAIN_LEAD):
         doubts.append(f"it is almost as much like a {rival}")
     if not label and others and abs(own) - abs(profiles[others[0]][1][channel]) < CERTAIN_LEAD / 2:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.recordings.columns import SIDES
+from rehab.gait.recordings.table import Table
 from rehab.gait.selfcheck.shapes import (
     LIKE,
     NAMED_LIKE,
@@ -19,8 +20,15 @@ from rehab.gait.selfcheck.shapes import (
     make_profile,
 )
 from rehab.gait.settings import MASS_MAX_KG, MASS_MIN_KG
-from rehab.gait.setup.names import Label, names_another
-from rehab.gait.setup.units import BY_MASS, FORCE_SPREAD, FORCE_UNITS, MASS_USUAL_KG, STANCE_LOAD
+from rehab.gait.setup.names import Label, find_side, names_another
+from rehab.gait.setup.units import (
+    BY_MASS,
+    FORCE_SPREAD,
+    FORCE_UNITS,
+    MASS_USUAL_KG,
+    STANCE_LOAD,
+    is_in_units,
+)
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
@@ -43,15 +51,15 @@ class Force:
     stances: Stances
 
 
-def find_forces(
-    columns: Mapping[str, Floats], labels: Mapping[str, Label | None], time_s: Floats
-) -> list[Force]:
+def find_forces(columns: Table, labels: Mapping[str, Label | None], time_s: Floats) -> list[Force]:
     """Return the one or two columns that are vertical forces: those assigned to legs, else those
-    with a label, else those with the shape.
+    with a label, else those with the shape. Of a plate's axes it is the one that bears the most.
     """
     found = []
     for name, label in labels.items():
-        if (label and label.channel != "force") or (not label and names_another(name)):
+        if (label and label.channel != "force") or (not label and names_another(name, "force")):
+            continue
+        if not is_in_units(columns, name, FORCE_UNITS) or _is_sideways(columns, name):
             continue
         for sign in (1.0, -1.0):
             force = _find_force(name, label, sign, time_s, columns[name])
@@ -64,7 +72,23 @@ def find_forces(
         is_same = any(_is_in_phase(one.stances, other.stances) for other in kept)
         if not is_same and len(kept) < 2 and (not kept or _rank(one) == _rank(kept[0])):
             kept.append(one)
-    return kept
+    order = list(columns)  # the left leg's comes first where nothing says whose it is
+    return sorted(kept, key=lambda one: order.index(one.name))
+
+
+def _is_sideways(columns: Mapping[str, Floats], name: str) -> bool:
+    """Return whether another axis of the same plate, by its name, bears more."""
+    for at, letter in enumerate(name):
+        axes = next((one for one in ("xyz", "XYZ") if letter in one), "")
+        names = [name[:at] + axis + name[at + 1 :] for axis in axes if axis != letter]
+        sizes = [_find_size(columns[one]) for one in names if one in columns]
+        if sizes:
+            return max(sizes) > _find_size(columns[name])
+    return False
+
+
+def _find_size(values: Floats) -> float:
+    return float(np.percentile(np.abs(np.nan_to_num(values)), 99.0))
 
 
 def _rank(force: Force) -> int:
@@ -83,7 +107,8 @@ def _find_force(
     high = float(np.percentile(force, 99.5))
     if not high > 0 or np.percentile(force, 0.5) < -0.3 * high:
         return None
-    quiet = float((np.abs(force) < 0.06 * high).mean())
+    zero = float(np.percentile(force, 10.0))  # of a plate that nobody has zeroed
+    quiet = float((np.abs(force - zero) < 0.06 * (high - zero)).mean())
     stances = find_stances(time_s, force)
     profile = make_profile(time_s, force, stances)
     if profile is None or (not SWING[0] < quiet < SWING[1] and not name.startswith("plates.")):
@@ -112,11 +137,9 @@ def name_sides(
     A leg's ankle moment is large while its own plate is loaded; where labels name no leg of a
     plate, this does, and where they name the other one, it is told.
     """
-    moments = {
-        label.side: name
-        for name, label in reversed(list(labels.items()))
-        if label and label.channel == "moment" and label.is_sagittal
-    }
+    named_moments = [(n, one) for n, one in labels.items() if one and one.channel == "moment"]
+    named_moments.sort(key=lambda pair: pair[1].is_sagittal)  # of a leg's, the last one is taken
+    moments = {label.side: name for name, label in named_moments}
 
     def share(force: Force, side: str) -> float:
         """Return how much more of a leg's moment falls in the stances than out of them."""
@@ -127,7 +150,7 @@ def name_sides(
         # Half a swing after the toes have left, when only the other leg stands.
         return float(size[at].mean() - size.mean()) / max(float(size.mean()), 1e-12)
 
-    named = [force.label.side if force.label else "" for force in forces]
+    named = [find_side(force.name) for force in forces]
     if len(forces) == 2 and named[0] == named[1]:
         named = ["", ""]
     if not any(named):
@@ -204,7 +227,10 @@ def find_force_unit(
     unit = written[0]
     if mass_kg is not None:
         near = min(masses, key=lambda one: abs(math.log(masses[one] / mass_kg)))
-        unit = unit if unit in masses else near
+        if abs(math.log(masses["N"] / mass_kg)) < NO_FORCE:  # a harness takes more than half of it
+            near = "N"
+        # Many a file does not write that a force is by body mass; the two differ by tens.
+        unit = unit if unit in masses and near != f"{unit}/kg" else near
         off = abs(math.log(masses[unit] / mass_kg))
         doubt = ""
         if unit != near and off > 2 * FORCE_SPREAD:

@@ -11,14 +11,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-# Words of English, German, French and Spanish labels.
+# Words of English, German, French, Spanish, Italian, Portuguese and Dutch labels.
 SIDE = re.compile(
-    r"\b(?:(left|lt|l|links|linke[rs]?|gauche|izq|izquierd[ao])"
-    r"|(right|rt|r|rechts|rechte[rs]?|droite?|derech[ao]))"
+    r"\b(?:(left|lt|l|links|linke[rs]?|gauche|izq|izquierd[ao]|sinistr[ao]|sx|esquerd[ao])"
+    r"|(right|rt|r|rechts|rechte[rs]?|droite?|derech[ao]|destr[ao]|dx|direit[ao]))"
     r"(?=\d?\b| ?ank)"
 )
 ANKLE = re.compile(
     r"\b[lr]?ank(le)?\b|\b[lr]?ankle|\b[lr]?ank(mom|ang)|sprunggelenk|knöchel|cheville|tobillo"
+    r"|caviglia|tornozelo|enkel"
 )
 # Joints and quantities that are none of ours, wherever they stand in a label.
 OTHER = [
@@ -43,6 +44,7 @@ OTHER = [
     "power",
     "pow",
     "vel",
+    "speed",
     "acc",
     "inver",
     "ever",
@@ -56,17 +58,26 @@ OTHER = [
     *("knie", "hüft", "becken", "rumpf", "schulter", "ellenbogen", "handgelenk"),
     *("genou", "hanche", "bassin", "tronc", "épaule", "coude", "poignet"),
     *("rodilla", "cadera", "hombro", "codo", "cuello", "muñeca"),
+    *("ginocchio", "anca", "bacino", "joelho", "quadril", "heup", "bekken"),
 ]
-MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b")
+MOMENT = re.compile(r"mom(ent)?s?\b|moment|torque|\btrq|\btau\b|\bm ank")
 ANGLE = re.compile(
-    r"winkel|[aá]ngulo|\bang(le)?s?\b|[a-z]angles?v?\b|[a-z]ang\b|flex|dorsi|plantar|\brot\b"
+    r"winkel|hoek|[aáâ]ng[uo]lo|\bang(le)?s?\b|[a-z]angles?v?\b|[a-z]ang\b|flex|dorsi|plantar"
+    r"|\brot\b|\btheta\b|\bq ank"
 )
+# Of a plate's axes, the one upward is found by its size (``find_forces``).
 FORCE = re.compile(
-    r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?z ?\d*\b"
+    r"\bplates (left|right)\b|\bverti[ck]al|\bvert\b|\bforce n\b|\b[lr]?f ?\d* ?[yz] ?\d*\b"
     r"|\b(forces?|for|grfs?|fp ?\d*|plate ?\d*) ?\d*( [lr]| left| right)? ?v? ?[yz] ?\d*\b"
-    r"|\bv[yz]\b"
+    r"|\bv[yz]\b|\bv ?grfs?\b|\bgrfs? v\b|\b(kraft|kracht|fuerza|forza|força)\b"
+    r"|\b(force|grf) (l|r|left|right)\b|\b(l|r|left|right) (force|grf)$"
 )
-NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank")
+NO_FORCE = re.compile(r"mom|torque|\bcop|pos|normali|\bp[xyz]\b|ank|sprungg|cheville|tobillo")
+OTHERS = {  # what a column without a label is not, by other words in its name
+    "force": (ANKLE, MOMENT, ANGLE),
+    "moment": (FORCE, ANGLE, re.compile(r"force|grf|kraft|kracht|fuerza|forza")),
+    "angle": (FORCE, MOMENT, re.compile(r"force|grf|kraft|kracht|fuerza|forza")),
+}
 AXIS = re.compile(r"[XYZ](Inf|Sup)?$")
 PLANE = re.compile(r"\b([xyz])\b(?: theia)?$")
 # Which direction a label counts as positive, by the program that writes it.
@@ -88,24 +99,26 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What a label says: a channel, the leg (or empty), whether its plane, and its sign (or 0)."""
+    """What a label says: a channel, the leg (or empty), its axis (or empty), its sign (or 0)."""
 
     channel: str
     side: str
-    is_sagittal: bool
+    axis: str
     sign: int
+
+    @property
+    def is_sagittal(self) -> bool:
+        """Whether the axis is that of flexion in most programs; by ISB's rules it is z."""
+        return self.axis in {"", "x"}
 
 
 def read_label(column: str) -> Label | None:
     """Return what a column's label says, None where it names none of our channels."""
-    words = split_label(column)
-    found = SIDE.findall(words)
-    sides = {"left" if left else "right" for left, _ in found}
-    side = sides.pop() if len(sides) == 1 else ""
+    words, side = split_label(column), find_side(column)
     if any(other in words for other in OTHER):
         return None
     if FORCE.search(words) and not NO_FORCE.search(words):
-        return Label("force", side, True, 0)
+        return Label("force", side, "", 0)
     is_own = bool(re.search(r"\b(left|right) (moment nm|angle rad)$", words))
     if not side or not (ANKLE.search(words) or is_own):
         return None
@@ -114,15 +127,22 @@ def read_label(column: str) -> Label | None:
         return None
     plane = PLANE.search(words)
     signs = [sign for what, form, sign in SIGNS if what == channel and form.search(words)]
-    is_sagittal = plane is None or plane[1] == "x"
-    return Label(channel, side, is_sagittal, signs[0] if signs else 0)
+    return Label(channel, side, plane[1] if plane else "", signs[0] if signs else 0)
 
 
-def names_another(column: str) -> bool:
-    """Return whether a label names something that is none of our channels, or a marker's axis."""
+def find_side(column: str) -> str:
+    """Return the leg that a label names, or empty, whatever else it says."""
+    sides = {"left" if left else "right" for left, _ in SIDE.findall(split_label(column))}
+    return sides.pop() if len(sides) == 1 else ""
+
+
+def names_another(column: str, channel: str) -> bool:
+    """Return whether a label names something else than a channel, or a marker's axis."""
     words = split_label(column)
-    return any(other in words for other in OTHER) or bool(
-        re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words)
+    return (
+        any(other in words for other in OTHER)
+        or any(form.search(words) for form in OTHERS[channel])
+        or bool(re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words))
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from rehab.gait.selfcheck.shapes import Stances, make_profile
 from rehab.gait.setup.names import read_unit
 from rehab.gait.signals.filters import Floats
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
 # What one of each is in N, Nm and rad; of units by body mass, for 1 kg.
 FORCE_UNITS = {
     "N": 1.0, "kN": 1e3, "kgf": GRAVITY_M_S2, "lbf": 4.44822, "mN": 1e-3, "N/kg": 1.0,
@@ -22,6 +22,7 @@ MOMENT_UNITS = {
     "Nm": 1.0, "Nmm": 1e-3, "kNm": 1e3, "lbf·ft": 1.35582, "lbf·in": 0.112985, "Nm/kg": 1.0,
     "Nmm/kg": 1e-3,
 }  # fmt: skip
+IMPERIAL = {"lbf·ft", "lbf·in"}
 BY_MASS = {"N/kg", "body weights", "Nm/kg", "Nmm/kg"}
 ANGLE_UNITS = {"rad": 1.0, "°": math.pi / 180, "mrad": 1e-3}
 # Mean vertical force of a stance by body weight: half of a stride by its stance. Of the five
@@ -33,7 +34,13 @@ ANGLE_RAD, ANGLE_SPREAD = (
     0.5,
     0.6,
 )  # range over a stride: 0.40 to 0.64 (the same); 0.3 in an orthosis
+CHANNEL_UNITS = {"force": FORCE_UNITS, "moment": MOMENT_UNITS, "angle": ANGLE_UNITS}
 MASS_USUAL_KG = (35.0, 160.0)
+
+
+def is_in_units(table: Table, name: str, units: Collection[str]) -> bool:
+    """Return whether a column's unit, by its file or its label, is one of some, or not known."""
+    return read_unit(name, table.units) in {"", *units}
 
 
 def find_unit(
@@ -49,7 +56,8 @@ def find_unit(
     """Return a moment's or an angle's unit, its factor, and what speaks against it.
 
     A unit that the file says stands, but for moments by body mass, which many a file does not
-    write: the size of both decides, which differ by tens.
+    write: the size of both decides, which differ by tens. Feet and inches are nobody's whose file
+    does not say so: a leg that is weaker by a quarter is usual after a stroke.
 
     Parameters
     ----------
@@ -72,7 +80,9 @@ def find_unit(
         expected, units, spread = ANGLE_RAD, ANGLE_UNITS, ANGLE_SPREAD
         size = float(np.ptp(profile))
     off = {unit: abs(math.log(max(size * f, 1e-300) / expected)) for unit, f in units.items()}
-    unit, second = sorted(units, key=lambda one: off[one])[:2]
+    metric = [one for one in units if one not in IMPERIAL]
+    unit = min(metric, key=lambda one: off[one])
+    second = min((one for one in units if one != unit), key=lambda one: off[one])
     written = read_unit(name, table.units)
     doubts = []
     if written in units:

@@ -134,7 +134,7 @@ class StanceAnalyzer:
         self._braking = BrakingFinder()
         self._angle_lag = LagWatch(BRAKING_S)
         self._moment_lag = LagWatch(MOMENT_LAG_S)
-        self._last_end: tuple[int, float] | None = None
+        self._last_end: tuple[int, float, float] | None = None
 
     def measure(self, contact: Contact, stop: int) -> Stance:
         """Return the stance of a contact that has ended, from the samples before ``stop``."""
@@ -165,7 +165,7 @@ class StanceAnalyzer:
             force, contact.offset_n, contact.peak_n, self._weight_n, self._rate_hz
         )
         is_sure = late_s is None and contact.known_index == end
-        self._watch_angle((end, end_s) if is_sure else None, end)
+        self._watch_angle((end, end_s, end_s - begin_s) if is_sure else None, end)
         bridged, gap_s = bridge_gaps(window, clock, moving.is_known)
         clean = None if bridged is None else decimate(bridged, self._decimation)
         push_off, a2_sd, flags = None, None, list(clock.flags)
@@ -214,17 +214,23 @@ class StanceAnalyzer:
         moment_nm = stance.signals[1, half : stance.end + 1]
         toes, late = stance.index(LEVER_FROM) - half, stance.index(LATE_FROM) - half
         reasons += check_lever(force_n, moment_nm, toes, self._weight_n)
-        reasons += self._check_lags(force_n[late:], moment_nm[late:])
+        lag_s = find_moment_lag(force_n[late:], moment_nm[late:], self._even_hz)
+        # What is refused already, as with the other foot on the plate, tells of no clock.
+        self._moment_lag.add(None if reasons else lag_s, stance.end_s - stance.begin_s)
+        if self._moment_lag.beyond_s or self._moment_lag.has_drifted:
+            reasons.append(RejectionReason.MOMENT_OUT_OF_STEP)
+        if self._angle_lag.has_drifted:
+            reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
         if self._angle_lag.beyond_s:
             flags.append(Flag.UNUSUAL_TIMING)
         reasons += check_push_off(push_off, stance)
         if has_clonus(push_off, stance):
             flags.append(Flag.CLONUS)
 
-    def _watch_angle(self, sure: tuple[int, float] | None, end: int) -> None:
+    def _watch_angle(self, sure: tuple[int, float, float] | None, end: int) -> None:
         """Add when the ankle braked after the stance before, if it is sure when that ended.
 
-        At its own end that was not known yet.
+        At its own end that was not known yet. ``sure`` is its sample, time and length.
         """
         last, self._last_end = self._last_end, sure
         if last is None:
@@ -234,17 +240,7 @@ class StanceAnalyzer:
         buffer = self._buffer
         if first >= buffer.samples.first and buffer.samples.goes_on(first, stop):
             time, angle = buffer.channel(TIME, first, stop), buffer.channel(ANGLE, first, stop)
-            self._angle_lag.add(self._braking.find(time, angle, last[1]))
-
-    def _check_lags(self, force_n: Floats, moment_nm: Floats) -> list[RejectionReason]:
-        """Return which channels are out of time by this stride's late stance and those before."""
-        self._moment_lag.add(find_moment_lag(force_n, moment_nm, self._even_hz))
-        reasons = []
-        if self._moment_lag.beyond_s or self._moment_lag.has_drifted:
-            reasons.append(RejectionReason.MOMENT_OUT_OF_STEP)
-        if self._angle_lag.has_drifted:
-            reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
-        return reasons
+            self._angle_lag.add(self._braking.find(time, angle, last[1]), last[2])
 
     def _find_window(self, begin: int, stop: int) -> tuple[Floats, int]:
         """Return the samples from swing to ``stop``, and how many come before the stance.

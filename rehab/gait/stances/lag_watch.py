@@ -3,6 +3,9 @@
 Several strides show what one cannot. A moment is its force times a lever, so both fall together,
 whoever walks. An ankle brakes soon after its foot has left, but people differ in that by more than
 any lag that matters: it is refused only where it changes from this person's own first strides.
+
+Who takes twice the time for a stance takes it for what happens in it, and a lag of so much longer
+does the same to A2: lags are compared by the pace of ``PACE_S``.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from rehab.gait.signals.filters import (
 # 35; an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside,
 # a stride is marked as unusual and stays valid: nothing proves that no person walks so.
 BRAKING_S = (-0.02, 0.075)
+PACE_S = 1.1  # a fifth more than the longest usual stance of the five people of all limits here
 BRAKING_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.1, 0.2)
 SETTLE_S = 0.05  # of the filter
@@ -54,6 +58,11 @@ SLOPE_ERRORS, SLOPE_MOVED_S = 7.0, 0.01
 SCATTER_S, SCATTER_WEIGHT = 0.004, 4
 
 
+def find_pace(stance_s: float) -> float:
+    """Return how many times as long all takes for whom a stance takes so long."""
+    return max(1.0, stance_s / PACE_S)
+
+
 class LagWatch:
     """Follows a lag [s] over strides.
 
@@ -69,12 +78,15 @@ class LagWatch:
         self._newest: deque[float] = deque(maxlen=STRIDES)
         self._own: list[float] = []
         self._lag_s = self._own_s = 0.0  # medians of these
+        self._pace = 1.0
         self._run: deque[float] = deque(maxlen=SLOPE_STRIDES)
 
-    def add(self, lag_s: float | None) -> None:
-        """Add a stride's lag, None where it has none."""
+    def add(self, lag_s: float | None, stance_s: float = PACE_S) -> None:
+        """Add a stride's lag, None where it has none, and how long its foot stood."""
         if lag_s is None:
             return
+        self._pace = find_pace(stance_s)
+        lag_s /= self._pace
         self._newest.append(lag_s)
         self._run.append(lag_s)
         self._lag_s = median(self._newest)
@@ -89,17 +101,18 @@ class LagWatch:
         """By how much the lag is outside of what is known of people [s], 0 where it is not."""
         if not self._newest:
             return 0.0
-        return min(0.0, self._lag_s - self._least_s) + max(0.0, self._lag_s - self._most_s)
+        beyond_s = min(0.0, self._lag_s - self._least_s) + max(0.0, self._lag_s - self._most_s)
+        return beyond_s * self._pace
 
     @property
     def has_drifted(self) -> bool:
         """Whether the lag has changed since the first strides, or is changing steadily."""
-        return abs(self.moved_s) > self._drift_max_s or self._runs_away()
+        return abs(self.moved_s) > self._drift_max_s * self._pace or self._runs_away()
 
     @property
     def moved_s(self) -> float:
         """By how much the lag has changed since the first strides [s]; 0 until there are enough."""
-        return self._lag_s - self._own_s if len(self._own) == OWN_STRIDES else 0.0
+        return self._pace * (self._lag_s - self._own_s) if len(self._own) == OWN_STRIDES else 0.0
 
     def _runs_away(self) -> bool:
         """Return whether the lag has changed steadily over the newest strides."""

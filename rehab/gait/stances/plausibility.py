@@ -56,9 +56,10 @@ PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.86-0.91 of it (five people)
 REVERSED_SHARE = 0.5
 # A foot that leaves the floor has been plantarflexing, or resting, to the last: there the ankle
 # turns 0.13 to 1.96 times as fast as at A2 (five people; all plantarflex). What turns back while
-# it pushes is the other leg's, which rolls over its foot by then, or 100 ms early.
-BACKWARD_RAD_S = (0.05, 0.5)
-BACKWARD_SHARE = 0.1  # of the velocity at A2, between these limits
+# it pushes is the other leg's, which rolls over its foot by then (0.75 and more), or 100 ms early
+# (0.2-0.7).
+BACKWARD_RAD_S = (0.05, 0.8)
+BACKWARD_SHARE = 0.15  # of the velocity at A2, between these limits
 BACKWARD_S = 0.04
 FULL_LOAD = 0.8  # of body weight; 1.0-1.14 (five people), even slow walking reaches 95 %
 CLONUS_TO = 0.8  # of stance; then the ankle pushes off
