@@ -22,6 +22,7 @@ MOVED_S = 2.0  # of such movement, about three strides, from which the axis is k
 SHARE_MIN, SHARE_SURE = 0.6, 0.9  # of all rotation: the axis is by travel, or by rotation alone
 TRAVEL_FORGET_S = 10.0
 SPEED_S = 1.5  # after which integrated acceleration is forgotten: it drifts
+DRIFT_S = 5.0  # over which its mean is drift: a rate that is off by 0.01 rad/s makes 0.4 m/s
 SPEED_MAX_M_S = 1.0  # one jerk must not outweigh many strides
 QUIET_RAD_S, QUIET_M_S2 = 0.7, 1.5
 TRAVEL_M_S = 0.1  # from which the direction of travel is believed
@@ -42,6 +43,8 @@ class SagittalAxis:
         self._moved_s = 0.0
         self._component = NOWHERE
         self._velocity = NOWHERE  # [m/s], in the frame that hardly turns
+        self._drift = NOWHERE  # its mean
+        self._travels = 0  # samples of both
         self._forward = NOWHERE  # [m/s], in the sensor's frame
         self._up = NOWHERE
         self._quiet_s = 0.0
@@ -120,11 +123,16 @@ class SagittalAxis:
             kept * (velocity[1] + linear[1] * step_s),
             kept * (velocity[2] + linear[2] * step_s),
         )
+        self._travels += 1
+        weight = max(1 / self._travels, step_s / (DRIFT_S + step_s))
+        drift = self._drift = mix(self._drift, self._velocity, weight)
         if not orientation.is_settled:
             return
         shaken = math.sqrt(dot(acceleration, acceleration)) - GRAVITY_M_S2
         quiet_s = step_s * math.exp(-speed / QUIET_RAD_S**2 - (shaken / QUIET_M_S2) ** 2)
-        behind = remove_part(orientation.to_sensor(self._velocity), orientation.up)
+        x, y, z = self._velocity
+        ahead = orientation.to_sensor((x - drift[0], y - drift[1], z - drift[2]))
+        behind = remove_part(ahead, orientation.up)
         if dot(behind, behind) > SPEED_MAX_M_S**2:
             behind = scale_to_unit(behind)
         keep = 1 - step_s / TRAVEL_FORGET_S

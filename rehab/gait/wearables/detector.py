@@ -24,7 +24,7 @@ HELD_S = 60.0  # how long samples wait until the axis is known
 STRIDES_MIN, STRIDES_SURE = 3, 5  # of a sign that may be right; of the one with more of them
 STRIDES_ASKED = 12  # from which a sign that is still unknown is asked for
 # A leg moves less in the middle of a stance than in what is taken for one with the wrong sign; by
-# half where nothing but rotation says so.
+# half where travel does not say where ahead is.
 QUIETER, QUIETER_ALONE = 0.9, 0.5
 STRIDES_MOVED = 5  # that do not count after the sensor moved
 
@@ -43,9 +43,9 @@ class WearableDetector:
     """Measures the strides of a foot or shank in samples as they come.
 
     It finds about which axis the leg swings, and which end of that axis points to the walker's left
-    by two signs that have to agree: where the leg travels, and that it is quiet in what are then
-    its stances. Until they do, no stride is returned; those that wait are returned then. Thresholds
-    follow the person. A stride is known at most 0.15 s after the initial contact that ends it.
+    by two signs that must not disagree: where the leg travels, and that it is quiet in what are
+    then its stances. Until that is known no stride is returned; those that wait are returned then.
+    Thresholds follow the person. A stride is known at most 0.15 s after the initial contact that ends it.
 
     Parameters
     ----------
@@ -64,7 +64,6 @@ class WearableDetector:
         self._place = Place(place)
         self._last_s = math.nan
         self._last_rate = NOWHERE
-        self._has_acceleration = False
         self._moved = 0  # strides that still do not count
         self._begin()
 
@@ -143,7 +142,6 @@ class WearableDetector:
             return []
         mean = ((rate[0] + last[0]) / 2, (rate[1] + last[1]) / 2, (rate[2] + last[2]) / 2)
         up = NOWHERE
-        self._has_acceleration = acceleration is not None
         if acceleration is None:
             self._axis.add_rotation(step_s, rate)
         else:
@@ -230,10 +228,11 @@ class WearableDetector:
         known = [one for one in self._readings if one.count >= STRIDES_MIN]
         quiet = min(known, key=lambda one: one.motion_rad_s)
         other = next(one for one in self._readings if one is not quiet)
-        limit = QUIETER if self._has_acceleration else QUIETER_ALONE
-        is_quieter = quiet.motion_rad_s <= other.motion_rad_s * limit
-        agrees = not self._has_acceleration or self._axis.left_sign == quiet.sign
-        if not (quiet.is_plausible and is_quieter and agrees):
+        ahead = self._axis.left_sign
+        if ahead not in (None, quiet.sign) or (ahead is None and len(known) < 2):
+            return
+        limit = QUIETER_ALONE if ahead is None else QUIETER
+        if not quiet.is_plausible or quiet.motion_rad_s > other.motion_rad_s * limit:
             return
         if self._best is None:
             self._best = quiet

@@ -15,6 +15,7 @@ const STRIDES_MIN = 3;
 const STRIDES_SURE = 5;
 const STRIDES_ASKED = 12;
 const QUIETER = 0.9;
+const QUIETER_ALONE = 0.5;
 const STRIDES_MOVED = 5;
 
 export class WearableDetector {
@@ -144,8 +145,9 @@ export class WearableDetector {
     const known = this.#readings.filter((one) => one.count >= STRIDES_MIN);
     const quiet = known.reduce((best, one) => (one.motion < best.motion ? one : best));
     const other = this.#readings.find((one) => one !== quiet);
-    const agrees = this.#axis.leftSign === quiet.sign;
-    if (!quiet.isPlausible || quiet.motion > other.motion * QUIETER || !agrees) return;
+    const ahead = this.#axis.leftSign;
+    if (ahead === null ? known.length < 2 : ahead !== quiet.sign) return;
+    if (!quiet.isPlausible || quiet.motion > other.motion * (ahead === null ? QUIETER_ALONE : QUIETER)) return;
     if (!this.#best) {
       this.#best = quiet;
     } else if (quiet === this.#best) {
