@@ -42,9 +42,7 @@ class Unit(RawConfigParser):
 def test_a_unit_starts_a_command_that_exists(unit: Path) -> None:
     read = Unit(strict=False)
     read.read(unit)
-    program, *arguments = shlex.split(
-        read["Service"]["ExecStart"].replace("upkeep %i", "upkeep weekly")
-    )
+    program, *arguments = shlex.split(read["Service"]["ExecStart"].replace(" %i", " weekly"))
     assert program == "/opt/garry/.venv/bin/python"
     if arguments[0] == "manage.py":
         command = load_command_class(get_commands()[arguments[1]], arguments[1])
