@@ -117,15 +117,6 @@ def test_a_robots_port_may_owe_its_base_a_stop_after_the_service_has_ended() -> 
     assert read["Service"]["KillMode"] == "process"
 
 
-def test_the_settings_to_copy_are_the_same_for_systemd_and_a_shell() -> None:
-    text = (ROOT / "docs" / "hosting.md").read_text()
-    lines = re.findall(r"^ +(GARRY_\w+=.*)$", text, re.MULTILINE)
-    assert len(lines) > 7
-    for line in lines:
-        name, value = line.split("=", 1)
-        assert shlex.split(line, comments=True) == [f"{name}={value}"]
-
-
 def test_settings_that_are_named_exist() -> None:
     named = set()
     for file in (*DEPLOY.rglob("*"), ROOT / "docs" / "hosting.md"):
