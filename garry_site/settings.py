@@ -40,6 +40,10 @@ DATA_DIR = Path(
 BACKUP_KEYS = string_list(
     "GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)"
 )
+BACKUP_DIR = text("GARRY_BACKUP_DIR", "", "folder of nightly backups (manage.py upkeep)")
+BACKUP_DAYS = number("GARRY_BACKUP_DAYS", 30, "days that they are kept", low=2, high=3650)
+RESTORE_KEY = text("GARRY_RESTORE_KEY", "", "file with a secret key, for weekly test restores")
+SHIPPED_LOGS = text("GARRY_SHIPPED_LOGS", "", "file elsewhere that sealed logs are appended to")
 HOST = text("GARRY_HOST", "127.0.0.1", "address that the server listens on")
 PORT = number("GARRY_PORT", 8000, "port that the server listens on", low=1, high=65535)
 ALLOWED_HOSTS = string_list(
@@ -77,6 +81,9 @@ if HOSTED and len(SECRET_KEY) < SECRET_KEY_LENGTH:
         f"{SECRET_KEY_LENGTH} or more random characters."
     )
 SECRET_KEY = SECRET_KEY or read_secret_key(DATA_DIR)
+SECRET_KEY_FALLBACKS = string_list(
+    "GARRY_SECRET_KEY_FALLBACKS", "", "secret keys from before, until manage.py rotatekeys has run"
+)
 
 # --- applications -------------------------------------------------------------------------------
 

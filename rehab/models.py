@@ -5,6 +5,7 @@ from rehab.boards.models import Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients import family, visits  # noqa: F401
+from rehab.people import chores, server_keys  # noqa: F401
 from rehab.people.audit import moves  # noqa: F401
 from rehab.people.consent import tombstones  # noqa: F401
 from rehab.people.models import Clinic, Patient, User

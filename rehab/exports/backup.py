@@ -13,11 +13,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from itertools import islice
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from django.apps import apps
 from django.core import serializers
 from django.core.management.color import no_style
+from django.core.serializers.json import DjangoJSONEncoder
 from django.db import connection, models, transaction
 from django.db.migrations.recorder import MigrationRecorder
 from pyrage.x25519 import Identity, Recipient
@@ -41,6 +42,14 @@ GZIP_WBITS = 31  # makes zlib write the gzip format
 
 class CannotRestore(ValueError):
     """A backup that cannot be restored; the message says why, and what to do."""
+
+
+class ExactEncoder(DjangoJSONEncoder):
+    """Writes moments to the microsecond, as digests have them; Django's own to the millisecond."""
+
+    def default(self, value: Any) -> Any:
+        """Return a value as JSON has it."""
+        return value.isoformat() if isinstance(value, datetime) else super().default(value)
 
 
 def backup_models() -> list[type[models.Model]]:
@@ -103,7 +112,7 @@ def _lines(counts: dict[str, int], now: datetime) -> Iterator[str]:
         names = [field.name for field in model._meta.concrete_fields]
         rows = model._base_manager.order_by("pk").iterator(chunk_size=BATCH_ROWS)
         while batch := list(islice(rows, BATCH_ROWS)):
-            yield serializers.serialize("jsonl", batch, fields=names)
+            yield serializers.serialize("jsonl", batch, fields=names, cls=ExactEncoder)
 
 
 def _compress(texts: Iterable[str]) -> Iterator[bytes]:

@@ -8,7 +8,6 @@ import shlex
 import shutil
 import subprocess
 from configparser import RawConfigParser
-from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,11 +16,13 @@ from django.conf import settings
 from django.core.management import get_commands, load_command_class
 from prometheus_client import generate_latest
 
+from rehab.management.commands import upkeep
 from rehab.sessions.live import runtime
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
 from rehab.sessions.live.pulse import SILENT_S
 from rehab.sessions.live.session import instruments
+from rehab.sessions.pages.server import metrics
 from rehab.sources import load_source
 from rehab.sources.arguments import make_parser as make_source_parser
 from robot.__main__ import make_parser
@@ -41,7 +42,7 @@ class Unit(RawConfigParser):
 def test_a_unit_starts_a_command_that_exists(unit: Path) -> None:
     read = Unit(strict=False)
     read.read(unit)
-    program, *arguments = shlex.split(read["Service"]["ExecStart"])
+    program, *arguments = shlex.split(read["Service"]["ExecStart"].replace(" %i", " weekly"))
     assert program == "/opt/garry/.venv/bin/python"
     if arguments[0] == "manage.py":
         command = load_command_class(get_commands()[arguments[1]], arguments[1])
@@ -116,15 +117,6 @@ def test_a_robots_port_may_owe_its_base_a_stop_after_the_service_has_ended() -> 
     assert read["Service"]["KillMode"] == "process"
 
 
-def test_the_settings_to_copy_are_the_same_for_systemd_and_a_shell() -> None:
-    text = (ROOT / "docs" / "hosting.md").read_text()
-    lines = re.findall(r"^ +(GARRY_\w+=.*)$", text, re.MULTILINE)
-    assert len(lines) > 7
-    for line in lines:
-        name, value = line.split("=", 1)
-        assert shlex.split(line, comments=True) == [f"{name}={value}"]
-
-
 def test_settings_that_are_named_exist() -> None:
     named = set()
     for file in (*DEPLOY.rglob("*"), ROOT / "docs" / "hosting.md"):
@@ -134,9 +126,9 @@ def test_settings_that_are_named_exist() -> None:
     assert named - clients <= set(settings.VARIABLES)
 
 
+@pytest.mark.django_db
 def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
-    # Registers what is counted while it is asked.
-    import_module("rehab.sessions.pages.server.metrics")
+    monkeypatch.setattr(metrics, "_connections", lambda: (1, 100))  # of PostgreSQL
     idle = SimpleNamespace(
         sessions={},
         is_ready=True,
@@ -154,3 +146,14 @@ def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
     for expression in asked:
         for name in re.findall(r"\b(?:garry|process)_\w+", expression):
             assert {name, name.removesuffix("_bucket")} & there, expression
+
+
+def test_each_time_of_upkeep_has_a_timer_and_a_turn_in_the_container() -> None:
+    timers = {"hourly", "nightly", "weekly"}
+    assert set(upkeep.TIMES) == timers
+    compose = (DEPLOY / "compose.yaml").read_text()
+    for name in timers:
+        read = Unit(strict=False)
+        read.read(DEPLOY / "systemd" / f"garry-{name}.timer")
+        assert read["Timer"]["Unit"] == f"garry-upkeep@{name}.service"
+        assert f"manage.py upkeep {name}" in compose

@@ -27,7 +27,8 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.audit.moves import ClinicMove
 from rehab.people.models import Clinic, ErasureReason, Patient, User
 from rehab.people.roles import Role
-from rehab.people.sign_in.factors.factors import Authenticator, close_secret, open_secret
+from rehab.people.server_keys import Purpose, decrypt_text, encrypt_text
+from rehab.people.sign_in.factors.factors import Authenticator
 from rehab.people.sign_in.tokens import find_by_token
 from rehab.sessions import seals as session_seals
 from rehab.sessions.log import Step
@@ -69,7 +70,7 @@ def file(tmp_path: Path) -> Path:
 def world() -> World:
     """A clinic with a row of every model, walked with measure and protocol of all clinics too."""
     world = build_world("amber")
-    Authenticator.everywhere.update(credential=close_secret("JBSWY3DP"))
+    Authenticator.everywhere.update(credential=encrypt_text(Purpose.AUTHENTICATORS, "JBSWY3DP"))
     walk(world.patient, "positive", [HIT, MISS, None] * 5)
     world.clinic.refresh_from_db()
     return world
@@ -155,7 +156,7 @@ def test_people_devices_and_keys_after_a_move(world, file, key):
     assert lead.check_password("correct horse battery")
     assert find_by_token(Device, world.token, NOW) is None
     app = Authenticator.everywhere.get(user__clinic=clinic)
-    assert open_secret(app.credential) == "JBSWY3DP"
+    assert decrypt_text(Purpose.AUTHENTICATORS, app.credential) == "JBSWY3DP"
     mine = Enrollment.everywhere.filter(clinic=clinic)
     assert list(mine.values_list("code", "allocation__group")) == codes
     entry = AuditEntry.everywhere.get(clinic=clinic, act=Act.CLINIC_IN)

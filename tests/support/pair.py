@@ -117,6 +117,7 @@ class Pair:
             "GARRY_SECRET_KEY": "0123456789" * 6,
             "GARRY_ALLOWED_HOSTS": "localhost,127.0.0.1",
             "GARRY_METRICS_TOKEN": "a token",
+            "GARRY_SESSION_MINUTES": "720",  # a clock that jumps by an hour signs nobody out
             "GARRY_DATABASE_URL": database,
         }
         self.own_environments: list[dict[str, str]] = [{} for _ in range(count)]

@@ -95,7 +95,7 @@ def run_python(folder: Path, *arguments: str, **options: Any) -> str:
 
 
 @cache
-def _tables() -> bytes:
+def read_tables() -> bytes:
     """Return a database with the tables and no row of ours, as a server makes one at first."""
     if kept := templates.read("server"):
         return kept
@@ -123,7 +123,7 @@ def serve(
     database = folder / "garry.sqlite3"
     if not new_machine and not database.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        database.write_bytes(_tables())
+        database.write_bytes(read_tables())
     port = free_port()
     process = subprocess.Popen(
         [sys.executable, *program, "serve", *arguments],

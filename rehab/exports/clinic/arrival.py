@@ -23,7 +23,14 @@ from pyrage.x25519 import Identity
 
 from rehab.exports.clinic.departure import delete_rows
 from rehab.exports.clinic.keys import reserve_keys
-from rehab.exports.clinic.rows import ENCRYPTED, TOKENS, CannotMove, ClinicRows, is_encrypted
+from rehab.exports.clinic.rows import (
+    ENCRYPTED,
+    TOKENS,
+    CannotMove,
+    ClinicRows,
+    close_value,
+    is_encrypted,
+)
 from rehab.exports.clinic.sealed_file import (
     PSEUDONYMS,
     Content,
@@ -162,8 +169,8 @@ class Arrival:
             if own != key or (table.label == USER and row[table.index("is_superuser")]):
                 raise CannotMove("Rows of the file are not of its clinic. Export it again.")
         if is_encrypted(table, row):
-            name, _, close = ENCRYPTED[table.label]
-            row[table.index(name)] = close(row[table.index(name)])
+            place = table.index(ENCRYPTED[table.label][0])
+            row[place] = close_value(table.label, row[place])
         if column:
             row[table.index(column)] = names.get(row[table.index(column)], row[table.index(column)])
         if "token_hash" in table.names and not row[table.index("token_hash")]:

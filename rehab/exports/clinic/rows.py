@@ -18,48 +18,40 @@ from rehab.people.audit.moves import ClinicMove, Translate, same_key
 from rehab.people.audit.sealing import with_floats
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
-from rehab.people.sign_in.factors.factors import Authenticator, close_secret, open_secret
-from rehab.studies.allocation.scheme import Secret
-from rehab.studies.registration.sealing import seal, unseal
-from rehab.training.measures import InvalidSetting
+from rehab.people.server_keys import Purpose, decrypt_text, encrypt_text
+from rehab.people.sign_in.factors.factors import Authenticator
 
 READ_ROWS = 2000
 TOKENS = ("token_hash", "successor_hash", "retired_hash")
 to_json = msgspec.json.Encoder(order="sorted").encode
-Rewrite = Callable[[str], str]
 
 
 class CannotMove(ValueError):
     """A clinic that cannot be taken out, in or away; the message says why, and what to do."""
 
 
-def _open_study(sealed: str) -> str:
-    try:
-        return unseal(sealed).to_text() if sealed else ""
-    except InvalidSetting as problem:
-        raise CannotMove(str(problem)) from problem
-
-
-def _close_study(text: str) -> str:
-    return seal(Secret.from_text(text)) if text else ""
-
-
-def _open_app(credential: str) -> str:
-    try:
-        return open_secret(credential)
-    except InvalidToken:  # of an earlier key of the server: its codes are refused here, too
-        return ""
-
-
-def _close_app(secret: str) -> str:
-    return close_secret(secret) if secret else ""
-
-
-# Columns that are encrypted with a server's own key: how they are opened and closed.
-ENCRYPTED: dict[str, tuple[str, Rewrite, Rewrite]] = {
-    "rehab.study": ("sealed", _open_study, _close_study),
-    "rehab.authenticator": ("credential", _open_app, _close_app),
+# Columns that are encrypted with a server's own keys.
+ENCRYPTED = {
+    "rehab.study": ("sealed", Purpose.STUDIES),
+    "rehab.authenticator": ("credential", Purpose.AUTHENTICATORS),
 }
+
+
+def open_value(label: str, encrypted: str) -> str:
+    """Return an encrypted value as it travels. Raises CannotMove for a study of another key."""
+    try:
+        return decrypt_text(ENCRYPTED[label][1], encrypted) if encrypted else ""
+    except InvalidToken as problem:
+        if label == "rehab.study":
+            raise CannotMove(
+                "A study was sealed with another key of the server. Run manage.py rotatekeys."
+            ) from problem
+        return ""  # an app whose codes are refused here, too
+
+
+def close_value(label: str, text: str) -> str:
+    """Return a value, encrypted with this server's key."""
+    return encrypt_text(ENCRYPTED[label][1], text) if text else ""
 
 
 def is_encrypted(table: Table, row: list[Any]) -> bool:
@@ -128,8 +120,8 @@ class ClinicRows:
             for index, change in changes:
                 row[index] = change(row[index])
             if is_encrypted(table, row):
-                name, opened, _ = ENCRYPTED[table.label]
-                row[table.index(name)] = opened(row[table.index(name)])
+                place = table.index(ENCRYPTED[table.label][0])
+                row[place] = open_value(table.label, row[place])
             if self.move is not None:
                 table.translate(row, translate)
             yield row

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hmac
 from collections.abc import Iterable, Iterator
 from datetime import date, timedelta
 from typing import Any
 
-from django.utils.crypto import salted_hmac
+from rehab.people.server_keys import Purpose, stable_key
 
 MAX_WEEKS = 520
 SINCE_1970_S = 1e8  # clocks beyond three years count from 1970, and would reveal the date
@@ -18,7 +19,7 @@ def shift_of(pseudonym: str) -> timedelta:
     It follows from the pseudonym and the server's own key (HMAC-SHA-256): the same at each export,
     and unknown to anyone who has only the files. Whole weeks keep the day of the week.
     """
-    digest = salted_hmac("garry.exports.dates", pseudonym, algorithm="sha256").digest()
+    digest = hmac.digest(stable_key(Purpose.DATES), pseudonym.encode(), "sha256")
     return -timedelta(weeks=1 + int.from_bytes(digest[:8], "big") % MAX_WEEKS)
 
 

@@ -16,6 +16,7 @@ from rehab.management.new_file import new_file
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
+from rehab.people.server_keys import close_keys_again
 
 
 class Command(BaseCommand):
@@ -37,6 +38,7 @@ class Command(BaseCommand):
                 "A backup holds everything about patients, and is encrypted to a public key in "
                 f"GARRY_BACKUP_KEYS. {problem}"
             ) from problem
+        close_keys_again(recipients)
         with new_file(file) as out:
             counts = write_backup(out, recipients, now)
         for clinic in Clinic.everywhere.all():

@@ -6,10 +6,8 @@ import getpass
 import json
 import os
 from argparse import ArgumentParser
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from django.conf import settings
 from django.core.management import BaseCommand, CommandError
@@ -25,7 +23,8 @@ from rehab.exports.clinic.departure import (
 )
 from rehab.exports.clinic.rows import CannotMove, ClinicRows
 from rehab.exports.clinic.sealed_file import inspect, write_clinic
-from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities, read_recipients
+from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_recipients
+from rehab.management.key_files import opened, read_key_file
 from rehab.management.new_file import new_file
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
@@ -84,9 +83,9 @@ class Command(BaseCommand):
 
     def _import(self, file: Path, key: Path, name: str, **_: Any) -> None:
         os.nice(10)  # sessions of other clinics go first
-        with _opened(file) as opened:
+        with opened(file) as source:
             log = self.stdout.write
-            clinic = import_clinic(opened, _keys(key), timezone.now(), name=name, log=log)
+            clinic = import_clinic(source, read_key_file(key), timezone.now(), name=name, log=log)
         self._tell(f"{clinic} is here and as the file says", ClinicRows(clinic.pk).count())
         self.stdout.write(
             "Passwords and authenticator apps go on; recovery codes do not, and passkeys at the "
@@ -118,8 +117,8 @@ class Command(BaseCommand):
         if file is None and not destroy:
             raise CommandError("Name the file that it leaves with: --file FILE --key KEYFILE.")
         if file is not None:
-            with _opened(file) as opened:
-                content = inspect(opened, _keys(key))
+            with opened(file) as source:
+                content = inspect(source, read_key_file(key))
         by = f"{getpass.getuser()}, server console"
         try:
             digest = remove_clinic(one, content, by, now, wait_s=LEAVES_WITHIN_S, store=store)
@@ -145,8 +144,8 @@ class Command(BaseCommand):
                 "and find out who was there."
             )
         if file is not None:
-            with _opened(file) as opened:
-                content = inspect(opened, _keys(key))
+            with opened(file) as source:
+                content = inspect(source, read_key_file(key))
             move = one.moves.filter(file=content.header["file"]).first()
             rows = ClinicRows(one.pk, content.header["tokens"], move)
             compare_with_file(one, content, rows.digest())
@@ -177,24 +176,3 @@ def _read_pending(certificate: Path, clinic: str) -> dict[str, Any] | None:
     except (OSError, ValueError, LookupError, TypeError):
         pass
     raise CommandError(f"{certificate} is there already. Name another file.")
-
-
-def _keys(path: Path | None) -> Any:
-    if path is None:
-        raise CommandError("Name the file with the secret key: --key KEYFILE.")
-    try:
-        return read_identities(path.read_text())
-    except OSError as problem:
-        raise CommandError(f"{path} cannot be read: {problem.strerror}.") from problem
-    except ValueError as problem:  # InvalidKey, or no text at all
-        raise CommandError(f"{path} holds no key. {problem}") from problem
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
-    try:
-        opened = path.open("rb")
-    except OSError as problem:
-        raise CommandError(f"{path} cannot be read: {problem.strerror}.") from problem
-    with opened:
-        yield opened

@@ -9,7 +9,9 @@ from typing import Any
 from django.core.management import BaseCommand, CommandError, call_command
 
 from rehab.exports.backup import CannotRestore, restore_backup
-from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities
+from rehab.exports.encryption import CannotDecrypt
+from rehab.management.key_files import opened, read_key_file
+from rehab.people.server_keys import close_keys_again
 
 
 class Command(BaseCommand):
@@ -30,21 +32,14 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, file: Path, key: Path, **options: Any) -> None:
         """Restore the backup. Raises CommandError, with the cure."""
-        try:
-            identities = read_identities(key.read_text())
-        except OSError as problem:
-            raise CommandError(f"{key} cannot be read: {problem.strerror}.") from problem
-        except ValueError as problem:  # InvalidKey, or no text at all
-            cure = problem if isinstance(problem, InvalidKey) else "It is no text file."
-            raise CommandError(f"{key}: {cure}") from problem
+        identities = read_key_file(key)
         call_command("migrate", verbosity=0)
         try:
-            with file.open("rb") as source:
+            with opened(file) as source:
                 counts = restore_backup(source, identities)
-        except OSError as problem:
-            raise CommandError(f"{file} cannot be read: {problem.strerror}.") from problem
         except (CannotRestore, CannotDecrypt) as problem:
             raise CommandError(f"{file}: {problem}") from problem
+        close_keys_again((), identities)
         self.stdout.write(
             f"{counts['rehab.patient']} patients, {counts['rehab.trainingsession']} sessions and "
             f"{counts['rehab.step']} steps are restored. Everybody has to sign in again."

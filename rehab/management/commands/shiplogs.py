@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError
-from django.core.serializers.json import DjangoJSONEncoder
 from django.utils import timezone
 
+from rehab.exports.backup import ExactEncoder
 from rehab.people.audit.seals import seal_logs, shipped_lines
 
 
@@ -34,7 +34,7 @@ class Command(BaseCommand):
             with os.fdopen(descriptor, "a", encoding="utf-8") as out:
                 os.fchmod(descriptor, 0o600)
                 for line in shipped_lines(after):
-                    out.write(json.dumps(line, cls=DjangoJSONEncoder, ensure_ascii=False) + "\n")
+                    out.write(json.dumps(line, cls=ExactEncoder, ensure_ascii=False) + "\n")
                     count += 1
         except OSError as problem:
             raise CommandError(

@@ -7,14 +7,15 @@ to no other row.
 
 from __future__ import annotations
 
+import hmac
 from typing import ClassVar
 
 from django.db import models
-from django.utils.crypto import salted_hmac
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.scope import Scope, ScopedModel
+from rehab.people.server_keys import Purpose, stable_key, store_first
 
 
 class ImportTombstone(ScopedModel):
@@ -40,6 +41,7 @@ class ImportTombstone(ScopedModel):
 
 def block_reimport(clinic_id: int, legacy_id: int) -> None:
     """Block a participant from being imported again."""
+    store_first(Purpose.TOMBSTONES)
     ImportTombstone.everywhere.get_or_create(
         clinic_id=clinic_id, id_hash=_hash_id(clinic_id, legacy_id)
     )
@@ -52,5 +54,5 @@ def is_reimport_blocked(clinic_id: int, legacy_id: int) -> bool:
 
 
 def _hash_id(clinic_id: int, legacy_id: int) -> str:
-    hashed = salted_hmac("garry.import_tombstones", f"{clinic_id} {legacy_id}", algorithm="sha256")
-    return hashed.hexdigest()
+    key = stable_key(Purpose.TOMBSTONES)
+    return hmac.digest(key, f"{clinic_id} {legacy_id}".encode(), "sha256").hex()

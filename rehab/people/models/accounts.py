@@ -9,7 +9,7 @@ from django.contrib.auth.models import AbstractUser, UserManager
 from django.core.exceptions import ValidationError
 from django.db import models
 from django.db.models import F, Q
-from django.utils.crypto import salted_hmac
+from django.utils.crypto import constant_time_compare, salted_hmac
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models.clinics import Clinic, language_choices
@@ -104,11 +104,16 @@ class User(AbstractUser):
     def __str__(self) -> str:
         return self.get_full_name() or self.username
 
-    def get_session_auth_hash(self) -> str:
+    def _get_session_auth_hash(self, secret: str | None = None) -> str:
         """Return what a browser session keeps of this account; when it changes, that ends."""
         may = f"{self.role} {self.clinic_id}"  # open sockets act by the rights that they began with
         what = f"{self.sign_in_generation} {may} {self.password}"
-        return salted_hmac("garry.sign_in", what, algorithm="sha256").hexdigest()
+        return salted_hmac("garry.sign_in", what, secret=secret, algorithm="sha256").hexdigest()
+
+    def has_session_hash(self, given: str) -> bool:
+        """Return whether a browser session kept this of this account, by any key of the host."""
+        own = (self.get_session_auth_hash(), *self.get_session_auth_fallback_hash())
+        return any(constant_time_compare(given, one) for one in own)
 
     def end_sign_ins(self) -> None:
         """End all sign-ins of this account, also pending ones; open sockets close within seconds.

@@ -13,7 +13,6 @@ from typing import Any, cast
 from django.contrib.auth import HASH_SESSION_KEY, SESSION_KEY, login, logout
 from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
-from django.utils.crypto import constant_time_compare
 
 from rehab.people.models import User
 from rehab.people.sign_in import browser_sessions, lockout
@@ -53,7 +52,7 @@ def pending_second_factor(request: HttpRequest, now: datetime) -> User | None:
         return None
     accounts = User.everywhere.select_related("clinic")
     user = accounts.filter(pk=pending["user"], is_active=True).first()
-    if user and constant_time_compare(pending["password"], user.get_session_auth_hash()):
+    if user and user.has_session_hash(pending["password"]):
         return user
     return None
 
@@ -87,7 +86,7 @@ def is_session_valid(data: Mapping[str, Any], user: User) -> bool:
     return (
         user.is_active
         and data.get(SESSION_KEY) == str(user.pk)
-        and constant_time_compare(data.get(HASH_SESSION_KEY, ""), user.get_session_auth_hash())
+        and user.has_session_hash(data.get(HASH_SESSION_KEY, ""))
         and (bool(data.get(SECOND_FACTOR_VERIFIED)) or not factors.is_required(user))
     )
 

@@ -33,7 +33,14 @@ STOP_S = 5.0
 CHUNK = 64 * 1024
 MAX_LINE_BYTES = 1200  # stored of a line
 # What a source is not given: it may read a recording from a stranger.
-SECRETS = ("GARRY_SECRET_KEY", "GARRY_DATABASE_URL", "GARRY_METRICS_TOKEN", "NOTIFY_SOCKET")
+SECRETS = (
+    "GARRY_SECRET_KEY",
+    "GARRY_SECRET_KEY_FALLBACKS",
+    "GARRY_DATABASE_URL",
+    "GARRY_METRICS_TOKEN",
+    "GARRY_OIDC_CLIENT_SECRET",
+    "NOTIFY_SOCKET",
+)
 MAX_LINE_CHARS = 300  # of a line in the report
 
 

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from base64 import urlsafe_b64encode
 from datetime import datetime
 from typing import ClassVar
 
-from cryptography.fernet import Fernet, InvalidToken
+from cryptography.fernet import InvalidToken
 from django.conf import settings
 from django.db import models, transaction
 from django.db.models import Q
-from django.utils.crypto import salted_hmac
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
+from rehab.people.server_keys import Purpose, decrypt_text, encrypt_text
 from rehab.people.sign_in.factors.recovery_codes import CODE_COUNT, generate_code, hash_code
 from rehab.people.sign_in.factors.totp import matching_time_step
 
@@ -110,7 +109,9 @@ def add_app(user: User, secret: str, code: str, now: datetime) -> list[str] | No
     if time_step is None:
         return None
     kind = Authenticator.Kind.APP
-    return add_authenticator(user, kind, str(kind.label), close_secret(secret), time_step)
+    return add_authenticator(
+        user, kind, str(kind.label), encrypt_text(Purpose.AUTHENTICATORS, secret), time_step
+    )
 
 
 def remove_authenticator(user: User, authenticator_id: int) -> bool:
@@ -156,7 +157,7 @@ def verify_code(user: User, code: str, now: datetime) -> bool:
     """Return whether a code, of an app or for recovery, signs an account in. Each does so once."""
     for app in authenticators_of(user).filter(kind=Authenticator.Kind.APP):
         try:
-            secret = open_secret(app.credential)
+            secret = decrypt_text(Purpose.AUTHENTICATORS, app.credential)
         except InvalidToken:  # the server's secret key has changed; recovery codes still work
             continue
         time_step = matching_time_step(secret, code, now.timestamp())
@@ -165,20 +166,3 @@ def verify_code(user: User, code: str, now: datetime) -> bool:
     typed = hash_code(code, user.pk, user.date_joined)
     used, _ = RecoveryCode.everywhere.filter(user=user, code_hash=typed).delete()
     return bool(used)
-
-
-def open_secret(encrypted: str) -> str:
-    """Return an app's secret. Raises InvalidToken where the server has another key now."""
-    return _cipher().decrypt(encrypted).decode()
-
-
-def close_secret(secret: str) -> str:
-    """Return an app's secret, encrypted with the server's own key."""
-    return _cipher().encrypt(secret.encode()).decode()
-
-
-def _cipher() -> Fernet:
-    """Return a cipher with a key of the server's own: the database alone reveals no secret."""
-    return Fernet(
-        urlsafe_b64encode(salted_hmac("garry.second_factors", "apps", algorithm="sha256").digest())
-    )

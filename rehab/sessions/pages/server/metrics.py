@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hmac
+import shutil
 from collections import Counter
 from collections.abc import Iterator
 
 from django.conf import settings
+from django.db import DatabaseError, connection
 from django.http import Http404, HttpRequest, HttpResponse
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
@@ -17,6 +19,7 @@ from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
 from rehab.people.access import public
+from rehab.people.chores import Chore
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.session.instruments import REGISTRY
@@ -67,7 +70,47 @@ def _labeled(name: str, about: str, label: str, counts: Counter[str]) -> GaugeMe
     return family
 
 
+class Upkeep(Collector):
+    """How the server's chores went, and what it may run out of."""
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """Yield the figures; without the database those of the disk alone."""
+        disk = shutil.disk_usage(settings.DATA_DIR)
+        yield GaugeMetricFamily(
+            "garry_disk_free_ratio", "Free part of the data folder's disk.", disk.free / disk.total
+        )
+        try:
+            chores, (used, limit) = list(Chore.objects.all()), _connections()
+        except DatabaseError:  # other figures say so
+            return
+        well = Counter({one.name: int(one.is_well) for one in chores})
+        yield _labeled("garry_chore_well", "1 if a chore's last run succeeded.", "chore", well)
+        ages = GaugeMetricFamily(
+            "garry_chore_succeeded_timestamp_seconds", "Its last success.", labels=["chore"]
+        )
+        for one in chores:
+            ages.add_metric([one.name], one.succeeded_at.timestamp() if one.succeeded_at else 0.0)
+        yield ages
+        if limit:
+            yield GaugeMetricFamily(
+                "garry_database_connections_ratio", "Used part of them.", used / limit
+            )
+
+
+def _connections() -> tuple[int, int]:
+    """Return the connections to the database and their limit; 0 where there is none."""
+    if connection.vendor != "postgresql":
+        return 0, 0
+    with connection.cursor() as cursor:
+        cursor.execute(
+            "SELECT count(*), current_setting('max_connections')::int FROM pg_stat_activity"
+        )
+        used, limit = cursor.fetchone()
+        return used, limit
+
+
 REGISTRY.register(LiveSessions())
+REGISTRY.register(Upkeep())
 ProcessCollector(registry=REGISTRY)
 GCCollector(registry=REGISTRY)
 

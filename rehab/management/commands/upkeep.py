@@ -1,0 +1,167 @@
+"""`manage.py upkeep hourly | nightly | weekly`: what keeps a server well, and a record of it.
+
+Timers run it (deploy/systemd, deploy/compose.yaml). How each chore went is in /metrics.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import ssl
+import subprocess
+import sys
+import tempfile
+from argparse import ArgumentParser
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from cryptography import x509
+from django.conf import settings
+from django.core.management import BaseCommand, CommandError, call_command
+from django.utils import timezone
+
+from rehab.people.audit import seals
+from rehab.people.chores import record_chore
+from rehab.people.server_keys import ServerKey
+from rehab.sessions import seals as session_seals
+
+NAMED = "garry-{:%Y-%m-%d}.backup"
+RENEWED = timedelta(days=14)  # before a certificate ends; certbot does so 30 days before
+SEALED_SINCE = timedelta(days=30)  # whose rows are read again each night
+
+
+def ship_logs(now: datetime) -> str:
+    """Append what was sealed of the logs to the file stored elsewhere."""
+    return _called("shiplogs", _setting("GARRY_SHIPPED_LOGS", settings.SHIPPED_LOGS))
+
+
+def retention(now: datetime) -> str:
+    """Erase what clinics no longer keep."""
+    return _called("retention")
+
+
+def backup(now: datetime) -> str:
+    """Write a backup, then delete those past their time."""
+    folder = Path(_setting("GARRY_BACKUP_DIR", settings.BACKUP_DIR))
+    said = _called("backup", folder / NAMED.format(now))
+    oldest = NAMED.format(now - timedelta(days=settings.BACKUP_DAYS))
+    for file in folder.glob("garry-*.backup"):
+        if file.name < oldest:
+            file.unlink()
+    return said
+
+
+def check_seals(now: datetime) -> str:
+    """Compare logs with their seals, and the steps that were sealed lately."""
+    broken = [*seals.find_broken(), *session_seals.find_broken(now - SEALED_SINCE)]
+    if broken:
+        raise CommandError(f"{len(broken)} are not as they were sealed: {'; '.join(broken[:5])}")
+    return "All seals hold."
+
+
+def check_keys(now: datetime) -> str:
+    """Open the server's own keys."""
+    closed = [str(one) for one in ServerKey.objects.all() if one.open() is None]
+    if closed:
+        raise CommandError(f"{', '.join(closed)}: not opened. See manage.py rotatekeys --help.")
+    return "All keys open."
+
+
+def check_certificate(now: datetime) -> str:
+    """Read the certificate that the proxy shows."""
+    host = settings.ALLOWED_HOSTS[0].lstrip(".")
+    try:
+        shown = ssl.get_server_certificate((host, 443), timeout=10)
+    except OSError as problem:
+        raise CommandError(f"No certificate at {host}:443 ({problem}).") from problem
+    ends = x509.load_pem_x509_certificate(shown.encode()).not_valid_after_utc
+    if ends - now < RENEWED:
+        raise CommandError(f"The certificate of {host} ends on {ends:%Y-%m-%d}. Run certbot renew.")
+    return f"The certificate of {host} is valid until {ends:%Y-%m-%d}."
+
+
+def try_restore(now: datetime) -> str:
+    """Restore the newest backup into a scratch database, and look at it there."""
+    key = _setting("GARRY_RESTORE_KEY", settings.RESTORE_KEY)
+    files = sorted(Path(_setting("GARRY_BACKUP_DIR", settings.BACKUP_DIR)).glob("garry-*.backup"))
+    if not files:
+        raise CommandError("There is no backup to restore. Run manage.py upkeep backup.")
+    scratch = Path(tempfile.mkdtemp(prefix="restore-", dir=settings.DATA_DIR))
+    try:
+        said = _run_in(scratch, "restore", str(files[-1]), "--key", key)
+        _run_in(scratch, "upkeep", "keys", "seals")
+    finally:
+        shutil.rmtree(scratch)
+    return said
+
+
+CHORES: dict[str, Callable[[datetime], str]] = {
+    "shiplogs": ship_logs,
+    "retention": retention,
+    "backup": backup,
+    "seals": check_seals,
+    "keys": check_keys,
+    "certificate": check_certificate,
+    "restore": try_restore,
+}
+TIMES = {
+    "hourly": ["shiplogs"],
+    "nightly": ["retention", "backup", "seals", "keys", "certificate"],
+    "weekly": ["restore"],
+}
+
+
+class Command(BaseCommand):
+    """Does each chore, whatever becomes of the others. Exits with status 1 where one failed."""
+
+    help = "Do what keeps a server well; monitoring reads how it went."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the argument of what to do."""
+        parser.add_argument("what", nargs="+", choices=[*TIMES, *CHORES])
+
+    def handle(self, *args: Any, what: list[str], **options: Any) -> None:
+        """Do the chores of a time, or these."""
+        failed = False
+        for name in [chore for one in what for chore in TIMES.get(one, [one])]:
+            now, problem = timezone.now(), None
+            try:
+                said = CHORES[name](now)
+            except Exception as error:  # the next chore is done all the same
+                said = problem = f"{error}" or repr(error)
+                failed = True
+            record_chore(name, said, now, failed=problem is not None)
+            (self.stdout if problem is None else self.stderr).write(f"{name}: {said.strip()}")
+        if failed:
+            raise SystemExit(1)
+
+
+def _setting(name: str, value: str) -> str:
+    if not value:
+        raise CommandError(f"{name} is not set: docs/hosting.md.")
+    return value
+
+
+def _called(*command: Any) -> str:
+    out = StringIO()
+    call_command(*command, stdout=out)
+    return out.getvalue()
+
+
+def _run_in(folder: Path, *command: str) -> str:
+    """Run a command of an installation in this folder, on SQLite. Raises CommandError."""
+    own = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
+    done = subprocess.run(
+        [sys.executable, "manage.py", *command],
+        cwd=settings.BASE_DIR,
+        env=own | {"GARRY_DATA_DIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise CommandError((done.stderr or done.stdout).strip())
+    return done.stdout

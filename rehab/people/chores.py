@@ -1,0 +1,36 @@
+"""What a server does by itself each night, and how it went: monitoring reads it from these rows."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import ClassVar
+
+from django.db import models
+
+
+class Chore(models.Model):
+    """When a chore last succeeded and last failed, and what it said."""
+
+    name = models.CharField(max_length=32, primary_key=True)
+    succeeded_at = models.DateTimeField(null=True)
+    failed_at = models.DateTimeField(null=True)
+    said = models.TextField(blank=True)
+
+    class Meta:
+        ordering: ClassVar = ["name"]
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def is_well(self) -> bool:
+        """Whether its last run succeeded."""
+        if self.succeeded_at is None or self.failed_at is None:
+            return self.failed_at is None
+        return self.succeeded_at > self.failed_at
+
+
+def record_chore(name: str, said: str, now: datetime, *, failed: bool) -> None:
+    """Record how a chore went."""
+    moment = {"failed_at": now} if failed else {"succeeded_at": now}
+    Chore.objects.update_or_create(name=name, defaults=moment | {"said": said[-2000:]})
