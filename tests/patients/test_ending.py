@@ -58,7 +58,7 @@ def test_today_stands_beside_last_time(world, patient):
     assert "You walked" in words
     assert "Today 7 of 10 Last time 4 of 10" in words
     assert "Most in a row 5" in words
-    assert f"{day:%A} {day.day} {day:%B}, 2:15 p.m." in words
+    assert f"{day:%A} {day.day} {day:%B}, 14:15" in words
     assert "More steps at the goal than last time." in words
 
 

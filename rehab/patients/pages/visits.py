@@ -53,7 +53,7 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
         visit, *_later = [
             plan_visit(patient, day + timedelta(weeks=week), at) for week in range(weeks)
         ]
-        when = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
+        when = format_date(visit.day, _("l j F")) + (f", {visit.at:%H:%M}" if visit.at else "")
         names = {"name": patient.nickname, "when": when, "count": weeks}
         message = ngettext(
             "%(name)s is expected on %(when)s.",

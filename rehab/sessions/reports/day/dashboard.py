@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from django.utils.dateformat import format as format_date
+from django.utils.formats import date_format
 from django.utils.translation import gettext
 
 from rehab.people.access import clinic_of
@@ -107,7 +107,7 @@ def _format_hit_rate(row: Any) -> str:
 
 
 def _format_time(moment: datetime, midnight: datetime) -> str:
-    day = "" if moment >= midnight else format_date(moment, "M j") + ", "
+    day = "" if moment >= midnight else date_format(moment, "MONTH_DAY_FORMAT") + ", "
     return f"{day}{moment:%H:%M}"
 
 
