@@ -54,10 +54,10 @@ class Step(AppendOnlyModel):
     performance = models.FloatField(_("performance"), null=True)
     hit = models.BooleanField(_("hit"), null=True)
     close = models.BooleanField(
-        _("close"), db_default=False, help_text=_("Too uncertain to count as hit or miss.")
+        _("close"), db_default=False, help_text=_("Too uncertain to count as a hit or a miss.")
     )
     late = models.BooleanField(
-        _("late"), db_default=False, help_text=_("It came too late to be shown as live.")
+        _("late"), db_default=False, help_text=_("It arrived too late to be shown live.")
     )
     points = models.SmallIntegerField(_("points"), null=True)
     valid = models.BooleanField(_("valid"))

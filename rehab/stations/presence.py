@@ -51,11 +51,11 @@ def _format_state(device: Device, has_ended: bool, now: datetime) -> str:
     if device.is_revoked:
         return gettext("revoked")
     if has_ended:
-        return gettext("ended with its approver’s rights or unused: let it in again")
+        return gettext("expired, unused or with its approver’s rights: let it in again")
     if device.has_expired(now):
         return gettext("its token has expired: give it a new one")
     if device.copy_seen_at is not None:
-        return gettext("somebody used its old token on %(day)s: give it a new one") % {
+        return gettext("its old token was used on %(day)s: give it a new one") % {
             "day": date_format(device.copy_seen_at.astimezone(now.tzinfo))
         }
     return format_last_seen(device.last_seen_at, now)

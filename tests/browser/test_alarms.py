@@ -271,7 +271,9 @@ def test_a_server_that_says_nothing_is_told_first_and_everything_is_gray(
         expect(monitor.locator("[data-presence=robot]")).to_contain_text("– not known for")
         expect(patient.locator(".words")).to_contain_text("No connection for")
         monitor.click("[data-robot=stop]")
-        expect(monitor.locator(".said")).to_have_text("Stop not heard. Use the robot’s own switch.")
+        expect(monitor.locator(".said")).to_have_text(
+            "The stop did not get through. Use the robot’s own switch."
+        )
         picture(monitor, "silent-server")
         picture(patient, "silent-server-patient")
         held.clear()

@@ -35,7 +35,7 @@ RECORD = """async (path) => {
 }"""
 
 
-UNHEARD = "Stop not heard. Use the robot’s own switch, or call your therapist."
+UNHEARD = "The stop did not get through. Use the robot’s own switch, or call your therapist."
 
 
 def looks(page: Page, look: str, words: str | re.Pattern[str] = "") -> None:
@@ -164,7 +164,7 @@ def test_a_session_from_start_to_scores(server, browser):
         page.click("text=Start")
         looks(page, "waiting", "Waiting for the sensor.")
         with feet_of(server, walk) as feet:
-            looks(page, "begin", "Begin to walk.")
+            looks(page, "begin", "Start walking.")
             feet.walk(1.0, 1.1)
             looks(page, "feedback", "Strong push!")
             assert page.locator(".said").text_content() == "Strong push. Plus 1. 2 points."

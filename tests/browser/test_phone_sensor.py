@@ -65,7 +65,7 @@ def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: V
           document.dispatchEvent(new Event("visibilitychange"));
         }""")
         presence = pt.locator("[data-presence=source]")
-        expect(presence).to_contain_text("the phone’s page is not in front")
+        expect(presence).to_contain_text("the phone is showing another page")
         expect(presence).to_have_class(re.compile(r"\blow\b"))
         phone.walk(324, 332)
         hidden = phone.strides - after

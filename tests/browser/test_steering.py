@@ -225,7 +225,7 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         wire.freeze()  # nothing is closed: the Wi-Fi is just gone
         stop.click()
         expect(stop).to_have_class(re.compile("asked"))
-        unanswered = "Stop not heard. Use the robot’s own switch."
+        unanswered = "The stop did not get through. Use the robot’s own switch."
         expect(why).to_have_text(unanswered)
         expect(said).to_have_text(unanswered)
         expect(stop).not_to_have_class(re.compile("asked"))

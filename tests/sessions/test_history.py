@@ -170,7 +170,7 @@ def test_every_state_can_be_looked_at(client, patient, end, said, link):
 
 def test_a_session_without_a_stride_says_so(client, patient):
     page = detail(client, walk(patient, "positive", []))
-    assert "No stride has come." in page
+    assert "No strides yet." in page
 
 
 def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_assert_num_queries):

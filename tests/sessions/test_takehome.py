@@ -60,7 +60,7 @@ def test_one_session_has_nothing_to_be_compared_with(world, patient):
     walk(patient, "negative", [HIT] * 4)
     words = read(world, patient)
     assert "1 session " in words
-    assert "How it developed" not in words
+    assert "Your progress" not in words
     assert "best session" not in words
 
 

@@ -68,7 +68,7 @@ def _parse_weeks(given: str) -> int:
     """Return for how many weeks a visit is planned. Raises InvalidVisitDay."""
     if not (given.isascii() and given.isdecimal() and 1 <= int(given[:3]) <= MAX_WEEKS):
         raise InvalidVisitDay(
-            _("Plan a visit for 1 to %(most)s weeks at once.") % {"most": MAX_WEEKS}
+            _("Plan visits for 1 to %(most)s weeks at a time.") % {"most": MAX_WEEKS}
         )
     return int(given)
 

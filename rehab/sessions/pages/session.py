@@ -90,7 +90,9 @@ def correct(request: HttpRequest, session_id: int) -> HttpResponse:
         TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
     )
     if not can_correct(session):
-        messages.error(request, gettext("This session still runs. End it before you correct it."))
+        messages.error(
+            request, gettext("This session is still running. End it before you correct it.")
+        )
         return redirect("session", session_id=session.pk)
     form = CorrectionForm(request.POST or None, session=session, by=user)
     if request.method == "POST" and form.create(timezone.now()):

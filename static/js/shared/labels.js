@@ -103,7 +103,7 @@ const DOUBTS = {
 const REFUSALS = {
   sign_in: _("Sign in again, or pair the tablet again."),
   no_session: _("There is no such session for you."),
-  not_open: _("The session is not open. Load the page again."),
+  not_open: _("The session is not open. Reload the page."),
   not_stored: _("It could not be stored. Try again."),
 };
 

@@ -131,7 +131,7 @@ def find_alerts(
 def _device_problem(device: Device, now: datetime) -> str | None:
     if is_overdue(device, now):
         return gettext(
-            "%(name)s at %(station)s has never dialed in. Give it its token, or revoke it."
+            "%(name)s at %(station)s has never connected. Give it its token, or revoke it."
         )
     if device.revoked_at is not None and now - device.revoked_at < REVOKED_ALERT_FOR:
         return gettext(
@@ -142,7 +142,7 @@ def _device_problem(device: Device, now: datetime) -> str | None:
         return gettext("The token of %(name)s at %(station)s has expired. Give it a new one.")
     if device.copy_seen_at is not None:
         return gettext(
-            "Somebody used an old token of %(name)s at %(station)s. Give it a new one, and find "
-            "out who has the old one."
+            "An old token of %(name)s at %(station)s was used. Give it a new one, and find out who "
+            "has the old one."
         )
     return None
