@@ -2602,7 +2602,7 @@ class Migration(migrations.Migration):
                             ("near_fall", "near fall"),
                             ("fall", "fall"),
                             ("fall_severity", "hurt by the fall"),
-                            ("fall_withdrawn", "it was no fall"),
+                            ("fall_withdrawn", "it was not a fall"),
                             ("fall_acknowledged", "fall seen by a therapist"),
                             ("stop_acknowledged", "robot’s stop seen by a therapist"),
                             ("verbal_cue", "verbal cue"),

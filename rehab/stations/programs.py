@@ -25,7 +25,7 @@ PROGRAMS = (
     SensorProgram(
         _("D-Flow, Nexus or a script of your own"), "rows --listen udp://0.0.0.0:9101 --mass 75"
     ),
-    SensorProgram(_("Lab Streaming Layer"), "lsl --stream Treadmill Mocap --mass 75"),
+    SensorProgram("Lab Streaming Layer", "lsl --stream Treadmill Mocap --mass 75"),
     SensorProgram(
         _("Sensors on both shins, by Bluetooth"), "ble --sensor left.shank=LEFT right.shank=RIGHT"
     ),

@@ -292,7 +292,7 @@ def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
         expect(pt.locator("[data-show=goal]")).to_have_text("4.10")
         tab_to(pt, "[data-main]")
         pt.keyboard.press("Space")
-        expect(pt.locator("[data-main]")).to_contain_text("Go on")
+        expect(pt.locator("[data-main]")).to_contain_text("Resume")
         expect(pt.locator("[data-main]")).to_be_focused()
         tab_to(pt, "[data-end]")
         pt.keyboard.press("Enter")

@@ -177,7 +177,7 @@ def test_a_session_from_start_to_scores(server, browser):
             assert page.evaluate(TOO_SMALL) == []
             page.click("text=No, go back")
             looks(page, "paused")
-            page.click("text=Go on")
+            page.click("text=Resume")
             looks(page, "feedback", "Strong push!")
             feet.walk(1.2, 1.0, 1.0)
             looks(page, "calm", "Just walk as you usually do.")

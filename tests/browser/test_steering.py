@@ -186,7 +186,7 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
             feet.walk(1.2, 1.2)
     with serve(tmp_path) as server, pages(browser, server, walk, where) as (tablet, monitor):
         expect(monitor.locator("[data-alarm=restart]")).to_have_text(
-            "The server was restarted; nothing was lost. Go on when ready."
+            "The server was restarted; nothing was lost. Resume when ready."
         )
         expect(tablet.locator(".sub")).to_have_text("Rest now. Your score is safe.")
         monitor.locator("[data-main]").click()

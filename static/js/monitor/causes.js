@@ -53,7 +53,7 @@ function describeOwnStop(session) {
 
 function describeRestart({ state, pause_reason: reason }) {
   if (state !== "paused" || reason !== "restart") return "";
-  return _("The server was restarted; nothing was lost. Go on when ready.");
+  return _("The server was restarted; nothing was lost. Resume when ready.");
 }
 
 function describeSource({ presence, state: sessionState }, { state }) {
@@ -91,7 +91,7 @@ function describeRobot(session, { state, robot }) {
 function describePause({ state, pause_reason: reason, rest_s: rest }) {
   if (state !== "paused") return "";
   const why = fill(PAUSES[reason] ?? _("Paused."), { time: clock(rest ?? 0) });
-  return reason === "therapist" ? why : `${why} ${_("Go on when ready.")}`;
+  return reason === "therapist" ? why : `${why} ${_("Resume when ready.")}`;
 }
 
 export const CAUSES = [

@@ -22,7 +22,7 @@ const REMARKS = {
   near_fall: _("near fall"),
   fall: _("fall"),
   fall_severity: _("hurt by the fall"),
-  fall_withdrawn: _("it was no fall"),
+  fall_withdrawn: _("it was not a fall"),
   fall_acknowledged: _("fall seen by a therapist"),
   stop_acknowledged: _("robot’s stop seen by a therapist"),
   verbal_cue: _("verbal cue"),
