@@ -161,7 +161,7 @@ def test_every_page_in_each_language_at_twice_its_size(
         assert page.locator("html").get_attribute("lang") == language, path
         try:
             check(page, for_patients=path in PATIENT_PAGES)
-        except AssertionError as problem:
+        except pytest.fail.Exception as problem:
             found.append(f"{path}: {problem}")
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         if wide > 0:
