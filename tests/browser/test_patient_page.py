@@ -270,7 +270,7 @@ def test_a_page_that_is_signed_out_says_so_and_stops(server, browser):
         wire.cut()
         looks(page, "closed", "This screen has stopped.")
         expect(page.locator(".sub")).to_have_text("Please call your therapist.")
-        assert page.locator("text=Load again").is_visible()
+        assert page.locator("text=Reload").is_visible()
 
 
 @pytest.mark.essential

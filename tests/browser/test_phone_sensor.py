@@ -90,7 +90,7 @@ def test_a_therapist_shows_the_square_once(visit: Visit):
     page = visit("/stations/", size="laptop")
     page.click("text=A phone as a sensor")
     page.check("[name=side][value=right]")
-    page.click("text=Show the square")
+    page.click("text=Show the QR code")
     expect(page.locator(".qr svg")).to_be_visible()
     expect(page.locator("main")).to_contain_text("Phone, right shin")
     expect(page.locator("main")).to_contain_text("without https")
