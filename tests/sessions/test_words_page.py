@@ -7,7 +7,7 @@ import re
 import pytest
 from django.urls import reverse
 
-from rehab.feedback.clinic_valences import default_valence
+from rehab.feedback.clinic_valences import valences_of
 from rehab.people.roles import Role
 from rehab.sessions.feedback_text_updates import change_language, session_language
 from rehab.sessions.live.session.aggregate import SessionAggregate
@@ -68,9 +68,9 @@ def test_another_language_of_the_patient_is_that_of_the_open_session(world):
     world.patient.language = "es"
     world.patient.save()
     assert change_language(world.patient, world.people[Role.PT]) == []
-    fold = SessionAggregate.load(session).fold
-    assert fold.valences.known["negative"].bands == default_valence("negative", "es").bands
-    assert words_of(session) == [band.words for band in default_valence("positive", "es").bands]
+    fold, spanish = SessionAggregate.load(session).fold, valences_of(session.clinic_id, "es")
+    assert fold.valences.known["negative"].bands == spanish["negative"].bands
+    assert words_of(session) == [band.words for band in spanish["positive"].bands] != before
     assert (fold.valences.language, session_language(session)) == ("es", "es")
     assert (words_of(ended), session_language(ended)) == (before, "en")
 
