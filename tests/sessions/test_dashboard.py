@@ -171,7 +171,7 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
     ("fields", "words"),
     [
         ({"token_expires_at": NOW}, "has expired"),
-        ({"copy_seen_at": NOW - timedelta(days=3)}, "Somebody used an old token of"),
+        ({"copy_seen_at": NOW - timedelta(days=3)}, "An old token of"),
     ],
 )
 def test_a_device_whose_token_is_over_or_was_copied_wants_attention(world, rosa, fields, words):
@@ -199,7 +199,7 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
     assert len(words) == 3
     assert words[0] == "The session of Rosa has been open since 06:00. End it."
     assert words[1].startswith("never at ")
-    assert "has never dialed in" in words[1]
+    assert "has never connected" in words[1]
     assert "revoked and shut out" in words[2]
 
 
