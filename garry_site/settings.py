@@ -220,6 +220,7 @@ LANGUAGES = [
     ("fr", "Français (ébauche)"),
 ]
 LOCALE_PATHS = [FILES_DIR / "locale"]
+FORMAT_MODULE_PATH = "garry_site.formats"
 USE_TZ = True
 TIME_ZONE = text("GARRY_TIME_ZONE", "UTC", "time zone of dates in admin and reports")
 if TIME_ZONE not in available_timezones():

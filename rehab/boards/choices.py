@@ -86,7 +86,7 @@ class Occasion(TextChoices):
 
     AFTER_SESSION = "after_session", _("After a session")
     WAITING = "waiting", _("While the tablet waits")
-    PT_ONLY = "pt_only", _("Only here, to therapists")
+    PT_ONLY = "pt_only", _("Only here, for therapists")
 
 
 def metric_choices() -> list[tuple[str, Any]]:

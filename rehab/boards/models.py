@@ -134,7 +134,7 @@ class Leaderboard(ClinicModel):
         max_length=32,
         choices=metric_choices(),
         blank=True,
-        help_text=_("Who has more of this stands first; after that, who was earlier."),
+        help_text=_("Whoever has more of this comes first; after that, whoever was earlier."),
     )
     names = models.CharField(
         _("names"), max_length=16, choices=NameStyle.choices, default=NameStyle.PSEUDONYM

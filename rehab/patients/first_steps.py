@@ -57,7 +57,7 @@ def _look_for_sensor(user: User, now: datetime) -> Found:
     here = [one.name for one in sources if one.pk in connected]
     if here:
         return Found(True, _("%(sensor)s is connected.") % {"sensor": ", ".join(here)})
-    words = _("Start the sensor’s program with its token. Not connected: %(sensors)s.")
+    words = _("Start the sensor’s program with its token. Not connected yet: %(sensors)s.")
     return Found(False, words % {"sensors": _describe(sources, now)})
 
 

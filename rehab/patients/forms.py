@@ -64,7 +64,8 @@ class PatientForm(_SpokenForm):
                 required=False,
                 widget=forms.CheckboxSelectMultiple,
                 help_text=_(
-                    "Read the clinic's words to the patient first. It can change any time."
+                    "Read the clinic's words to the patient first. The answer can change at any "
+                    "time."
                 ),
             )
 
@@ -139,7 +140,7 @@ class ErasureForm(forms.Form):
         widget=forms.RadioSelect,
     )
     code = forms.CharField(
-        label=_("The patient's code, once more"),
+        label=_("Type the patient's code again"),
         max_length=32,
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )

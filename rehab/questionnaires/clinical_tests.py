@@ -99,7 +99,7 @@ WALK_SPEED = (
     gettext_noop("Mark ten meters, and two more before and behind them."),
     gettext_noop("Start the time when the first foot crosses the first mark."),
     gettext_noop("Stop it when the first foot crosses the last mark."),
-    gettext_noop("Walking aid and orthosis as usual; walk beside, never ahead."),
+    gettext_noop("Walking aid and orthosis as usual; walk slightly behind, never ahead."),
 )
 # Bohannon & Williams Andrews 2011; Steffen 2002; Bohannon 2006.
 CLINICAL_TESTS: dict[str, ClinicalTest] = {
@@ -153,8 +153,8 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 gettext_noop(
                     "The patient walks as far as possible and may rest; the time runs on."
                 ),
-                gettext_noop("Tap a lap at each turn. Say each minute how much time is left."),
-                gettext_noop("At six minutes measure the meters since the last turn."),
+                gettext_noop("Tap “Lap” at each turn. Every minute, say how much time is left."),
+                gettext_noop("At six minutes, measure the meters since the last turn."),
             ),
             norms=((60, 538, 572), (70, 471, 527), (80, 392, 417)),
             least_change=34.4,
@@ -175,7 +175,8 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                     "Start at “go”: stand up, walk to the mark, turn, walk back, sit down."
                 ),
                 gettext_noop(
-                    "Stop when the back touches the chair. One trial before does not count."
+                    "Stop when the back touches the chair. A practice trial before it does not "
+                    "count."
                 ),
             ),
             norms=((60, 8.1, 8.1), (70, 9.2, 9.2), (80, 11.3, 11.3)),
@@ -211,17 +212,18 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
             way=Way.SCORE,
             steps=(
                 gettext_noop(
-                    "How much help of a person the patient needs to walk; aids are allowed."
+                    "How much help from a person the patient needs to walk; walking aids are "
+                    "allowed."
                 ),
             ),
             least_change=1,
             levels=(
                 gettext_noop("Cannot walk, or needs two people"),
-                gettext_noop("Needs one person all the time, who carries weight"),
+                gettext_noop("Needs one person all the time, to carry weight"),
                 gettext_noop("Needs one person’s touch now and then, for balance"),
-                gettext_noop("Needs somebody beside, without touch"),
+                gettext_noop("Needs someone beside them, without touch"),
                 gettext_noop("Walks alone on level ground"),
-                gettext_noop("Walks alone everywhere, also on stairs"),
+                gettext_noop("Walks alone everywhere, including stairs"),
             ),
         ),
         ClinicalTest(

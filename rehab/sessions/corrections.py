@@ -154,7 +154,7 @@ def correct_session(
     rows = TrainingSession.objects.visible_to(by).select_for_update(of=("self",))
     stored = rows.select_related("patient").get(pk=session.pk)
     if not can_correct(stored):
-        raise ValidationError(gettext("This session still runs. End it first."))
+        raise ValidationError(gettext("This session is still running. End it first."))
     before, walker = current_values(stored, by), stored.patient_id
     if expected is not None and expected != before:
         raise ValidationError(_describe_conflict(stored, before, expected, by))
@@ -205,8 +205,8 @@ def _describe_conflict(
         if newest is not None:
             found.append(f"{field.label}: {newest.new or '–'} ({newest.by or '–'})")
     message = gettext(
-        "Somebody else has corrected this session meanwhile. %(what)s. Below stands what holds "
-        "now, with your changes. Look it over and correct it again."
+        "Someone else has corrected this session in the meantime. %(what)s. Below is what "
+        "applies now, with your changes. Check it and correct it again."
     )
     return message % {"what": " · ".join(found) or "–"}
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from datetime import date, datetime
 from zoneinfo import ZoneInfo
 
-from django.utils.dateformat import format as format_date
-from django.utils.formats import number_format
+from django.utils.formats import date_format, number_format
 from django.utils.translation import gettext, gettext_noop
 
 from rehab.people.models import Clinic
@@ -55,7 +54,7 @@ def format_day(day: date, today: date) -> str:
     """Return a day as text: `today`, without its year in this year, else with it."""
     if day == today:
         return gettext("today")
-    return format_date(day, gettext("M j") if day.year == today.year else gettext("M j, Y"))
+    return date_format(day, "MONTH_DAY_FORMAT" if day.year == today.year else "DATE_FORMAT")
 
 
 # What `source_choices` returns and a session stores, in English.

@@ -54,10 +54,10 @@ class Step(AppendOnlyModel):
     performance = models.FloatField(_("performance"), null=True)
     hit = models.BooleanField(_("hit"), null=True)
     close = models.BooleanField(
-        _("close"), db_default=False, help_text=_("Too uncertain to count as hit or miss.")
+        _("close"), db_default=False, help_text=_("Too uncertain to count as a hit or a miss.")
     )
     late = models.BooleanField(
-        _("late"), db_default=False, help_text=_("It came too late to be shown as live.")
+        _("late"), db_default=False, help_text=_("It arrived too late to be shown live.")
     )
     points = models.SmallIntegerField(_("points"), null=True)
     valid = models.BooleanField(_("valid"))
@@ -162,7 +162,7 @@ class RuleEntry(StrEnum):
 class Remark(StrEnum):
     """What a PT notes with one tap during a session. It changes no score either.
 
-    How badly the patient was hurt, and that it was no fall after all, refer to the last fall. An
+    How badly the patient was hurt, and that it was not a fall after all, refer to the last fall. An
     acknowledgment ends the alarms of its kind (`alarms`); it alone is noted after the end, too.
     """
 
@@ -224,7 +224,7 @@ EVENTS = {
     Remark.NEAR_FALL: _("near fall"),
     Remark.FALL: _("fall"),
     Remark.FALL_SEVERITY: _("hurt by the fall"),
-    Remark.FALL_WITHDRAWN: _("it was no fall"),
+    Remark.FALL_WITHDRAWN: _("it was not a fall"),
     Remark.FALL_ACKNOWLEDGED: _("fall seen by a therapist"),
     Remark.STOP_ACKNOWLEDGED: _("robot’s stop seen by a therapist"),
     Remark.VERBAL_CUE: _("verbal cue"),

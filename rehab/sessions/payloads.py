@@ -12,8 +12,7 @@ from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Tally
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
-from rehab.training.plans import SessionPlan
-from rehab.training.valences import VALENCES, Valence
+from rehab.training.valences import VALENCES
 from robot.wire.cue_limits import VARIED
 
 Message = dict[str, Any]
@@ -41,12 +40,13 @@ def describe_rates(tally: Tally) -> Message:
     }
 
 
-def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
+def describe_phase(fold: SessionFold, index: int) -> Message:
     """Return a phase as pages show it, with the feedback type that is in force there."""
+    plan, valence = fold.plan, fold.valence
     phase = plan.phases[index]
     calm_words = ""
     if not phase.feedback:
-        with override(plan.language):
+        with override(fold.valences.language):
             calm_words = gettext(find_phase_kind(phase.kind).calm_words)
     return {
         "index": index,
@@ -64,7 +64,7 @@ def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
 def describe_now(fold: SessionFold) -> Message:
     """Return the phase that the next step falls in, and how its points stand."""
     return {
-        "phase": describe_phase(fold.plan, fold.phase_index, fold.valence),
+        "phase": describe_phase(fold, fold.phase_index),
         "has_points": fold.valence.has_points,
         "longest": fold.valence.longest_words(),
         "score": fold.score,

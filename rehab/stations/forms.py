@@ -26,10 +26,10 @@ class PinForm(forms.ModelForm):
         max_length=MAX_LENGTH,
         widget=forms.PasswordInput(attrs={"inputmode": "numeric", "autocomplete": "new-password"}),
         help_text=_(
-            "Four to eight digits, asked for at this station’s tablet. Empty: stays as it is."
+            "Four to eight digits, asked for at this station’s tablet. Leave empty to keep it."
         ),
     )
-    no_pin = forms.BooleanField(label=_("No PIN: leaving asks a plain question"), required=False)
+    no_pin = forms.BooleanField(label=_("No PIN: leaving takes one tap more"), required=False)
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from datetime import datetime, timedelta
 
-from django.utils.dateformat import format as format_date
+from django.utils.formats import date_format
 from django.utils.translation import gettext, ngettext
 
 from rehab.stations.device_trust import find_ended
@@ -32,9 +32,7 @@ def format_last_seen(moment: datetime | None, now: datetime) -> str:
         return ngettext("seen %(count)s hour ago", "seen %(count)s hours ago", hours) % {
             "count": hours
         }
-    return gettext("seen on %(day)s") % {
-        "day": format_date(moment.astimezone(now.tzinfo), "M j, Y")
-    }
+    return gettext("seen on %(day)s") % {"day": date_format(moment.astimezone(now.tzinfo))}
 
 
 def format_device_states(devices: Collection[Device], now: datetime) -> list[tuple[Device, str]]:
@@ -53,12 +51,12 @@ def _format_state(device: Device, has_ended: bool, now: datetime) -> str:
     if device.is_revoked:
         return gettext("revoked")
     if has_ended:
-        return gettext("ended with its approver’s rights or unused: let it in again")
+        return gettext("expired, unused or with its approver’s rights: let it in again")
     if device.has_expired(now):
         return gettext("its token has expired: give it a new one")
     if device.copy_seen_at is not None:
-        return gettext("somebody used its old token on %(day)s: give it a new one") % {
-            "day": format_date(device.copy_seen_at.astimezone(now.tzinfo), "M j, Y")
+        return gettext("its old token was used on %(day)s: give it a new one") % {
+            "day": date_format(device.copy_seen_at.astimezone(now.tzinfo))
         }
     return format_last_seen(device.last_seen_at, now)
 

@@ -97,7 +97,7 @@ def start_session(
         # Two people who start the same visit would begin the next one, too: in another arm, maybe.
         if chosen_id not in (None, str(visit.pk)):
             raise InvalidSetting(
-                gettext("Somebody else has started that visit. Look at the list, then start again.")
+                gettext("Someone else has started that visit. Check the list, then start again.")
             )
         if visit.session is not None:  # it was aborted
             visit = StudyVisit(

@@ -77,7 +77,7 @@ def test_the_defaults_are_safe():
         ),
         (
             {"period": "dates", "period_from": date.min, "period_to": date(2026, 1, 1)},
-            "from Jan. 1, 1970 to Dec. 31, 2199",
+            "from 1 Jan 1970 to 31 Dec 2199",
         ),
         ({"frozen_on": date.min}, "Give a day from"),
         ({"types": "chosen"}, "at least one type"),

@@ -50,6 +50,16 @@ PT_PAGES = [
     "/sensor/",
     "/first-steps/?step=station",
     "/stations/",
+    "/caseload/",
+    "/patients/{patient}/tests/",
+    "/patients/{patient}/tests/6mwt/",
+    "/patients/{patient}/screen/check/",
+    "/patients/{patient}/family/",
+    "/sessions/two/",
+    "/https/",
+    "/recordings/check/",
+    "/studies/",
+    "/export/",
     "/incidents/",
     "/screen-size/",
     "/insight/?goal=any",
@@ -127,6 +137,37 @@ def test_pages_of_the_staff(context: BrowserContext, places: dict[str, str], pat
     page.set_viewport_size({"width": width, "height": height})
     go_dark(page)
     check(page)
+
+
+SPEAK = """
+from rehab.people.models import Patient, User
+User.everywhere.update(language="{0}")
+Patient.everywhere.update(language="{0}")
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("language", ["de", "es", "fr", "en"])
+def test_every_page_in_each_language_at_twice_its_size(
+    context: BrowserContext, server: Server, places: dict[str, str], language: str
+) -> None:
+    """A laptop's browser at 200 %: half as many pixels each way, and nothing to scroll sideways."""
+    server.run_shell(SPEAK.format(language))
+    found = []
+    for path in [*PT_PAGES, *ADMIN_PAGES, *PATIENT_PAGES]:
+        page = open_page(context, path.format(**places), "laptop")
+        page.set_viewport_size({"width": 720, "height": 450})
+        page.wait_for_load_state("networkidle")
+        assert page.locator("html").get_attribute("lang") == language, path
+        try:
+            check(page, for_patients=path in PATIENT_PAGES)
+        except pytest.fail.Exception as problem:
+            found.append(f"{path}: {problem}")
+        wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+        if wide > 0:
+            found.append(f"{path} scrolls sideways by {wide} px")
+        page.close()
+    assert found == []
 
 
 @pytest.mark.parametrize("path", PATIENT_PAGES)

@@ -114,11 +114,11 @@ def test_undo_withdraws_the_note_alone(server: Server, monitor: Page, walk: Walk
         monitor.click("[data-fall]")
         hear(robot, "stop")
         undo = monitor.locator("[data-withdraw]")
-        expect(undo).to_have_text("It was no fall (10 s)")
+        expect(undo).to_have_text("It was not a fall (10 s)")
         monitor.clock.fast_forward(3_000)
         expect(undo).to_have_text(re.compile(r"no fall \([4-7] s\)"))
         undo.click()
-        expect(monitor.locator("#strip")).to_contain_text("it was no fall")
+        expect(monitor.locator("#strip")).to_contain_text("it was not a fall")
         assert [kind for kind, _ in noted(server, walk)][2:] == ["fall", "fall_withdrawn"]
         expect(monitor.locator("[data-main]")).to_have_attribute("value", "resume")
         expect(monitor.locator("[data-show=robot-stop]")).to_have_text("Robot stopped")
@@ -271,7 +271,9 @@ def test_a_server_that_says_nothing_is_told_first_and_everything_is_gray(
         expect(monitor.locator("[data-presence=robot]")).to_contain_text("– not known for")
         expect(patient.locator(".words")).to_contain_text("No connection for")
         monitor.click("[data-robot=stop]")
-        expect(monitor.locator(".said")).to_have_text("Stop not heard. Use the robot’s own switch.")
+        expect(monitor.locator(".said")).to_have_text(
+            "The stop did not get through. Use the robot’s own switch."
+        )
         picture(monitor, "silent-server")
         picture(patient, "silent-server-patient")
         held.clear()

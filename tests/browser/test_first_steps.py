@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+import shlex
+import subprocess
+import sys
 
 import pytest
 from playwright.sync_api import expect
-from websockets.sync.client import connect
 
-from tests.support.servers import Server
+from tests.support.servers import ROOT, Server
 
 pytestmark = pytest.mark.browser
 
@@ -33,19 +34,24 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
     expect(page.get_by_text("Next step")).to_be_visible()
     expect(page.get_by_text("Skip this step")).to_be_hidden()
 
-    # The sensor gets a token, and is seen to be connected.
+    # The sensor gets a token.
     page.click("[data-step=sensor] a")
     page.fill("[name=name]", "Force plate")
     page.click("text=Save")
     token = page.locator("#token").inner_text().strip()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    page.click("text=I have copied it")
-    expect(page.locator("[data-live=sensor]")).to_contain_text("Not connected: Force plate")
-    header = {"Authorization": f"Bearer {token}"}
-    url = f"ws://127.0.0.1:{server.port}/ws/source/"
-    with connect(url, additional_headers=header) as socket:
-        socket.send(json.dumps({"type": "hello", "version": 1, "run": "a", "last": 0}))
-        expect(page.locator("[data-live=sensor].done")).to_have_text("Force plate is connected.")
+    # Its program's line is copied as it stands, and is seen to work on the same page.
+    page.click("text=simulated patient")
+    line = shlex.split(page.locator("details[open] code").last.inner_text())
+    assert line[-4:] == ["--server", server.url, "--token", token]
+    command, seen = [sys.executable, *line[1:]], page.locator("[data-live=sensor].done")
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.DEVNULL) as running:
+        try:
+            expect(seen).to_have_text("Force plate is connected.", timeout=30_000)
+            page.click("text=I have copied it")
+            expect(seen).to_have_text("Force plate is connected.")
+        finally:
+            running.terminate()
 
     # What was skipped stays open; the last step leads to a patient.
     page.click("text=Skip this step")

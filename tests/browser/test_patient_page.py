@@ -35,7 +35,7 @@ RECORD = """async (path) => {
 }"""
 
 
-UNHEARD = "Stop not heard. Use the robot’s own switch, or call your therapist."
+UNHEARD = "The stop did not get through. Use the robot’s own switch, or call your therapist."
 
 
 def looks(page: Page, look: str, words: str | re.Pattern[str] = "") -> None:
@@ -164,7 +164,7 @@ def test_a_session_from_start_to_scores(server, browser):
         page.click("text=Start")
         looks(page, "waiting", "Waiting for the sensor.")
         with feet_of(server, walk) as feet:
-            looks(page, "begin", "Begin to walk.")
+            looks(page, "begin", "Start walking.")
             feet.walk(1.0, 1.1)
             looks(page, "feedback", "Strong push!")
             assert page.locator(".said").text_content() == "Strong push. Plus 1. 2 points."
@@ -177,7 +177,7 @@ def test_a_session_from_start_to_scores(server, browser):
             assert page.evaluate(TOO_SMALL) == []
             page.click("text=No, go back")
             looks(page, "paused")
-            page.click("text=Go on")
+            page.click("text=Resume")
             looks(page, "feedback", "Strong push!")
             feet.walk(1.2, 1.0, 1.0)
             looks(page, "calm", "Just walk as you usually do.")
@@ -270,7 +270,7 @@ def test_a_page_that_is_signed_out_says_so_and_stops(server, browser):
         wire.cut()
         looks(page, "closed", "This screen has stopped.")
         expect(page.locator(".sub")).to_have_text("Please call your therapist.")
-        assert page.locator("text=Load again").is_visible()
+        assert page.locator("text=Reload").is_visible()
 
 
 @pytest.mark.essential

@@ -153,7 +153,7 @@ def test_without_the_setting_it_is_silent_until_somebody_asks(
         page.click(".pause")
         page.click(".sound")
         page.wait_for_selector(".sound[aria-pressed=true]")
-        page.click("text=Go on")
+        page.click("text=Resume")
         page.wait_for_selector("body:not([data-look=paused])")
         feet.walk(1.0)
         until_step(page, 2)

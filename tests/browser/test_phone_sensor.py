@@ -65,7 +65,7 @@ def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: V
           document.dispatchEvent(new Event("visibilitychange"));
         }""")
         presence = pt.locator("[data-presence=source]")
-        expect(presence).to_contain_text("the phone’s page is not in front")
+        expect(presence).to_contain_text("the phone is showing another page")
         expect(presence).to_have_class(re.compile(r"\blow\b"))
         phone.walk(324, 332)
         hidden = phone.strides - after
@@ -90,7 +90,7 @@ def test_a_therapist_shows_the_square_once(visit: Visit):
     page = visit("/stations/", size="laptop")
     page.click("text=A phone as a sensor")
     page.check("[name=side][value=right]")
-    page.click("text=Show the square")
+    page.click("text=Show the QR code")
     expect(page.locator(".qr svg")).to_be_visible()
     expect(page.locator("main")).to_contain_text("Phone, right shin")
     expect(page.locator("main")).to_contain_text("without https")

@@ -118,13 +118,13 @@ def test_a_passkey(page: Page, server: Server) -> None:
     sign_in(page, server)
     page.tap("a:has-text('Passkey')")
     page.fill("#name", "Laptop")
-    page.tap("text=Make a passkey")
+    page.tap("text=Create a passkey")
     expect(page.locator("h1")).to_have_text("Keep these codes")
     page.tap("text=I have them")
     expect(page.locator(".kept")).to_contain_text("Laptop")
 
     page.tap("a:has-text('Passkey')")
-    page.tap("text=Make a passkey")
+    page.tap("text=Create a passkey")
     expect(page.locator("[data-say]")).to_contain_text("already has a passkey")
     page.goto("/account/")
 

@@ -116,9 +116,9 @@ def test_a_session_is_told_in_the_languages_of_who_reads_it(
             expect(tablet.locator("body")).to_have_attribute("data-step", str(feet.number))
             is_spanish(tablet)
         pt(monitor)
-        monitor.click("[data-remark=pain]")
+        monitor.click("[data-remark=dizziness]")
         expect(monitor.locator("#strip .remark-words")).to_have_text(
-            {"es": "dolor", "en": "pain"}[language]
+            {"es": "mareo", "en": "dizziness"}[language]
         )
         pt(monitor)
         tablet.click("[data-change=pause]")
@@ -135,3 +135,26 @@ def test_a_session_is_told_in_the_languages_of_who_reads_it(
     pt(monitor)
     tablet.goto(f"/patients/{patient}/home/")
     is_spanish(tablet)
+
+
+def test_a_language_that_is_changed_in_mid_session_changes_the_page_whole(
+    server: Server, visit: Visit
+) -> None:
+    (walk,) = make_walks(server, {"phases": [{"kind": "training"}]})
+    tablet, desk = (
+        visit(path, walk, "tablet-landscape") for path in (walk.path, walk.monitor_path)
+    )
+    with feet_of(server, walk) as feet:
+        tablet.click("[data-change=start]")
+        feet.walk(1.1)
+        expect(tablet.locator("body")).to_have_attribute("data-look", "feedback")
+        is_english(tablet)
+        desk.click("a.av")  # back to the patient
+        desk.goto(f"{desk.url}screen/")
+        desk.select_option("[name=language]", "es")
+        desk.click("main form button.primary")
+        expect(tablet.locator("html")).to_have_attribute("lang", "es")
+        for performance in (1.2, 0.7):
+            feet.walk(performance)
+            expect(tablet.locator("body")).to_have_attribute("data-step", str(feet.number))
+            is_spanish(tablet)

@@ -186,7 +186,7 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
             feet.walk(1.2, 1.2)
     with serve(tmp_path) as server, pages(browser, server, walk, where) as (tablet, monitor):
         expect(monitor.locator("[data-alarm=restart]")).to_have_text(
-            "The server was restarted; nothing was lost. Go on when ready."
+            "The server was restarted; nothing was lost. Resume when ready."
         )
         expect(tablet.locator(".sub")).to_have_text("Rest now. Your score is safe.")
         monitor.locator("[data-main]").click()
@@ -225,7 +225,7 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         wire.freeze()  # nothing is closed: the Wi-Fi is just gone
         stop.click()
         expect(stop).to_have_class(re.compile("asked"))
-        unanswered = "Stop not heard. Use the robot’s own switch."
+        unanswered = "The stop did not get through. Use the robot’s own switch."
         expect(why).to_have_text(unanswered)
         expect(said).to_have_text(unanswered)
         expect(stop).not_to_have_class(re.compile("asked"))

@@ -86,7 +86,7 @@ def steer(story: Story) -> None:
     story.steps = int(story.page.evaluate("document.body.dataset.step"))
     monitor = story.monitor
     monitor.goto(f"/sessions/{story.session}/monitor/")
-    expect(monitor.locator("[data-main]")).to_contain_text("Go on")
+    expect(monitor.locator("[data-main]")).to_contain_text("Resume")
     expect(monitor.locator("[data-show=goal]")).to_have_text("3.90")
     monitor.tap("[aria-label='Goal up']")
     expect(monitor.locator("[data-show=goal]")).to_have_text("4.00")
@@ -98,7 +98,7 @@ def numbers_agree(story: Story, server: Server) -> None:
     """What stands on both pages is what is stored."""
     story.page.tap("[data-change=pause]")
     story.page.wait_for_selector("body[data-look=paused]")
-    expect(story.monitor.locator("[data-main]")).to_contain_text("Go on")
+    expect(story.monitor.locator("[data-main]")).to_contain_text("Resume")
     rows = query(server, "SELECT * FROM rehab_step WHERE session_id = ?", story.session)
     judged = [row for row in rows if row["hit"] is not None]
     hits = sum(row["hit"] for row in judged)

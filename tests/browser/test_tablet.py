@@ -40,7 +40,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         tablet.click("[data-change=pause]")  # whoever walks may always rest
         tablet.wait_for_selector("body[data-look=paused]")
         assert not tablet.is_visible("[data-change=resume]")
-        expect(pt.locator("[data-main]")).to_contain_text("Go on")
+        expect(pt.locator("[data-main]")).to_contain_text("Resume")
         pt.click("[data-end]")
         pt.click("text=End session")
         go_on_to_scores(tablet)

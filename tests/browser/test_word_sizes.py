@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page
 
+from rehab.sessions.pages.walk import COLUMNS
 from tests.support.browsers import signed_in
 from tests.support.layout import DRAWN, SCREENS, set_screen
 from tests.support.servers import Server
@@ -55,13 +56,16 @@ MEASURE = """() => {
 
 @pytest.fixture(scope="module")
 def walking(browser: Browser, server: Server) -> Iterator[Any]:
-    """Return a function that opens a page on which somebody walks, once for each set-up."""
-    pages: dict[tuple[str, str, str], Page] = {}
+    """Return a function that opens a page on which somebody walks, once for each language and type.
+
+    Sides and sizes are put on by `look`: they are attributes of the page's body.
+    """
+    pages: dict[tuple[str, str], Page] = {}
     with ExitStack() as stack:
 
-        def open_page(side: str, language: str, valence: str) -> Page:
-            if (side, language, valence) not in pages:
-                screen = {"screen_side": side, "language": language}
+        def open_page(language: str, valence: str) -> Page:
+            if (language, valence) not in pages:
+                screen = {"language": language}
                 (walk,) = make_walks(server, {"valence": valence, "screen": screen})
                 context = stack.enter_context(
                     signed_in(browser, server, walk, reduced_motion="reduce")
@@ -74,24 +78,31 @@ def walking(browser: Browser, server: Server) -> Iterator[Any]:
                 feet = stack.enter_context(feet_of(server, walk))
                 feet.walk(1.2, 0.8)
                 page.wait_for_function("() => document.body.dataset.step == 2")
-                pages[side, language, valence] = page
-            return pages[side, language, valence]
+                pages[language, valence] = page
+            return pages[language, valence]
 
         yield open_page
 
 
-def look(page: Page, screen: str, text: str, degree: float | None) -> dict[str, Any]:
+def look(page: Page, side: str, screen: str, text: str, degree: float | None) -> dict[str, Any]:
     """Return how large the page's words are on a screen of so many pixels a degree."""
-    set_screen(page, screen)
+    if page.viewport_size != dict(zip(("width", "height"), SCREENS[screen], strict=True)):
+        set_screen(page, screen)
+    column = COLUMNS.get(side, "")
     page.evaluate(
-        """([text, degree]) => {
-          document.body.dataset.text = text;
-          if (degree) document.body.dataset.pxPerMm = 1;
-          else delete document.body.dataset.pxPerMm;
-          if (degree) document.body.style.setProperty("--degree", `${degree}px`);
-          else document.body.style.removeProperty("--degree");
+        """([side, column, text, degree]) => {
+          const { dataset, style } = document.body;
+          if (column) dataset.column = column;
+          else delete dataset.column;
+          if (column) delete dataset.side;
+          else dataset.side = side;
+          dataset.text = text;
+          if (degree) dataset.pxPerMm = 1;
+          else delete dataset.pxPerMm;
+          if (degree) style.setProperty("--degree", `${degree}px`);
+          else style.removeProperty("--degree");
         }""",
-        [text, degree],
+        [side, column, text, degree],
     )
     page.evaluate(DRAWN)
     found: dict[str, Any] = page.evaluate(MEASURE)
@@ -114,11 +125,11 @@ def pixels_of_degree(screen: str) -> float:
 def test_words_are_as_large_as_promised(
     walking: Any, side: str, language: str, valence: str, screen: str, measured: bool
 ) -> None:
-    page = walking(side, language, valence)
+    page = walking(language, valence)
     degree = pixels_of_degree(screen) if measured else None
     sizes = []
     for text, factor in FACTORS.items():
-        found = look(page, screen, text, degree)
+        found = look(page, side, screen, text, degree)
         promised = (degree or found["degree"]) * factor * found["short"]
         assert found["word"] == pytest.approx(promised, rel=0.01), text
         assert found["key"] == pytest.approx(2 * promised, rel=0.01), text
@@ -164,19 +175,19 @@ def test_words_are_as_large_as_promised(
     ],
 )
 def test_common_screens_hold_the_promise(walking: Any, side: str, screen: str, text: str) -> None:
-    assert look(walking(side, "en", "positive"), screen, text, None)["short"] == 1
+    assert look(walking("en", "positive"), side, screen, text, None)["short"] == 1
 
 
 @pytest.mark.parametrize("side", ["right", "center"])
 @pytest.mark.parametrize("screen", ["tablet-portrait", "tablet-landscape"])
 def test_unmeasured_tablets_keep_the_thermometer(walking: Any, side: str, screen: str) -> None:
-    found = look(walking(side, "en", "positive"), screen, "largest", None)
+    found = look(walking("en", "positive"), side, screen, "largest", None)
     assert found["scene"]
     assert found["short"] >= KEPT_FROM
-    assert found["word"] > look(walking(side, "en", "positive"), screen, "normal", None)["word"]
+    assert found["word"] > look(walking("en", "positive"), side, screen, "normal", None)["word"]
 
 
 def test_what_no_screen_can_hold_is_told(walking: Any) -> None:
     """The largest words at 3 m on a tablet of ten inches: two letters would fill it."""
-    found = look(walking("right", "en", "positive"), "tablet-landscape", "largest", 558)
+    found = look(walking("en", "positive"), "right", "tablet-landscape", "largest", 558)
     assert (found["short"] < 0.5, found["drop"]) == (True, 3)

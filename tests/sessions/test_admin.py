@@ -97,11 +97,11 @@ def test_days_are_the_clinics_own(world, walked):
     [
         ({"hits_min": "many"}, "Enter a number"),
         ({"hits_min": "nan"}, "Enter a number"),
-        ({"hits_min": "90", "hits_max": "80"}, "It ends before it begins."),
+        ({"hits_min": "90", "hits_max": "80"}, "It ends before it starts."),
         ({"first": "2026-13-01"}, "Enter a valid date"),
         ({"first": "0001-01-01"}, "Give a day of the years 1900 to 2999."),
         ({"last": "9999-12-31"}, "Give a day of the years 1900 to 2999."),
-        ({"first": "2026-11-02", "last": "2026-11-01"}, "It ends before it begins."),
+        ({"first": "2026-11-02", "last": "2026-11-01"}, "It ends before it starts."),
         ({"who": "999999"}, "Select a valid choice"),
         ({"hits_max": "101"}, "Give 0 to 100 %"),
     ],

@@ -125,7 +125,7 @@ def test_today_lists_open_sessions_first_and_yesterdays_not_at_all(world, rosa):
     assert [state for _, state, _ in told] == ["Running", "Paused", "Finished", "Ended early"]
     assert [key for key, _, _ in told[:3]] == [runs.pk, left.pk, done.pk]
     assert told[2][2] == "75\N{NO-BREAK SPACE}%"
-    assert [line.time for line in lines][:3] == ["08:00", "Sep 14, 10:00", "09:00"]
+    assert [line.time for line in lines][:3] == ["08:00", "14 Sep, 10:00", "09:00"]
 
 
 def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monkeypatch):
@@ -138,7 +138,7 @@ def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monke
     assert [line.state for line in told["today"]] == ["Running", *["Finished"] * 3]
     assert told["today"][0].session == left
     assert told["walking"] == 1
-    assert "The session of Rosa has been open since Sep 15" in told["alerts"][0].message
+    assert "The session of Rosa has been open since 15 Sep" in told["alerts"][0].message
 
 
 def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch):
@@ -171,7 +171,7 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
     ("fields", "words"),
     [
         ({"token_expires_at": NOW}, "has expired"),
-        ({"copy_seen_at": NOW - timedelta(days=3)}, "Somebody used an old token of"),
+        ({"copy_seen_at": NOW - timedelta(days=3)}, "An old token of"),
     ],
 )
 def test_a_device_whose_token_is_over_or_was_copied_wants_attention(world, rosa, fields, words):
@@ -199,7 +199,7 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
     assert len(words) == 3
     assert words[0] == "The session of Rosa has been open since 06:00. End it."
     assert words[1].startswith("never at ")
-    assert "has never dialed in" in words[1]
+    assert "has never connected" in words[1]
     assert "revoked and shut out" in words[2]
 
 
@@ -210,7 +210,7 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
         (timedelta(seconds=90), "seen just now"),
         (timedelta(minutes=12), "seen 12 minutes ago"),
         (timedelta(hours=5), "seen 5 hours ago"),
-        (timedelta(days=3), "seen on Sep 13, 2026"),
+        (timedelta(days=3), "seen on 13 Sep 2026"),
     ],
 )
 def test_it_is_said_when_a_device_was_there(ago, words):

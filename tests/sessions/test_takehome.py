@@ -32,9 +32,9 @@ def test_it_counts_what_was_walked(world, patient):
     words = read(world, patient)
     assert "3 sessions" in words
     assert "30 steps with your trained leg" in words
-    assert "In your last session you reached the goal in 4 of 10 steps" in words
-    assert "In your best session it was 9 of 10 steps" in words
-    assert "Your longest row of steps at the goal: 6" in words
+    assert "In your last session you reached the goal with 4 of 10 steps" in words
+    assert "In your best session, with 9 of 10 steps" in words
+    assert "Your longest run of steps at the goal: 6" in words
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_one_session_has_nothing_to_be_compared_with(world, patient):
     walk(patient, "negative", [HIT] * 4)
     words = read(world, patient)
     assert "1 session " in words
-    assert "How it developed" not in words
+    assert "Your progress" not in words
     assert "best session" not in words
 
 

@@ -7,7 +7,9 @@ import re
 import pytest
 from django.urls import reverse
 
+from rehab.feedback.clinic_valences import valences_of
 from rehab.people.roles import Role
+from rehab.sessions.feedback_text_updates import change_language, session_language
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import change_session
@@ -57,6 +59,20 @@ def test_words_go_to_the_type_that_they_were_typed_for(world):
     assert words_of(session) == negative
     change_session(session, ChangeKind.VALENCE_NOW, "positive")
     assert words_of(session) == ["Push, Ana!", *before[1:]]
+
+
+def test_another_language_of_the_patient_is_that_of_the_open_session(world):
+    session, ended = begin(world), begin(world)
+    change_session(ended, ChangeKind.FINISH)
+    before = words_of(ended)
+    world.patient.language = "es"
+    world.patient.save()
+    assert change_language(world.patient, world.people[Role.PT]) == []
+    fold, spanish = SessionAggregate.load(session).fold, valences_of(session.clinic_id, "es")
+    assert fold.valences.known["negative"].bands == spanish["negative"].bands
+    assert words_of(session) == [band.words for band in spanish["positive"].bands] != before
+    assert (fold.valences.language, session_language(session)) == ("es", "es")
+    assert (words_of(ended), session_language(ended)) == (before, "en")
 
 
 def test_words_that_name_the_patient_are_refused(world):

@@ -97,7 +97,7 @@ def clinic_folder(settings, tmp_path):
 
 @pytest.mark.django_db
 def test_the_lead_makes_it_on_a_page(lead: Client, pt: Client, clinic_folder):
-    assert "Make it" in lead.get("/https/").content.decode()
+    assert "Create it" in lead.get("/https/").content.decode()
     assert "Your clinic’s lead does this." in pt.get("/https/").content.decode()
     pt.post("/https/")
     assert find_certificate() is None

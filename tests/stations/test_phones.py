@@ -24,7 +24,7 @@ pytestmark = pytest.mark.django_db
 
 def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     station = world.add_station()
-    assert "Show the square" in pt.get("/phones/pair/").content.decode()
+    assert "Show the QR code" in pt.get("/phones/pair/").content.decode()
     wish = {"station": station.pk, "place": "shank", "side": "left"}
     answer = pt.post("/phones/pair/", wish)
     assert "no-store" in answer.headers["Cache-Control"]

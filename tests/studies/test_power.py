@@ -120,7 +120,7 @@ def test_the_page_asks_shows_progress_and_refuses_with_words(world):
     page = lead.get(url).content.decode()
     assert "1 of 3 studies" in " ".join(page.split())
     assert 'value="1"' in page
-    assert "Go on" in page  # no server runs here that would
+    assert "Resume" in page  # no server runs here that would
     assert client_of(world, Role.PT).get(url).status_code == 403
     assert client_of(world, Role.RESEARCHER).get(url).status_code == 403  # of a draft
     go_on = reverse("power-run", args=[run.pk])

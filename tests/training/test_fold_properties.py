@@ -60,7 +60,10 @@ changes = st.builds(
             Change(ChangeKind.VALENCE, slug),
             Change(ChangeKind.VALENCE_NOW, slug),
             Change(ChangeKind.FEEDBACK_TEXT, {"valence": slug, "bands": bands_to_json(ONE_BAND)}),
-            Change(ChangeKind.FEEDBACK_TEXT, {"valence": slug, "bands": bands_to_json(TWO_BANDS)}),
+            Change(
+                ChangeKind.FEEDBACK_TEXT,
+                {"valence": slug, "bands": bands_to_json(TWO_BANDS), "language": "es"},
+            ),
         ]
     )
 )

@@ -21,6 +21,7 @@ from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.consent.services import current_text
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.feedback_text_updates import change_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
@@ -130,6 +131,7 @@ def edit_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, now=timezone.now(), instance=patient)
     if request.method == "POST" and form.save_or_report():
+        _speak(request, form)
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
     return render(request, "patients/form.html", context)
@@ -150,9 +152,17 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
             initial["screen_side"] = proposal.side.value
     form = ScreenForm(request.POST or None, instance=patient, initial=initial)
     if request.method == "POST" and form.save_or_report():
+        _speak(request, form)
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": patient, "checked": is_checked, "count": seen.count("1")}
     return render(request, "patients/screen_form.html", context | {"of": len(LETTERS)})
+
+
+def _speak(request: HttpRequest, form: PatientForm | ScreenForm) -> None:
+    """Let open sessions go on in the patient's language, where a form has changed that."""
+    if "language" in form.changed_data:
+        for problem in change_language(form.instance, user_of(request)):
+            messages.error(request, problem)
 
 
 @for_roles(Role.LEAD, Role.PT)

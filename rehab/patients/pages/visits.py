@@ -53,7 +53,7 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
         visit, *_later = [
             plan_visit(patient, day + timedelta(weeks=week), at) for week in range(weeks)
         ]
-        when = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
+        when = format_date(visit.day, _("l j F")) + (f", {visit.at:%H:%M}" if visit.at else "")
         names = {"name": patient.nickname, "when": when, "count": weeks}
         message = ngettext(
             "%(name)s is expected on %(when)s.",
@@ -68,7 +68,7 @@ def _parse_weeks(given: str) -> int:
     """Return for how many weeks a visit is planned. Raises InvalidVisitDay."""
     if not (given.isascii() and given.isdecimal() and 1 <= int(given[:3]) <= MAX_WEEKS):
         raise InvalidVisitDay(
-            _("Plan a visit for 1 to %(most)s weeks at once.") % {"most": MAX_WEEKS}
+            _("Plan visits for 1 to %(most)s weeks at a time.") % {"most": MAX_WEEKS}
         )
     return int(given)
 

@@ -108,7 +108,7 @@ class PatientAdmin(ScopedAdmin):
     def boards_agreed(self, patient: Patient) -> Any:
         """Return the boards the patient has consented to, with a link to the consent page."""
         if patient.is_new:
-            return _("Noted on the patient's consent page, once the patient is here.")
+            return _("To be noted on the patient's consent page, once the patient is here.")
         return format_html(
             '{} · <a href="{}">{}</a>',
             patient.get_boards_display(),

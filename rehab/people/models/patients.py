@@ -78,7 +78,7 @@ class Patient(ClinicModel):
     nickname = models.CharField(
         _("nickname"),
         max_length=32,
-        help_text=_("What the screens say, so that patient and therapist can check."),
+        help_text=_("Shown on the screens, so that patient and therapist can check."),
     )
     pseudonym = models.CharField(
         _("pseudonym"), max_length=16, unique=True, default=generate_pseudonym, editable=False
@@ -103,13 +103,13 @@ class Patient(ClinicModel):
         null=True,
         blank=True,
         validators=between(1900, 2100),
-        help_text=_("Researchers see the ten years of age alone."),
+        help_text=_("Researchers see only the decade of age."),
     )
     stroke_month = models.DateField(
         _("month of the stroke"),
         null=True,
         blank=True,
-        help_text=_("Researchers see the months since then alone."),
+        help_text=_("Researchers see only the months since then."),
     )
     severity = models.CharField(_("severity"), max_length=8, choices=Severity.choices, blank=True)
     language = models.CharField(_("language"), max_length=8, choices=language_choices, default="en")
@@ -120,14 +120,16 @@ class Patient(ClinicModel):
         _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL
     )
     screen_still = models.BooleanField(
-        _("calm page"), default=False, help_text=_("No confetti, and nothing moves but the level.")
+        _("calm page"),
+        default=False,
+        help_text=_("No confetti, and nothing moves except the level."),
     )
     screen_sounds = models.BooleanField(
         _("sounds"),
         default=False,
         help_text=_(
-            "A soft tone a step, the higher the better; a second one for points. "
-            "The patient can mute it on the page."
+            "A soft tone for each step, the higher the better; a second one for points. The "
+            "patient can mute it on the page."
         ),
     )
     boards = models.CharField(

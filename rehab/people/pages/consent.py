@@ -35,7 +35,7 @@ MEANINGS = {
     ),
     Purpose.BOARDS: gettext_lazy("Results stand beside those of others, under an animal's name."),
     Purpose.REMOTE: gettext_lazy("A therapist may watch a session from another place."),
-    Purpose.FAMILY: gettext_lazy("People whom the patient chooses see how the training goes."),
+    Purpose.FAMILY: gettext_lazy("People whom the patient chooses see how the training is going."),
 }
 LEVELS = {
     BoardsConsent.OWN: gettext_lazy("No"),

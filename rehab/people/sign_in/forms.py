@@ -15,12 +15,12 @@ from rehab.people.models import User
 from rehab.people.sign_in import lockout
 from rehab.people.sign_in.factors import factors
 
-WRONG_LOGIN = _("Name and password do not fit. Look at capitals, and try again.")
+WRONG_LOGIN = _("Name and password do not match. Check capital letters, and try again.")
 WRONG_PASSWORD = _("That is not your password.")
-WRONG_FIRST_CODE = _("This code does not fit. Look at the app again.")
+WRONG_FIRST_CODE = _("This code is not right. Check the app again.")
 WRONG = {
     "password": WRONG_PASSWORD,
-    "code": _("This code does not fit, or was used. Wait for the next one, and try again."),
+    "code": _("This code is not right, or has been used. Wait for the next one, and try again."),
     "passkey": _("This passkey was not accepted. Try again, or type a code."),
 }
 

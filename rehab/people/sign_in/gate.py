@@ -114,5 +114,5 @@ def _words(languages: str, wait_s: int) -> bytes:
 
 
 def _refusal(wait_s: int) -> bytes:
-    words = _("Too many tries to sign in. Wait %(seconds)d seconds, and try again.")
+    words = _("Too many attempts to sign in. Wait %(seconds)d seconds, and try again.")
     return (words % {"seconds": wait_s}).encode()

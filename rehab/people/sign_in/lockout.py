@@ -104,7 +104,7 @@ def lockout_message(request: HttpRequest) -> str:
         return ""
     minutes = -(-lockout_s(request) // 60)
     return ngettext(
-        "Too many wrong tries. Try again in a minute, or ask your clinic’s lead to unlock you.",
+        "Too many wrong attempts. Try again in a minute, or ask your clinic’s lead to unlock you.",
         "Too many wrong tries. Try again in %(minutes)d minutes, or ask your clinic’s lead to "
         "unlock you.",
         minutes,
@@ -130,5 +130,5 @@ class LockoutMiddleware:
         if not isinstance(exception, HashingBusy):
             return None
         _note_lockout(request, timedelta(seconds=BUSY_S))
-        words = _("Too many people sign in at this moment. Wait a little, and try again.")
+        words = _("Too many people are signing in right now. Wait a moment, and try again.")
         return render(request, "people/sign_in/busy.html", {"words": words}, status=429)

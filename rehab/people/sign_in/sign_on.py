@@ -136,8 +136,8 @@ def find_account(claims: Mapping[str, Any]) -> User:
             return create_account(claims, groups[0])
         raise SignOnRefused(
             _(
-                "No account here belongs to your hospital account. Sign in with name and password "
-                "once, and link it under Your account."
+                "No account here is linked to your hospital account. Sign in once with name and "
+                "password, and link it under Your account."
             )
         )
     if not user.is_active:

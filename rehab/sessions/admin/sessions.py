@@ -130,7 +130,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         """The time of day when it was started."""
         if session.started_at is None:
             return None
-        return f"{clinic_time(session.started_at, session.clinic):%H:%M:%S}"
+        return f"{clinic_time(session.started_at, session.clinic):%H:%M}"
 
     @admin.display(description=_("duration"), ordering="active_s")
     def duration(self, session: TrainingSession) -> str:

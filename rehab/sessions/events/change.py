@@ -89,6 +89,10 @@ def _value(fold: SessionFold, control: Control) -> Message:
 # The message of a change for each audience (`Control.payloads`).
 PAYLOADS: dict[tuple[Audience, Payload], Callable[[SessionFold, Control, ChangeValue], Message]] = {
     (Audience.PATIENT, Payload.STATE): lambda fold, _control, _value: _state(fold),
+    (Audience.PATIENT, Payload.LANGUAGE): lambda fold, control, _value: {
+        "kind": str(control.kind),
+        "language": fold.valences.language,
+    },
     (Audience.PATIENT, Payload.PHASE): lambda fold, _control, _value: _phase_for_patient(fold),
     (Audience.MONITOR, Payload.KIND): lambda fold, control, value: _marked(
         fold, control, value, {}

@@ -95,9 +95,7 @@ def snapshot(
             **describe_rates(fold.feedback),
             "obstacle": fold.obstacle,
             "robot": dict(robot),
-            "phases": [
-                describe_phase(plan, index, fold.valence) for index in range(len(plan.phases))
-            ],
+            "phases": [describe_phase(fold, index) for index in range(len(plan.phases))],
         }
     return message
 

@@ -8,6 +8,7 @@ from datetime import datetime
 from operator import attrgetter
 from typing import NamedTuple
 
+from rehab.feedback.translation import translate
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.log import Step
 from rehab.sessions.payloads import (
@@ -17,6 +18,7 @@ from rehab.sessions.payloads import (
     describe_walked,
 )
 from rehab.training.bands import Band
+from rehab.training.closeness import CLOSE_WORDS
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
@@ -39,12 +41,14 @@ class StepContext(NamedTuple):
     words_shown: bool
     chart_style: str
     answer_count: int  # answers before it
+    language: str  # of its words
 
     @classmethod
     def of(cls, fold: SessionFold) -> StepContext:
         """Return the context of the next step."""
         return cls(
-            fold.phase, fold.valence, fold.words_shown, fold.chart_style, fold.delivery.answer_count
+            *(fold.phase, fold.valence, fold.words_shown, fold.chart_style),
+            *(fold.delivery.answer_count, fold.valences.language),
         )
 
 
@@ -134,7 +138,10 @@ def patient_step(
         return _summary(plan, context, step, answer, score, streak, live=live)
     valence, band = context.valence, context.valence.band(step.performance)
     if step.close:
-        band = Band(0, plan.close_steps.words)
+        words = plan.close_steps.words
+        if context.language != plan.language:
+            words = translate(CLOSE_WORDS, context.language)
+        band = Band(0, words)
     return {
         "kind": "step",
         "number": step.number,

@@ -80,6 +80,6 @@ def _check_room(host: Host, live: LiveSession) -> None:
     there = (one for one in host.sessions.values() if one.clinic_id == live.clinic_id)
     if sum(one.is_running for one in there) >= MAX_RUNNING:
         raise NotAllowed(
-            "{limit} sessions of this clinic run already. End one of them first.",
+            "{limit} sessions of this clinic are already running. End one of them first.",
             limit=MAX_RUNNING,
         )

@@ -11,6 +11,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
 from django.utils.formats import date_format
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_safe
@@ -125,7 +126,7 @@ def to_row(
     return {
         "session": session,
         "week": gettext("Week of %(day)s") % {"day": date_format(monday, "DATE_FORMAT")},
-        "day": format_day(start.date(), now.date()).capitalize(),
+        "day": capfirst(format_day(start.date(), now.date())),
         "time": f"{start:%H:%M}",
         "duration": format_duration(session.active_s),
         "goal": format_number(session.goal),

@@ -72,7 +72,7 @@ def check_recording(request: HttpRequest) -> HttpResponse:
             context["problems"] = [_refusal()]
         elif context["mass"].strip() and mass_kg is None:
             context["problems"] = [
-                _("Give the body mass in kg, %(least)d to %(most)d.")
+                _("Enter the body mass in kg, %(least)d to %(most)d.")
                 % {"least": MASS_MIN_KG, "most": MASS_MAX_KG}
             ]
         else:
@@ -100,7 +100,7 @@ def _answer(request: HttpRequest, files: list[Path], mass_kg: float | None) -> d
     try:
         columns = write_columns(chosen, time)
     except ValueError as problem:
-        problems = [_("%(text)s is no number.") % {"text": problem}]
+        problems = [_("%(text)s is not a number.") % {"text": problem}]
         checked = check_upload(files, mass_kg, is_overground=is_overground)
         return _describe(checked, chosen) | {"problems": problems}
     name = name_recording(asked.get("name", ""))

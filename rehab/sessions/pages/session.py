@@ -8,6 +8,7 @@ from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.views.decorators.http import require_http_methods, require_safe
 
@@ -49,7 +50,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "session": session,
         "by_name": by_name,
         "who": session.patient.nickname if by_name else session.patient.pseudonym,
-        "day": format_day(start.date(), now.date()).capitalize(),
+        "day": capfirst(format_day(start.date(), now.date())),
         "time": f"{start:%H:%M}",
         "state": format_state(session.state),
         "open": State(session.state) in OPEN_STATES,
@@ -90,7 +91,9 @@ def correct(request: HttpRequest, session_id: int) -> HttpResponse:
         TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
     )
     if not can_correct(session):
-        messages.error(request, gettext("This session still runs. End it before you correct it."))
+        messages.error(
+            request, gettext("This session is still running. End it before you correct it.")
+        )
         return redirect("session", session_id=session.pk)
     form = CorrectionForm(request.POST or None, session=session, by=user)
     if request.method == "POST" and form.create(timezone.now()):

@@ -7,6 +7,7 @@ from csp.decorators import csp_replace
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
+from django.utils import translation
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
@@ -15,6 +16,7 @@ from rehab.people.models import ScreenSide
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
+from rehab.sessions.feedback_text_updates import session_language
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.monitor import redirect_to_consent
 from rehab.sessions.pages.screen_size import screen_of
@@ -42,7 +44,9 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
         return redirect_to_consent(request, session.patient)
     mirror = "mirror" in request.GET
     activate_patient_language(session.patient)
-    if State(session.state) in ENDED_STATES and not mirror:
+    if State(session.state) not in ENDED_STATES:
+        translation.activate(session_language(session))  # with its words
+    elif not mirror:
         return redirect("scores", session_id=session.pk)
     context = {
         "session": session,

@@ -95,16 +95,16 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
 def describe_today(today: Result, last: Result | None) -> str:
     """Return one sentence that is true of today and last time, and puts no blame."""
     if last is None:
-        return _("Next time you can compare with today.")
+        return _("Next time you can compare it with today.")
     match today.compare_goal(last), today.compare_hits(last):
         case Change.MORE, Change.LESS:
             return _("The goal was higher than last time.")
         case Change.MORE, _hits:
-            return _("The goal was higher than last time, and you reached it as often.")
+            return _("The goal was higher than last time, and you reached it just as often.")
         case Change.LESS, _hits:
             return _("The goal was lower than last time.")
         case _goal, Change.LESS:
-            return _("Fewer steps at the goal than last time. Days differ.")
+            return _("Fewer steps at the goal than last time. Every day is different.")
         case _goal, Change.MORE:
             return _("More steps at the goal than last time.")
         case _:

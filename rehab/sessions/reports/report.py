@@ -11,7 +11,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
-from rehab.sessions.conditions import format_noted
+from rehab.sessions.conditions import CONDITIONS, format_noted
 from rehab.sessions.formatting import (
     clinic_time,
     format_change,
@@ -133,19 +133,19 @@ def _summarize_remarks(
         {
             "name": capfirst(EVENTS[kind]),
             "count": 0 if kind in with_value else len(times[kind]),
-            "times": _join(times[kind]),
+            "times": _join(times[kind], 2 if kind in CONDITIONS else MAX_TIMES),
             "adverse": kind in ADVERSE,
         }
         for kind in order
     ]
 
 
-def _join(entries: list[str]) -> str:
-    """Join entries; of many, the first ones, how many are omitted, and the last."""
-    if len(entries) <= MAX_TIMES:
+def _join(entries: list[str], most: int) -> str:
+    """Join entries; of more than so many, the first ones, how many are omitted, and the last."""
+    if len(entries) <= most:
         return ", ".join(entries)
-    more = _("%(count)s more") % {"count": len(entries) - MAX_TIMES}
-    return ", ".join([*entries[: MAX_TIMES - 1], f"… {more} …", entries[-1]])
+    more = _("%(count)s more") % {"count": len(entries) - most}
+    return ", ".join([*entries[: most - 1], f"… {more} …", entries[-1]])
 
 
 def _describe_robot(events: list[SessionEvent]) -> str:

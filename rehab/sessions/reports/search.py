@@ -75,7 +75,7 @@ class SessionSearchForm(forms.Form):
         for low, high in (("first", "last"), *((f"{n}_min", f"{n}_max") for n in RANGES)):
             start, end = data.get(low), data.get(high)
             if start is not None and end is not None and start > end:
-                self.add_error(high, ValidationError(gettext("It ends before it begins.")))
+                self.add_error(high, ValidationError(gettext("It ends before it starts.")))
         return data
 
     def filter_sessions(self, sessions: QuerySet[Any], zone: str) -> QuerySet[Any]:

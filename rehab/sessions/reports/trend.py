@@ -10,6 +10,7 @@ from datetime import datetime
 from typing import Any
 
 from django.db.models import Avg, Count, Exists, F, OuterRef, Q, QuerySet, Subquery
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 
 from rehab.people.models import User
@@ -212,7 +213,7 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
 
     def day(point: TrendPoint) -> str:
         start = starts[point.session.pk]
-        label = format_day(start.date(), now.date()).capitalize()
+        label = capfirst(format_day(start.date(), now.date()))
         label = f"{label} {start:%H:%M}" if per_day[start.date()] > 1 else label
         is_imported = point.session.legacy_id is not None
         return f"{label} · {gettext('imported')}" if is_imported else label

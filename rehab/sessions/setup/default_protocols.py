@@ -112,7 +112,7 @@ PROTOCOLS: dict[str, Template] = {
     ),
     gettext_noop("Thirty minutes with catch blocks, first visit"): Template(
         gettext_noop(
-            "The same for somebody who has never had feedback: a try, then 100, 95, 90 and 85 %."
+            "The same for someone who has never had feedback: a trial, then 100, 95, 90 and 85 %."
         ),
         FIRST_VISIT,
     ),

@@ -76,7 +76,7 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
     return None
 
 
-def tablet_address(request: HttpRequest) -> dict[str, str]:
+def tablet_address(request: HttpRequest) -> dict[str, Any]:
     """Return the address that a tablet opens, and its drawing to scan; empty without one."""
     secure = secure_host()
     host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
@@ -84,7 +84,8 @@ def tablet_address(request: HttpRequest) -> dict[str, str]:
         return {"address": "", "qr": ""}
     address = f"{'https' if secure else request.scheme}://{host}{reverse('tablet')}"
     drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
-    return {"address": address, "qr": drawing}
+    own_certificate = bool(secure) and not settings.CERTIFICATE
+    return {"address": address, "qr": drawing, "own_certificate": own_certificate}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)

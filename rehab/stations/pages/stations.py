@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django.contrib import messages
 from django.core.exceptions import PermissionDenied
 from django.db.models import Prefetch
@@ -21,6 +23,7 @@ from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_device_states
+from rehab.stations.programs import PROGRAMS
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)
@@ -93,7 +96,11 @@ def change_device(request: HttpRequest, device_id: int) -> HttpResponse:
 
 def show_token(request: HttpRequest, device: Device, token: str) -> HttpResponse:
     """Return the page with a new token: the answer itself, since no cookie may keep it."""
-    return render(request, "stations/token.html", {"device": device, "token": token})
+    context: dict[str, Any] = {"device": device, "token": token}
+    if device.kind == Device.Kind.SOURCE:
+        server = f"{request.scheme}://{request.get_host()}"
+        context["programs"] = [(one.kind, one.command(server, token)) for one in PROGRAMS]
+    return render(request, "stations/token.html", context)
 
 
 def _find_station(request: HttpRequest, station_id: int) -> Station:

@@ -134,7 +134,7 @@ def _store(request: HttpRequest, study: Study, form: AdverseEventForm, proposed:
         return True
     wanted = request.POST.get("entry", "")
     if wanted and wanted not in proposed:
-        messages.warning(request, _("This was judged already. Load the page again."))
+        messages.warning(request, _("This was judged already. Reload the page."))
         return True
     if not form.is_valid():
         return False

@@ -150,7 +150,7 @@ def record(event: AdverseEvent, now: datetime) -> AdverseEvent:
         raise InvalidSetting(gettext("Say what happened."))
     if event.entry is not None:
         if AdverseEvent.everywhere.filter(entry=event.entry).exists():
-            raise InvalidSetting(gettext("This was judged already. Load the page again."))
+            raise InvalidSetting(gettext("This was judged already. Reload the page."))
         event.what = event.what or event.entry.kind
     event.at = event.entry.at if event.entry is not None else now
     event.save()

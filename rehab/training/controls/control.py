@@ -36,6 +36,7 @@ class Payload(StrEnum):
     """What an audience is sent of a change; ``rehab.sessions.events`` builds each."""
 
     KIND = "kind"  # that it happened
+    LANGUAGE = "language"  # of the words that are now in force
     VALUE = "value"  # the value that is now in force
     STATE = "state"  # the session's state and who paused it
     PHASE = "phase"  # the phase that the next step falls in

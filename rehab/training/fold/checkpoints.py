@@ -38,6 +38,7 @@ def fold_to_json(fold: SessionFold) -> dict[str, Any]:
         "pause_reason": None if fold.pause_reason is None else fold.pause_reason.value,
         "valence": fold.valence.slug,
         "next_valence": fold.valences.next_slug,
+        "language": fold.valences.language,
         "last_times_s": {side.value: time_s for side, time_s in fold.last_times_s.items()},
         "switches": fold.valences.switches,
         "settings": {
@@ -100,6 +101,7 @@ def fold_from_json(plan: SessionPlan, data: Mapping[str, Any]) -> SessionFold | 
         Block(phase, gain, valence): Tally(**tally)
         for phase, gain, valence, tally in data["blocks"]
     }
+    fold.valences.language = data.get("language", plan.language)
     known = fold.valences.known
     for slug, bands in data["bands"].items():
         known[slug] = replace(known[slug], bands=bands_from_json(bands))

@@ -29,15 +29,19 @@ class ValenceCourse:
         The one that the next phase with feedback begins with; empty for no change.
     switches
         After which step it changed to which.
+    language
+        Of the present words: the plan's, unless the patient's was changed since.
     """
 
     plan: SessionPlan
+    language: str = field(init=False)
     known: dict[str, Valence] = field(init=False)
     current: Valence = field(init=False)
     next_slug: str = ""
     switches: list[tuple[int, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.language = self.plan.language
         self.known = {one.slug: one for one in (self.plan.valence, *self.plan.alternatives)}
         self.current = self.plan.valence
 
@@ -116,9 +120,9 @@ class ValenceCourse:
             )
 
     def edit_text(self, value: object) -> None:
-        """Replace the bands of a valence. What a step earns stays as it was planned.
+        """Replace the bands of a valence, and the language of all words where one is given.
 
-        Raises InvalidSetting.
+        What a step earns stays as it was planned. Raises InvalidSetting.
         """
         given = value if isinstance(value, Mapping) else {}
         slug = given.get("valence")
@@ -126,6 +130,7 @@ class ValenceCourse:
             raise InvalidSetting("Words are given with their valence, one of the session's.")
         worded = replace(self.known[slug], bands=bands_from_json(given.get("bands")))
         self.known[slug] = worded
+        self.language = str(given.get("language") or self.language)
         if self.current.slug == slug:
             self.current = worded
 

@@ -16,7 +16,7 @@ const FIRST_STRIDE_S = 10; // a walk needs longer to begin
 const RESTART_S = 15; // after which what has not come back is told
 const SEEN = _("I have seen it");
 const STORAGE = {
-  late: _("The database does not answer: strides wait, and the robot stands still."),
+  late: _("The database is not answering: strides are waiting, and the robot is standing still."),
   disk_full: _("The server’s disk is full: strides are not stored. Make room on it."),
 };
 const PAUSES = {
@@ -53,21 +53,21 @@ function describeOwnStop(session) {
 
 function describeRestart({ state, pause_reason: reason }) {
   if (state !== "paused" || reason !== "restart") return "";
-  return _("The server was restarted; nothing was lost. Go on when ready.");
+  return _("The server was restarted; nothing was lost. Resume when ready.");
 }
 
 function describeSource({ presence, state: sessionState }, { state }) {
   if (sessionState !== "running") return "";
   if (!presence.source) {
-    return _("The sensor is not connected. Look at its switch and its cable, or pause.");
+    return _("The sensor is not connected. Check its switch and its cable, or pause.");
   }
   const running = state.sinceRunning_s;
   const isFirst = presence.stride_ago_s == null;
   const silent = isFirst ? running : Math.min(running, state.strideAgo_s);
   if (silent < (isFirst ? FIRST_STRIDE_S : SILENT_S.stride)) return "";
   const text = isFirst
-    ? _("No stride for %(count)s s. Does the patient walk? Look at the sensor, or pause.")
-    : _("The sensor is silent for %(count)s s. Does the patient walk? Look at the sensor, or pause.");
+    ? _("No stride for %(count)s s. Is the patient walking? Check the sensor, or pause.")
+    : _("The sensor has been silent for %(count)s s. Is the patient walking? Check the sensor, or pause.");
   return fill(text, { count: Math.floor(silent) });
 }
 
@@ -77,13 +77,13 @@ function describeDoubt(session, { state }) {
 
 function describeTablet(session, { state }) {
   if (!hasStarted(session) || !state.hadTablet || state.isTabletHeard) return "";
-  return _("The tablet is lost: the patient sees no feedback. Look at its screen and its Wi-Fi, or pause.");
+  return _("The tablet has dropped out: the patient sees no feedback. Check its screen and its Wi-Fi, or pause.");
 }
 
 function describeRobot(session, { state, robot }) {
   if (!hasStarted(session)) return "";
   if (state.hadRobot && !session.presence.robot) {
-    return _("The robot is lost: it stands still. Look at its switch and its network.");
+    return _("The robot has dropped out and is standing still. Check its switch and its network.");
   }
   return robot.alarm;
 }
@@ -91,7 +91,7 @@ function describeRobot(session, { state, robot }) {
 function describePause({ state, pause_reason: reason, rest_s: rest }) {
   if (state !== "paused") return "";
   const why = fill(PAUSES[reason] ?? _("Paused."), { time: clock(rest ?? 0) });
-  return reason === "therapist" ? why : `${why} ${_("Go on when ready.")}`;
+  return reason === "therapist" ? why : `${why} ${_("Resume when ready.")}`;
 }
 
 export const CAUSES = [

@@ -14,13 +14,13 @@ function ago(seconds) {
 
 // What a worn sensor says of itself; its strides are invalid meanwhile.
 const TROUBLES = {
-  hidden: _("the phone’s page is not in front"),
+  hidden: _("the phone is showing another page"),
   slow: _("the phone measures too slowly: charge it, turn off power saving"),
   gap: _("the phone missed samples"),
   moved: _("the sensor has moved: is the strap tight?"),
-  elsewhere: _("it sits otherwise than last time: strap it on as before, or take a new baseline"),
+  elsewhere: _("it sits differently from last time: strap it on as before, or take a new baseline"),
   battery: _("the phone’s battery is low"),
-  doubt: _("unsure how it is worn: stand still, lift the toes (shin: swing the leg forward) once"),
+  doubt: _("unsure how it is worn: stand still, then lift the toes once (shin: swing the leg forward)"),
 };
 
 // Within which two phones' clocks have to agree for their steps to be compared (static/js/sensor/symmetry.js).
@@ -64,7 +64,7 @@ function describeSource(isThere, strides, silent_s, isRunning, trouble) {
 }
 
 function describeTablets(count, silent_s, isHeard) {
-  if (!count) return ["–", _("none; only this mirror")];
+  if (!count) return ["–", _("none: only this mirror shows the page")];
   const what = count > 1 ? fill(_("%(count)s connected"), { count }) : _("connected");
   if (silent_s === null) return ["✓", what];
   if (!isHeard) return ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];

@@ -120,7 +120,7 @@ export class RobotPanel {
   }
 
   #reportUnanswered(order) {
-    const stop = _("Stop not heard. Use the robot’s own switch.");
+    const stop = _("The stop did not get through. Use the robot’s own switch.");
     this.#reportFailure(order === "stop" ? stop : _("No answer. Try again."));
   }
 
@@ -211,8 +211,8 @@ export class RobotPanel {
 
   #describeHold() {
     const reason = this.#isConnected && this.#status?.reason;
-    if (this.#isHeld) return fill(_("It stands: %(why)s."), { why: describeReason(this.#stopReason) });
-    return NOTABLE.has(reason) ? fill(_("It would not move: %(why)s."), { why: describeReason(reason) }) : "";
+    if (this.#isHeld) return fill(_("It is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
+    return NOTABLE.has(reason) ? fill(_("It will not move: %(why)s."), { why: describeReason(reason) }) : "";
   }
 
   #describeCure() {
@@ -233,7 +233,7 @@ export class RobotPanel {
   get alarm() {
     if (!this.#isConnected || this.#isRecovering) return "";
     if (!this.#isStopped && this.#status?.state !== "stopped") return "";
-    const why = fill(_("The robot stands: %(why)s."), { why: describeReason(this.#stopReason) });
+    const why = fill(_("The robot is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
     return [why, cureOf(this.#stopReason)].filter(Boolean).join(" ");
   }
 
@@ -246,7 +246,7 @@ export class RobotPanel {
   // Return [sign, text] of whether it may take part.
   get readiness() {
     if (!this.#isConnected) return ["–", _("No robot")];
-    if (this.#isHeld) return ["!", _("Robot stopped: let it move first, in its panel")];
+    if (this.#isHeld) return ["!", _("Robot stopped: first let it move again, in its panel")];
     return this.connection.isLow ? ["!", `${_("Robot")}: ${this.connection.text}`] : ["✓", _("Robot")];
   }
 

@@ -11,7 +11,7 @@ const REASONS = {
   late: _("the steps came late"),
   performing: _("still moving"),
   resting: _("resting"),
-  unknown_gesture: _("it does not know the gesture"),
+  unknown_gesture: _("it does not know this gesture"),
   bad_gesture: _("it cannot perform the gesture; compose it anew"),
   base_cannot_move: _("this robot cannot move"),
   stopped: _("it was stopped"),
@@ -40,7 +40,7 @@ const REASONS = {
   other_driver: _("another program drives it"),
   unordered_motion: _("something moved it"),
   open_loop: _("too far for a robot that does not know where it is"),
-  place_unknown: _("nobody has looked for long whether it is at its place"),
+  place_unknown: _("nobody has checked for a while that it is on its mark"),
   firmware_unknown: _("the base's version is not known yet"),
   firmware_refused: _("the base's version is too old"),
   paused: _("the session paused"),
@@ -62,28 +62,28 @@ const GESTURES = {
   sway: _("it sways"),
   greeting: _("it greets"),
   rest: _("it rests"),
-  farewell: _("it takes leave"),
-  idle: _("it moves a little, and answers nothing"),
+  farewell: _("it says goodbye"),
+  idle: _("it moves a little while it waits"),
   joy: _("it celebrates"),
   streak_3: _("it celebrates 3 in a row"),
   streak_5: _("it celebrates 5 in a row"),
   streak_10: _("it celebrates 10 in a row"),
   comeback: _("it celebrates the comeback"),
   near_miss: _("it shows that this was close"),
-  effort: _("it answers the effort"),
+  effort: _("it rewards the effort"),
   disappointment: _("it droops"),
 };
 
 // What has to be done before it may move again.
 const CURES = {
-  away_from_home: _("Carry it back, turned as it stood."),
+  away_from_home: _("Carry it back to its mark, facing as before."),
   bump: _("Clear its way."),
-  cliff: _("Take it away from the edge."),
+  cliff: _("Move it away from the edge."),
   wheel_drop: _("Put it down on both wheels."),
   over_current: _("Free its wheels."),
   stalled: _("Free its wheels."),
-  slipped: _("Look at the floor and its wheels."),
-  base_silent: _("Look at its switch and its cable."),
+  slipped: _("Check the floor and its wheels."),
+  base_silent: _("Check its switch and its cable."),
   charging: _("Take it off the charger."),
   battery_low: _("Charge it."),
   battery_empty: _("Charge it."),
@@ -110,11 +110,11 @@ export const describeState = (state) => STATES[state] ?? state;
 
 // What a window came to and what followed; `breakReason`: why the gesture after it did not end as it should.
 export function describeDecision(decision, breakReason) {
-  if (!decision) return _("It answers each five seconds of walking.");
+  if (!decision) return _("It responds to every five seconds of walking.");
   const { mean, threshold, gesture, intensity, pool, reason } = decision;
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
-  return fill(_("The last five seconds: %(mean)s of the goal, it celebrates from %(threshold)s: %(what)s."), {
+  return fill(_("Last five seconds: %(mean)s of the goal. It celebrates from %(threshold)s: %(what)s."), {
     mean: percent(mean),
     threshold: percent(threshold),
     what: gesture ? describeGesture(gesture) + (pool ? "" : size) + end : describeReason(reason),

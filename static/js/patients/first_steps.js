@@ -15,14 +15,15 @@ async function look() {
 
 function draw(slug, isDone, words) {
   const step = root.querySelector(`[data-step=${slug}]`);
-  const sign = step.querySelector("[data-sign]");
-  step.classList.toggle("done", isDone);
-  sign.textContent = isDone ? "✓" : sign.dataset.sign;
+  const sign = step?.querySelector("[data-sign]");
+  step?.classList.toggle("done", isDone);
+  if (sign) sign.textContent = isDone ? "✓" : sign.dataset.sign;
   const live = root.querySelector(`[data-live=${slug}]`);
   if (!live) return;
   live.classList.toggle("done", isDone);
   if (live.textContent !== words) live.textContent = words;
   const next = root.querySelector("[name=skip]");
+  if (!next) return;
   next.classList.toggle("primary", isDone);
   next.classList.toggle("quiet", !isDone);
   for (const label of next.children) label.hidden = (label.dataset.when === "done") !== isDone;

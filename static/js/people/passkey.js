@@ -13,7 +13,7 @@ for (const form of document.querySelectorAll("[data-passkey]")) {
   const isSupported = window.PublicKeyCredential?.parseCreationOptionsFromJSON;
   if (!isSupported) {
     form.querySelector("button").disabled = true;
-    status.textContent = _("This browser knows no passkeys. Take a newer one, or an authenticator app.");
+    status.textContent = _("This browser does not support passkeys. Use a newer one, or an authenticator app.");
     continue;
   }
   form.addEventListener("submit", async (event) => {

@@ -34,8 +34,8 @@ const LINKS = {
   "other leg": _("connected, for the steps’ symmetry: the other leg is trained"),
   lost: _("no network: strides are kept and sent later"),
   "no session": _("waiting for a session"),
-  unauthorized: _("This square is no longer valid. Show a new one on the therapist’s page."),
-  replaced: _("Another phone has scanned this square. Show a new one on the therapist’s page."),
+  unauthorized: _("This QR code is no longer valid. Show a new one on the therapist’s page."),
+  replaced: _("Another phone has scanned this QR code. Show a new one on the therapist’s page."),
   refused: _("The server does not take these strides."),
 };
 
@@ -138,12 +138,12 @@ function drawCheck() {
   const isAmber = isCrooked || detector.isInDoubt || elsewhere_deg;
   verdict.dataset.sign = isAmber ? "amber" : hasWalked ? "green" : "";
   if (detector.isInDoubt)
-    show("verdict", _("Stand still, lift the toes (shin: swing the leg forward) once, stand still."));
-  else if (isCrooked) show("verdict", _("It sits crooked or turns: tighten the strap, and walk again."));
+    show("verdict", _("Stand still, lift the toes once (shin: swing the leg forward), stand still."));
+  else if (isCrooked) show("verdict", _("It sits crooked or slips round: tighten the strap, and walk again."));
   else if (elsewhere_deg)
     show(
       "verdict",
-      fill(_("It sits %(angle)s° otherwise than last time. Strap it on as before, or take a new baseline."), {
+      fill(_("It is turned by %(angle)s° compared with last time. Strap it on as before, or take a new baseline."), {
         angle: elsewhere_deg,
       }),
     );
@@ -168,7 +168,7 @@ async function begin() {
   if (!isTrial && typeof DeviceMotionEvent.requestPermission === "function") {
     const answer = await DeviceMotionEvent.requestPermission().catch(() => "denied");
     if (answer !== "granted") {
-      refuse(_("Movement is not allowed. Reload this page, and allow it when the phone asks."));
+      refuse(_("The phone does not share its movement. Reload this page, and allow it when asked."));
       return;
     }
   }
@@ -204,10 +204,10 @@ function lock() {
 }
 
 if (!isTrial && (!window.isSecureContext || !("DeviceMotionEvent" in window))) {
-  refuse(_("Phones measure movement only on pages that came by https."));
+  refuse(_("Phones measure movement only on pages opened by https."));
   document.querySelector("[data-cure]").hidden = false;
 } else if (!token || !(place in PLACES) || !(side in SIDES)) {
-  refuse(_("Scan the square on the therapist’s page: “A phone as a sensor”."));
+  refuse(_("Scan the QR code on the therapist’s page “A phone as a sensor”."));
 } else {
   sessionStorage.setItem("sensor", scanned);
   body.dataset.place = place;

@@ -22,7 +22,7 @@ const REMARKS = {
   near_fall: _("near fall"),
   fall: _("fall"),
   fall_severity: _("hurt by the fall"),
-  fall_withdrawn: _("it was no fall"),
+  fall_withdrawn: _("it was not a fall"),
   fall_acknowledged: _("fall seen by a therapist"),
   stop_acknowledged: _("robot’s stop seen by a therapist"),
   verbal_cue: _("verbal cue"),
@@ -103,7 +103,7 @@ const DOUBTS = {
 const REFUSALS = {
   sign_in: _("Sign in again, or pair the tablet again."),
   no_session: _("There is no such session for you."),
-  not_open: _("The session is not open. Load the page again."),
+  not_open: _("The session is not open. Reload the page."),
   not_stored: _("It could not be stored. Try again."),
 };
 

@@ -36,7 +36,7 @@ for (const button of document.querySelectorAll("button[data-png]")) {
     try {
       save(await paint(button.value), button.dataset.png);
     } catch {
-      wrong.textContent = _("The figure did not come. Load the page again.");
+      wrong.textContent = _("The value did not arrive. Reload the page.");
     }
     button.disabled = false;
   });

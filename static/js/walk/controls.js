@@ -6,7 +6,7 @@ import { _ } from "garry/shared/language";
 const GUARD_MS = 700; // a question that just appeared takes no answer: the tap may be a double tap
 const NOTE_MS = 6_000;
 const ANSWER_MS = 450; // after which a stop that nobody confirmed is told as unheard
-const UNHEARD = _("Stop not heard. Use the robot’s own switch, or call your therapist.");
+const UNHEARD = _("The stop did not get through. Use the robot’s own switch, or call your therapist.");
 
 export function createControls(body, socket, showQuestion) {
   const note = body.querySelector(".note");

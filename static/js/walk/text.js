@@ -21,7 +21,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
             : _("Waiting for the sensor."),
       ];
     case "begin":
-      return [_("Begin to walk."), _("The sensor is ready.")];
+      return [_("Start walking."), _("The sensor is ready.")];
     case "calm":
       return [session.phase.calm_words, session.has_points ? _("No score in this part.") : ""];
     case "waiting":
@@ -29,11 +29,11 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "lost":
       return [_("The sensor is silent."), `${KEEP_WALKING} ${safe}`];
     case "still":
-      return [_("No steps arrive."), `${KEEP_WALKING} ${safe}`];
+      return [_("No steps are arriving."), `${KEEP_WALKING} ${safe}`];
     case "paused":
       return [
         _("Pause."),
-        [_("Rest now."), isAlone && _("Your therapist starts again."), safe].filter(Boolean).join(" "),
+        [_("Rest now."), isAlone && _("Your therapist will start again."), safe].filter(Boolean).join(" "),
       ];
     case "ask":
       return [_("End this session?"), safe];
@@ -42,7 +42,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "fell":
       return [_("Stand still."), _("Help is coming.")];
     case "ended":
-      return [_("You have finished."), _("Your scores come next.")];
+      return [_("You have finished."), _("Next: your scores.")];
     case "closed":
       return [_("This screen has stopped."), _("Please call your therapist.")];
   }

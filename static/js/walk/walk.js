@@ -36,6 +36,10 @@ const socket = connect(body.dataset.socket, {
     awaitStep();
   },
   onEvent(event) {
+    if (event.kind === "feedback_text") {
+      if (event.language !== document.documentElement.lang) location.reload(); // all of it, not its words alone
+      return;
+    }
     applyEvent(session, event);
     watchServer();
     if (event.kind === "step" && event.live && !document.hidden) {

@@ -73,7 +73,7 @@ class ScreenConsumer(Socket):
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_seen_at = timezone.now()
-        self.language = live.aggregate.fold.plan.language  # what the patient reads
+        self.language = live.aggregate.fold.valences.language  # what the patient reads
         if self.audience is Audience.MONITOR and isinstance(self.actor, User):
             theirs = await database_sync_to_async(language_of)(self.actor)
             self.language = theirs or settings.LANGUAGE_CODE

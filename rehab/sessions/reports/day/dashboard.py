@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from django.utils.dateformat import format as format_date
+from django.utils.formats import date_format
 from django.utils.translation import gettext
 
 from rehab.people.access import clinic_of
@@ -107,7 +107,7 @@ def _format_hit_rate(row: Any) -> str:
 
 
 def _format_time(moment: datetime, midnight: datetime) -> str:
-    day = "" if moment >= midnight else format_date(moment, "M j") + ", "
+    day = "" if moment >= midnight else date_format(moment, "MONTH_DAY_FORMAT") + ", "
     return f"{day}{moment:%H:%M}"
 
 
@@ -131,7 +131,7 @@ def find_alerts(
 def _device_problem(device: Device, now: datetime) -> str | None:
     if is_overdue(device, now):
         return gettext(
-            "%(name)s at %(station)s has never dialed in. Give it its token, or revoke it."
+            "%(name)s at %(station)s has never connected. Give it its token, or revoke it."
         )
     if device.revoked_at is not None and now - device.revoked_at < REVOKED_ALERT_FOR:
         return gettext(
@@ -142,7 +142,7 @@ def _device_problem(device: Device, now: datetime) -> str | None:
         return gettext("The token of %(name)s at %(station)s has expired. Give it a new one.")
     if device.copy_seen_at is not None:
         return gettext(
-            "Somebody used an old token of %(name)s at %(station)s. Give it a new one, and find "
-            "out who has the old one."
+            "An old token of %(name)s at %(station)s was used. Give it a new one, and find out who "
+            "has the old one."
         )
     return None

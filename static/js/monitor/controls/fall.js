@@ -16,7 +16,7 @@ export function createFall({ state: told, show, announce, onPress, change, note,
   function countDown() {
     const left = until - performance.now();
     withdraw.hidden = left <= 0;
-    withdraw.textContent = fill(_("It was no fall (%(count)s s)"), { count: Math.ceil(left / 1000) });
+    withdraw.textContent = fill(_("It was not a fall (%(count)s s)"), { count: Math.ceil(left / 1000) });
     if (withdraw.hidden) clearInterval(timer);
   }
 

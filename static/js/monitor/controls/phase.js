@@ -19,7 +19,7 @@ export function createPhase({ show, onPress, change }) {
       again.disabled = !["running", "paused"].includes(session.state);
       drawBar(session);
       const next = session.phases[session.phase.index + 1];
-      show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("No further phase"));
+      show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("Last phase"));
       button.disabled = !next;
     },
   };

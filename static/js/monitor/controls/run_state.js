@@ -9,7 +9,7 @@ import { openDialog } from "garry/monitor/controls/open_dialog";
 const MAIN = {
   ready: ["start", _("Start"), "play"],
   running: ["pause", _("Pause"), "pause"],
-  paused: ["resume", _("Go on"), "play"],
+  paused: ["resume", _("Resume"), "play"],
 };
 
 export function createRunState({ state, show, onPress, change }) {
