@@ -178,9 +178,8 @@ async def test_a_planned_rest_pauses_everyone_until_the_therapist_goes_on(place,
 async def test_a_heart_rate_above_the_limit_pauses_until_it_is_below(place, begun):
     session = await begun(place, TRAINING, heart_rate_limit=120)
     source, monitor = await place.source().open(), await place.monitor(session).open()
-    for number, rate in enumerate((120, 121), 1):
-        await source.say(a_step(number) | {"extra": {"heart_rate": rate}})
-        await source.acked(number)
+    for rate in (120, 121):
+        await source.walk(4.0, extra={"heart_rate": rate})
     paused = await monitor.until(lambda event: event.get("state") == "paused")
     assert paused["pause_reason"] == "heart_rate"
     assert len(await events_of(session, "heart_rate_limit")) == 1
