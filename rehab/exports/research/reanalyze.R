@@ -53,7 +53,7 @@ round_of <- function(units, variances) {
   ends <- range(eigen(observed, symmetric = TRUE, only.values = TRUE)$values)
   list(plain = plain, effects = effects, slopes = slopes, squares = squares,
        information = information, moves = plain %*% crossed,
-       observed = if (ends[1] < 1e-6 * ends[2]) curved / 2 else observed)
+       observed = if (ends[1] < 1e-3 * ends[2]) curved / 2 else observed)
 }
 
 fit <- function(units, diagonal) {

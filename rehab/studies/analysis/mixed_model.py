@@ -10,6 +10,7 @@ Science 13:236-247; Thomadakis et al. 2023, Statistics in Medicine 42:2873-2885)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ Flags = NDArray[np.bool_]
 MAX_ROUNDS = 200
 TOLERANCE = 1e-9  # relative change of the variances at which the iteration ends
 LEAST_EIGENVALUE = 1e-7  # of a person's covariance, as a share of the residual variance
-SINGULAR = 1e-6  # an information whose least eigenvalue is below this share of the largest
+SINGULAR = 1e-3  # an information whose least eigenvalue is below this share of the largest
 EXACT = 1e-12  # a residual variance below this share of the values' is rounding alone
 
 
@@ -117,6 +118,8 @@ def fit(x: Floats, y: Floats, seen: Flags, parts: Floats) -> Fit:
     # A part that no two visits of anybody share could not be told from the visits' own.
     of_visits = ~np.asarray((every * off_diagonal).any(axis=(1, 2, 3)))
     used = np.asarray(parts.any(axis=(1, 2, 3))) & (~own | of_visits)
+    # Nor could one that adds the same as another: of one visit in each period, say.
+    used &= [not any(map(partial(np.array_equal, one), parts[:n])) for n, one in enumerate(parts)]
     parts = parts[used]
     count, rank = int(seen.sum()), int(np.linalg.matrix_rank(x.reshape(-1, x.shape[2])))
     effects, span, residual = _least_squares(x, y)
