@@ -18,7 +18,7 @@ from rehab.people.models import SIDES, Patient, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import SessionScope, TrainingSession
 from rehab.sessions.setup.walking import BELT_M_S, SUPPORT_PERCENT
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS
 from rehab.training.summary.metrics import METRICS
 
@@ -157,6 +157,14 @@ class RuleEntry(StrEnum):
 
     GOAL_FOLLOWED = "goal_followed"  # the staircase moved the goal
     PLANNED_REST = "planned_rest"  # the session paused for the rest after a phase
+    HEART_RATE_LIMIT = "heart_rate_limit"  # the session paused above the plan's limit
+
+
+# The entries of pauses by a plan's rules.
+RULE_PAUSES = {
+    PauseReason.REST: RuleEntry.PLANNED_REST,
+    PauseReason.HEART_RATE: RuleEntry.HEART_RATE_LIMIT,
+}
 
 
 class Remark(StrEnum):
@@ -214,6 +222,7 @@ EVENTS = {
     **{kind: _(control.log_label) for kind, control in CONTROLS.items()},
     RuleEntry.GOAL_FOLLOWED: _("goal followed"),
     RuleEntry.PLANNED_REST: _("planned rest"),
+    RuleEntry.HEART_RATE_LIMIT: _("heart rate above its limit"),
     RobotEntry.STOP: _("robot stop"),
     RobotEntry.ARM: _("robot arm"),
     RobotEntry.DECISION: _("robot decision"),

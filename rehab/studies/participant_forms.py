@@ -106,12 +106,13 @@ class PlaceForm(OptionForm):
     @property
     def place(self) -> Place:
         """The chosen place."""
-        data = self.cleaned_data
+        data, parts = self.cleaned_data, build_parts(self.chosen())
         kind, _between, name = data["source"].partition(" ")
         return Place(
             station=data["station"],
             source=dict(source_choices())[data["source"]],
             simulated=kind == "synthetic",
             source_args=tuple(build_source_args(kind, name, self.patient)),
-            walking=build_parts(self.chosen())["walking"],
+            walking=parts["walking"],
+            heart_rate_limit=parts["heart_rate_limit"],
         )

@@ -33,6 +33,7 @@ class Place:
     simulated: bool = False
     source_args: tuple[str, ...] = ()
     walking: WalkingConditions = field(default_factory=WalkingConditions)
+    heart_rate_limit: int | None = None
 
 
 def next_visit(enrollment: Enrollment) -> StudyVisit | None:

@@ -49,6 +49,7 @@ class PauseReason(StrEnum):
     PATIENT = "patient"
     RESTART = "restart"  # of the server
     REST = "rest"  # that the plan has after a phase
+    HEART_RATE = "heart_rate"  # above the plan's limit
 
 
 ChangeValue = float | str | Mapping[str, Any] | None

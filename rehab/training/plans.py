@@ -80,6 +80,8 @@ class PlanSettings:
         What the order of phrases and of the robot's variants follows from; 0 to have one drawn.
     locked
         Whether what defines the condition stays as it was planned: in a study's session.
+    heart_rate_limit
+        Above it a stride pauses the session [1/min]; None for no limit.
     """
 
     goal: GoalRule
@@ -92,6 +94,7 @@ class PlanSettings:
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
     seed: int = 0
     locked: bool = False
+    heart_rate_limit: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +197,7 @@ class SessionPlan(PlanSettings):
             language=data.get("language", "en"),
             words_vary=data.get("words_vary", False),
             seed=data.get("seed", 0),
+            heart_rate_limit=data.get("heart_rate_limit"),
         )
 
 

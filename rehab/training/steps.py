@@ -12,6 +12,8 @@ from robot.wire.limits import TIME_MAX_S
 
 # The extra value with what a source sent as a step's value, where another one is trained.
 SENT_VALUE = "sent_value"
+# The extra value with the heart rate at a stride [1/min].
+HEART_RATE = "heart_rate"
 
 
 class Side(StrEnum):

@@ -12,6 +12,7 @@ from django.core.management import CommandError, call_command
 
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Patient, User
+from rehab.studies.record.checklists import ITEMS
 from rehab.studies.results.drawing import FIGURES, TABLES
 from rehab.studies.simulation.example import PHASES
 from tests.support.archives import rows_of
@@ -35,7 +36,12 @@ def test_a_seed_gives_the_same_files_twice_and_all_of_it_is_exported(tmp_path):
     digests = {re.search("[0-9a-f]{64}", text).group() for text in told}
     assert len(digests) == 1
     files = {f"{name}.csv" for name in TABLES} | {f"{name}.svg" for name in FIGURES}
-    assert {file.name for file in (tmp_path / "one").iterdir()} == {*files, "export.zip"}
+    lists = {f"{name}.txt" for name in ITEMS}
+    assert {file.name for file in (tmp_path / "one").iterdir()} == {*files, *lists, "export.zip"}
+    consort = (tmp_path / "one" / "CONSORT 2025.txt").read_text("utf-8")
+    assert "6 assessed, 0 turned away" in consort
+    assert "[Still asked: Conflicts of interest]" in consort
+    assert "A: 0 left" in consort
     for name in files:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
 

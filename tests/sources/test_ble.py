@@ -13,6 +13,7 @@ import pytest
 
 from rehab.sources.arguments import make_parser
 from rehab.sources.ble import source as ble
+from rehab.sources.ble.heart_rate import HeartRate
 from rehab.sources.ble.host_clock import DRIFT, HostClock
 from rehab.sources.ble.movella_dot import MovellaDot
 from rehab.sources.ble.nordic_uart import NordicUart
@@ -47,6 +48,47 @@ def test_a_dots_clock_wraps_around_after_71_minutes_and_doubles_are_left_out():
     assert steps == pytest.approx([0.016667, 0.016667, 0.033334])
     assert dot.read(DOT[:20], 0) == []
     assert dot.damaged == 1
+
+
+# Heart Rate Measurement: flags, then the rate in one byte or two, then energy and beats apart.
+@pytest.mark.parametrize(
+    ("data", "rate"),
+    [
+        ("00 48", 72),
+        ("01 2C01", 300),
+        ("16 48 E803 F003", 72),  # touches the skin, with beats apart
+        ("1E 48 0A00 E803", 72),
+        ("04 48", None),  # does not touch the skin
+        ("02 48", 72),  # says nothing of the skin
+        ("00 00", None),
+    ],
+)
+def test_a_heart_rate_sensor(data, rate):
+    rows = HeartRate().read(bytes.fromhex(data), 7.0)
+    assert rows == ([] if rate is None else [{"heart_rate": rate}])
+
+
+@pytest.mark.parametrize("data", ["", "00", "01 48"])
+def test_a_heart_rate_that_is_cut_off_is_damaged(data):
+    sensor = HeartRate()
+    assert sensor.read(bytes.fromhex(data), 7.0) == []
+    assert sensor.damaged == 1
+
+
+async def test_strides_carry_the_heart_rate_for_ten_seconds(quick):
+    belt = FakeSensor("Belt", HeartRate.notifies)
+    foot = FakeSensor("GARRY-1", NordicUart.notifies, WRITES)
+    source, said = make(["left.foot=GARRY-1", "--heart-rate", "Belt"], FakeBleak(belt, foot))
+    async with reading(source) as harness:
+        await until(lambda: belt.is_read)
+        for data, wait_s in (("00 48", 0), ("00 5A", 9.9), ("04 FF", 0.2)):
+            belt.send(bytes.fromhex(data))
+            harness.intake.add_rows([{"value": 3.9}])
+            harness.time.now_s += wait_s
+        harness.intake.add_rows([{"value": 3.9}])
+        rates = [stride.extra.get("heart_rate") for stride in harness.strides()]
+    assert rates == [72, 90, 90, None]
+    assert any("Reading Belt (heart rate)" in text for text in said)
 
 
 @pytest.mark.parametrize("part", [1, 7, 20, 40])

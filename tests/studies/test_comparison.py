@@ -101,6 +101,48 @@ def test_baseline_and_stratum_are_adjusted_for_with_variances_of_each_arm():
     assert 10 < found.estimate.freedom < 19
 
 
+def test_precision_is_that_of_the_observed_likelihood_where_visits_are_missing_by_response():
+    """Of variances and effects, by differences of the restricted likelihood itself."""
+    values, arms = two_arms(40, 2, np.random.default_rng(SEED))
+    keep = np.ones((40, 2), bool)
+    keep[1::2, 1] = values[1::2, 0] > 0  # the worse half of B
+    design = designs.parallel(observe(values, arms, keep=keep), ["A", "B"])
+    fitted, seen = design.fit, design.seen
+    x, y = design.x[seen][:, :4], design.y[seen]  # of each arm at each visit: no baselines
+    person = np.repeat(np.arange(40), 2).reshape(40, 2)[seen]
+    visit = np.tile([0, 1], 40).reshape(40, 2)[seen]
+    together = person[:, None] == person[None, :]
+    parts = design.parts[:, person[:, None], visit[:, None], visit[None, :]] * together
+
+    def solve(variances):
+        covariance = np.einsum("v,vab->ab", variances, parts)
+        weight = np.linalg.inv(covariance)
+        information = x.T @ weight @ x
+        effects = np.linalg.solve(information, x.T @ weight @ y)
+        rest = y - x @ effects
+        logs = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(information)[1]
+        return -(logs + rest @ weight @ rest) / 2, effects
+
+    at, step = fitted.variances, 1e-3
+    moved = step * np.eye(len(at))
+    slopes = np.array([(solve(at + h)[1] - solve(at - h)[1]) / (2 * step) for h in moved])
+    curved = np.array(
+        [
+            [
+                sum(s * u * solve(at + s * h + u * k)[0] for s in (1, -1) for u in (1, -1))
+                for h in moved
+            ]
+            for k in moved
+        ]
+    ) / (4 * step**2)
+    known = np.linalg.inv(-curved)
+    assert fitted.of_variances == pytest.approx(known, rel=1e-3, abs=1e-3 * known.max())
+    added = 2 * slopes.T @ known @ slopes
+    found = (fitted.adjusted - fitted.plain)[:4, :4]
+    assert found == pytest.approx(added, rel=1e-2, abs=1e-3 * added.max())
+    assert found[3, 3] > 0.1 * fitted.plain[3, 3]  # of B at the second visit
+
+
 # Potthoff and Roy 1964, Biometrika 51:313-326: a distance in the skull of children [mm].
 BOYS = [
     *((26, 25, 29, 31), (21.5, 22.5, 23, 26.5), (23, 22.5, 24, 27.5), (25.5, 27.5, 26.5, 27)),

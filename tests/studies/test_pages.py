@@ -216,7 +216,7 @@ def shown_visit(page: Any) -> str:
 
 def press_start(client: Client, enrollment: Enrollment, visit: str) -> Any:
     station = Station.everywhere.filter(clinic=enrollment.clinic).first()
-    where = {"station": station.pk, "source": "live", "visit": visit}
+    where = {"station": station.pk, "source": "live", "visit": visit, "heart_rate_limit": 130}
     return client.post(reverse("start-visit", args=[enrollment.pk]), where)
 
 
@@ -235,6 +235,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     assert "negative" not in page.lower()
     session = TrainingSession.everywhere.exclude(pk=world.session.pk)
     assert start_visit(pt, enrollment).url == reverse("monitor", args=[session.get().pk])
+    assert session.get().to_plan().heart_rate_limit == 130
     assert "One study a patient" in text_of(
         pt.post(url, {"patient": patient.pk, "keep_data": "no", "takes_part": "yes"})
     )

@@ -17,8 +17,8 @@ pinv <- function(m) {
 trace <- function(a, b) sum(a * t(b))
 total <- function(units, f) Reduce(`+`, lapply(units, f))
 
-# Restricted maximum likelihood with Kenward and Roger's covariance. A unit is a person: x (visits,
-# effects), y, and parts: what each variance adds to the covariance of the visits.
+# Restricted maximum likelihood, Kenward and Roger's covariance by the observed information. A unit
+# is a person: x (visits, effects), y, and parts: what each variance adds to the visits' covariance.
 round_of <- function(units, variances) {
   ways <- lapply(units, function(u) {
     w <- solve(Reduce(`+`, Map(`*`, u$parts, variances)))
@@ -31,10 +31,15 @@ round_of <- function(units, variances) {
   slopes <- lapply(v, function(k) total(each, function(i) {
     ways[[i]]$xw %*% units[[i]]$parts[[k]] %*% t(ways[[i]]$xw)
   }))
-  squares <- sapply(v, function(k) sum(sapply(each, function(i) {
-    e <- ways[[i]]$w %*% (units[[i]]$y - units[[i]]$x %*% effects)
-    t(e) %*% units[[i]]$parts[[k]] %*% e
-  })))
+  errors <- lapply(each, function(i) {
+    ways[[i]]$w %*% (units[[i]]$y - units[[i]]$x %*% effects)
+  })
+  pulled <- lapply(each, function(i) sapply(units[[i]]$parts, function(p) p %*% errors[[i]]))
+  pulled <- lapply(each, function(i) matrix(pulled[[i]], length(errors[[i]])))
+  squares <- as.vector(total(each, function(i) t(errors[[i]]) %*% pulled[[i]]))
+  crossed <- total(each, function(i) ways[[i]]$xw %*% pulled[[i]])
+  curved <- total(each, function(i) t(pulled[[i]]) %*% ways[[i]]$w %*% pulled[[i]])
+  curved <- curved - t(crossed) %*% plain %*% crossed
   pair <- function(k, l) total(each, function(i) {
     ways[[i]]$xw %*% units[[i]]$parts[[k]] %*% ways[[i]]$wp[[l]] %*% ways[[i]]$w %*% units[[i]]$x
   })
@@ -44,8 +49,11 @@ round_of <- function(units, variances) {
     twice <- trace(plain %*% slopes[[k]], plain %*% slopes[[l]])
     (first - 2 * trace(plain, pairs[[k]][[l]]) + twice) / 2
   }))
-  list(plain = plain, effects = effects, slopes = slopes, squares = squares, pairs = pairs,
-       information = information)
+  observed <- curved - information
+  ends <- range(eigen(observed, symmetric = TRUE, only.values = TRUE)$values)
+  list(plain = plain, effects = effects, slopes = slopes, squares = squares,
+       information = information, moves = plain %*% crossed,
+       observed = if (ends[1] < 1e-3 * ends[2]) curved / 2 else observed)
 }
 
 fit <- function(units, diagonal) {
@@ -76,13 +84,9 @@ fit <- function(units, diagonal) {
     if (change < 1e-9) break
   }
   now <- round_of(units, variances)
-  of_variances <- pinv(now$information)
-  v <- seq_along(variances)
-  inner <- Reduce(`+`, lapply(v, function(k) Reduce(`+`, lapply(v, function(l) {
-    of_variances[k, l] * (now$pairs[[k]][[l]] - now$slopes[[k]] %*% now$plain %*% now$slopes[[l]])
-  }))))
+  of_variances <- pinv(now$observed)
   list(effects = now$effects, plain = now$plain, freedom = freedom, of_variances = of_variances,
-       adjusted = now$plain + 2 * now$plain %*% inner %*% now$plain,
+       adjusted = now$plain + 2 * now$moves %*% of_variances %*% t(now$moves),
        slopes = lapply(now$slopes, function(s) now$plain %*% s %*% now$plain))
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from argparse import ArgumentParser
@@ -25,6 +26,7 @@ from rehab.people.sign_in.first_start import prepare_database
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.headless import GIVE_WAY_S, Pace
 from rehab.studies.models import Study
+from rehab.studies.record.checklists import ITEMS, checklist_rows, checklist_text
 from rehab.studies.results.drawing import FIGURES, TABLES, name_pair, write_table
 from rehab.studies.results.results import Results
 from rehab.studies.simulation.example import example_trial
@@ -41,7 +43,8 @@ class Command(BaseCommand):
 
     help = (
         "Simulate a study of four feedback types through the real path, and write tables (CSV), "
-        "figures (SVG) and the export for analysis (ZIP). One that was broken off goes on."
+        "figures (SVG), SPIRIT and CONSORT (text) and the export for analysis (ZIP). One that was "
+        "broken off goes on."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -58,6 +61,9 @@ class Command(BaseCommand):
             "--clinic", default=CLINIC, help=f"default: {CLINIC!r}, made if missing"
         )
         parser.add_argument(
+            "--facts", type=Path, help="JSON: what checklists ask of a study, by name"
+        )
+        parser.add_argument(
             "--to", type=Path, default=Path("simulated-study"), help="folder of the files"
         )
 
@@ -71,6 +77,9 @@ class Command(BaseCommand):
             trial = example_trial(options["participants"], options["visits"], population)
             clinic, _is_new = Clinic.everywhere.get_or_create(name=options["clinic"])
             study = find_or_plan(clinic, trial, seed, now)
+            if options["facts"]:
+                study.facts = json.loads(options["facts"].read_text("utf-8"))
+                study.save(update_fields=["facts"])
             give_way = Pace(rest_s=GIVE_WAY_S if connection.vendor == "sqlite" else 0.0)
             for done in walk_study(study, trial, seed, now, give_way):
                 self._tell(f"{done} of {trial.participants} participants")
@@ -108,7 +117,7 @@ class Command(BaseCommand):
 
 
 def write_files(results: Results, folder: Path) -> str:
-    """Write the tables and figures, and return the digest of them all."""
+    """Write tables, figures and checklists; return the digest of the tables and figures."""
     files = {f"{name}.csv": write_table(rows(results)) for name, rows in TABLES.items()}
     files |= {f"{name}.svg": draw(results) for name, draw in FIGURES.items()}
     folder.mkdir(parents=True, exist_ok=True)
@@ -116,6 +125,9 @@ def write_files(results: Results, folder: Path) -> str:
     for name, text in sorted(files.items()):
         (folder / name).write_bytes(text.encode())  # the same on Windows, too
         digest.update(f"{name}\n{text}".encode())
+    lists = list(checklist_rows(results.study, results))
+    for name in ITEMS:  # which tell the day, so that they are not in the digest
+        (folder / f"{name}.txt").write_text(checklist_text(lists, name), "utf-8")
     return digest.hexdigest()
 
 

@@ -11,6 +11,7 @@ from rehab.sessions.setup.option import (
 )
 from rehab.sessions.setup.walking import (
     BELT_M_S,
+    HEART_RATE_LIMIT_MIN,
     MAX_DEVICE_LETTERS,
     SUPPORT_PERCENT,
 )
@@ -54,5 +55,19 @@ WALKING_OPTIONS = (
         group=Group.WALKING,
         is_of_patient=True,
         column=OptionColumn("weight_support", "%", "Body weight that a harness carried."),
+    ),
+    Option(
+        name="heart_rate_limit",
+        label=_("Pause above a heart rate of, per minute"),
+        help="A stride with a higher heart rate pauses the session; needs a heart-rate sensor.",
+        kind=int,
+        nullable=True,
+        least=HEART_RATE_LIMIT_MIN[0],
+        most=HEART_RATE_LIMIT_MIN[1],
+        unit=_("per minute"),
+        place="heart_rate_limit",
+        group=Group.WALKING,
+        is_of_patient=True,
+        column=OptionColumn("heart_rate_limit", "1/min", "Heart rate that pauses the session."),
     ),
 )

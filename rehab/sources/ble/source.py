@@ -1,4 +1,4 @@
-"""Sensors on feet or shanks by Bluetooth: own firmware, Movella DOT, WitMotion.
+"""Sensors on feet or shanks by Bluetooth (own firmware, Movella DOT, WitMotion), heart rate.
 
     python -m rehab.sources ble --sensor left.foot=NAME right.foot=NAME
 
@@ -17,6 +17,7 @@ from typing import Any
 
 from rehab.gait.recordings.columns import SignalColumn
 from rehab.sources.ble.adapter import AXES, Adapter, Row
+from rehab.sources.ble.heart_rate import HeartRate
 from rehab.sources.ble.host_clock import HostClock
 from rehab.sources.ble.movella_dot import MovellaDot
 from rehab.sources.ble.nordic_uart import NordicUart
@@ -39,7 +40,7 @@ ASKED_FIRST = 8
 class _Sensor:
     """One sensor: who wears it where, what it is called, and its clock."""
 
-    wearable: Wearable
+    wearable: Wearable | None  # None: it measures the heart rate
     name: str
     said: str = ""
     clock: HostClock = field(default_factory=HostClock)
@@ -55,6 +56,7 @@ class BleSource(LiveSource):
             "--sensor", nargs="+", required=True, metavar="SIDE.PLACE=NAME",
             help="left or right, foot or shank, and the sensor's name or address",
         )  # fmt: skip
+        parser.add_argument("--heart-rate", metavar="NAME", help="a heart-rate sensor's name")
         add_signal_arguments(parser)
 
     def __init__(
@@ -66,9 +68,11 @@ class BleSource(LiveSource):
     ) -> None:
         """Read the command line. Raises SourceError, also where bleak is missing."""
         sensors = [_read_sensor(text) for text in options.sensor]
-        worn = tuple(one.wearable for one in sensors)
+        worn = tuple(one.wearable for one in sensors if one.wearable)
         if len({(one.side, one.place) for one in worn}) < len(worn):
             raise SourceError("--sensor names a place twice. Give each sensor a place of its own.")
+        if options.heart_rate:
+            sensors.append(_Sensor(None, options.heart_rate))
         if len({one.name for one in sensors}) < len(sensors):
             raise SourceError("--sensor names a sensor twice. Give each place one of its own.")
         self.settings = replace(IntakeSettings.read(options), wearables=worn)
@@ -120,7 +124,8 @@ class BleSource(LiveSource):
             self._take(sensor, adapter, bytes(data), intake)
 
         async with self._bleak.BleakClient(device, lambda _client: lost.set()) as client:
-            known = [one for one in ADAPTERS if client.services.get_characteristic(one.notifies)]
+            kinds = ADAPTERS if sensor.wearable else (HeartRate,)
+            known = [one for one in kinds if client.services.get_characteristic(one.notifies)]
             if not known:
                 self._say(
                     sensor, f"{sensor.name} is no sensor that GARRY knows. Its firmware may be old."
@@ -131,7 +136,8 @@ class BleSource(LiveSource):
             await client.start_notify(adapter.notifies, take)
             if adapter.start:
                 await client.write_gatt_char(*adapter.start, response=True)
-            where = f"{sensor.wearable.side} {sensor.wearable.place}"
+            worn = sensor.wearable
+            where = f"{worn.side} {worn.place}" if worn else "heart rate"
             self._say(sensor, f"Reading {sensor.name} ({where}). {adapter.warning}".rstrip())
             asking = asyncio.create_task(self._ask_times(client, adapter))
             try:
@@ -171,6 +177,9 @@ class BleSource(LiveSource):
             if asked_s is not None:
                 sensor.clock.exchange(asked_s, sensor_s, now_s)
         wearable = sensor.wearable
+        if wearable is None:
+            intake.add_rows(rows)
+            return
         intake.add_rows([_name(row, wearable, sensor.clock, now_s) for row in rows])
         intake.set_clock_error(wearable.side, wearable.place, sensor.clock.error_s(now_s))
 

@@ -15,6 +15,7 @@ from rehab.gait.recordings.columns import SIDES
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
+from rehab.sources.intake.devices import NAMES, read_devices
 from rehab.sources.intake.measurements import from_wearable, to_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.quality import SignalQuality
@@ -29,13 +30,13 @@ from rehab.sources.intake.rows import (
 )
 from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.intake.tables import TablePlans
-from rehab.sources.intake.treadmill import NAMES, read_treadmill
 from rehab.sources.intake.wearables import Sided, WearablePipeline
 from rehab.sources.reporting import Notify, SourceError
-from rehab.training.steps import Measurement, Side
+from rehab.training.steps import HEART_RATE, Measurement, Side
 from robot.wire.limits import MAX_EXTRA
 
 REPEAT_S = 10.0  # before the same warning is shown again
+BEAT_HOLDS_S = 10.0  # an older heart rate is none
 CURE_OF = {str(reason): text for reason, text in CURES.items()}
 
 
@@ -90,7 +91,8 @@ class Intake:
         self._problem: SourceError | None = None
         self._failed = asyncio.Event()
         self._number = 0
-        self._treadmill: dict[str, float] = {}  # what it last said of itself
+        self._said: dict[str, float] = {}  # by devices beside the signals
+        self._beat_s = 0.0  # when the heart rate was last said
         self._warned_s: dict[str, float] = {}
         self._reported_reasons: set[str] = set()
         self._doubts: tuple[str, ...] = ()  # why valid strides do not count
@@ -125,7 +127,7 @@ class Intake:
         samples: list[Mapping[str, Cell]] = []
         for row in rows:
             if not NAMES.isdisjoint(row):
-                self.note_treadmill(read_treadmill(row))
+                self.note_devices(read_devices(row))
             if VALUE in row:
                 self._add_stride(row)
             elif self._columns.keys() & row.keys() or self._wearables.names & row.keys():
@@ -143,9 +145,11 @@ class Intake:
         if samples:
             self._add_samples(samples)
 
-    def note_treadmill(self, said: Mapping[str, float]) -> None:
-        """Send what a treadmill says of itself with the strides from now on."""
-        self._treadmill |= said
+    def note_devices(self, said: Mapping[str, float]) -> None:
+        """Send what a treadmill or a heart-rate sensor says with the strides from now on."""
+        self._said |= said
+        if HEART_RATE in said:
+            self._beat_s = self._monotonic()
 
     def reject_row(self, text: str) -> None:
         """Count a row that cannot be used, and report why, at most every ten seconds."""
@@ -185,8 +189,10 @@ class Intake:
         self._put(stride, is_timed=any(name in row for name in TIMES))
 
     def _put(self, stride: Measurement, *, is_timed: bool) -> None:
-        if self._treadmill and len(stride.extra) + len(self._treadmill) <= MAX_EXTRA:
-            stride = replace(stride, extra={**self._treadmill, **stride.extra})
+        if HEART_RATE in self._said and self._monotonic() - self._beat_s > BEAT_HOLDS_S:
+            del self._said[HEART_RATE]
+        if self._said and len(stride.extra) + len(self._said) <= MAX_EXTRA:
+            stride = replace(stride, extra={**self._said, **stride.extra})
         self._number += 1
         self.quality.record_stride(stride, is_timed=is_timed)
         for reason in stride.reasons:

@@ -10,26 +10,32 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rehab.sources.client import Display, NextStride
-from rehab.sources.intake.treadmill import decode_treadmill, encode_treadmill
+from rehab.sources.intake.devices import decode_treadmill, encode_treadmill
 from rehab.sources.reporting import Notify
 from rehab.sources.source import PlayedSource
 from rehab.sources.synthetic.measured import express, show_goal
 from rehab.sources.synthetic.profiles import PROFILES
 from rehab.sources.synthetic.walker import SyntheticWalker
 from rehab.training.measures import A2, MEASURES
-from rehab.training.steps import Measurement, Side
+from rehab.training.steps import HEART_RATE, Measurement, Side
 
 if TYPE_CHECKING:
     from rehab.sources.synthetic.streaming import SignalWalker
 
 
 # The simulated treadmill: slowly at first, then as fast as the patient learns to go.
+REST_MIN, WALK_MIN, RISE_S = 72.0, 118.0, 90.0  # the simulated heart: at rest, walking [1/min]
 FIRST_M_S, LAST_M_S, STEP_M_S, STEP_EVERY_S = 0.5, 0.9, 0.1, 60.0
 
 
 def find_speed(time_s: float) -> float:
     """Return the speed [m/s] of the simulated treadmill's belt at a time [s]."""
     return min(LAST_M_S, FIRST_M_S + STEP_M_S * math.floor(max(0.0, time_s) / STEP_EVERY_S))
+
+
+def find_heart_rate(time_s: float) -> float:
+    """Return the heart rate [1/min] of the simulated patient at a time [s]."""
+    return round(WALK_MIN - (WALK_MIN - REST_MIN) * math.exp(-max(0.0, time_s) / RISE_S))
 
 
 class SyntheticSource(PlayedSource):
@@ -43,6 +49,9 @@ class SyntheticSource(PlayedSource):
         parser.add_argument("--seed", type=int, default=0, help="the same seed walks the same")
         parser.add_argument(
             "--treadmill", action="store_true", help="a simulated treadmill says its speed, too"
+        )
+        parser.add_argument(
+            "--heart-rate", action="store_true", help="a simulated heart-rate sensor, too"
         )
         parser.add_argument("--profile", choices=sorted(PROFILES), default="good")
         parser.add_argument(
@@ -61,6 +70,7 @@ class SyntheticSource(PlayedSource):
         self._profile = PROFILES[options.profile]
         self._seed: int = options.seed
         self._has_treadmill: bool = options.treadmill
+        self._has_heart_rate: bool = options.heart_rate
         self._side = Side(options.side) if options.side else None
         self._open_signals = make_opener(options, notify) if options.signals else None
         self._notify = notify
@@ -92,6 +102,9 @@ class SyntheticSource(PlayedSource):
             stride = express(stride, walker, measure) if strider is walker else stride
             if self._has_treadmill:
                 said = decode_treadmill(encode_treadmill(find_speed(stride.time_s)))
+                stride = replace(stride, extra=dict(stride.extra) | said)
+            if self._has_heart_rate:
+                said = {HEART_RATE: find_heart_rate(stride.time_s)}
                 stride = replace(stride, extra=dict(stride.extra) | said)
             return stride
 

@@ -2,12 +2,15 @@
 
 Estimates are unbiased where visits are missing at random: depending on the arm, the baseline and
 what was seen before (Rubin 1976, Biometrika 63:581-592). Intervals are those of Kenward and Roger
-(1997, Biometrics 53:983-997), which hold for small groups.
+(1997, Biometrics 53:983-997), for small groups, by the observed information: the expected one holds
+only where visits are missing completely at random (Kenward and Molenberghs 1998, Statistical
+Science 13:236-247; Thomadakis et al. 2023, Statistics in Medicine 42:2873-2885).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +21,7 @@ Flags = NDArray[np.bool_]
 MAX_ROUNDS = 200
 TOLERANCE = 1e-9  # relative change of the variances at which the iteration ends
 LEAST_EIGENVALUE = 1e-7  # of a person's covariance, as a share of the residual variance
+SINGULAR = 1e-3  # an information whose least eigenvalue is below this share of the largest
 EXACT = 1e-12  # a residual variance below this share of the values' is rounding alone
 
 
@@ -114,6 +118,8 @@ def fit(x: Floats, y: Floats, seen: Flags, parts: Floats) -> Fit:
     # A part that no two visits of anybody share could not be told from the visits' own.
     of_visits = ~np.asarray((every * off_diagonal).any(axis=(1, 2, 3)))
     used = np.asarray(parts.any(axis=(1, 2, 3))) & (~own | of_visits)
+    # Nor could one that adds the same as another: of one visit in each period, say.
+    used &= [not any(map(partial(np.array_equal, one), parts[:n])) for n, one in enumerate(parts)]
     parts = parts[used]
     count, rank = int(seen.sum()), int(np.linalg.matrix_rank(x.reshape(-1, x.shape[2])))
     effects, span, residual = _least_squares(x, y)
@@ -172,31 +178,33 @@ class _Round:
 
     def __init__(self, x: Floats, y: Floats, seen: Flags, parts: Floats, variances: Floats) -> None:
         weight = np.linalg.inv(_covariance(parts, seen, variances, 1.0))
-        self._x = x
-        self._across = np.swapaxes(x, 1, 2)
-        self.plain = np.linalg.pinv((self._across @ weight @ x).sum(0), hermitian=True)
+        across = np.swapaxes(x, 1, 2)
+        self.plain = np.linalg.pinv((across @ weight @ x).sum(0), hermitian=True)
         self.effects = self.plain @ np.einsum("ntk,nt->k", weight @ x, y)
         error = np.einsum("nst,nt->ns", weight, y - x @ self.effects)
-        self.squares = np.einsum("ns,vnst,nt->v", error, parts, error)
+        pulled = np.einsum("vnst,nt->vns", parts, error)
+        self.squares = np.einsum("ns,vns->v", error, pulled)
         weighted = weight @ parts  # (v, n, t, t)
-        inner = weighted @ weight
-        self.slopes = (self._across @ inner @ x).sum(1)  # (v, k, k)
-        self._pairs = weighted[:, None] @ inner[None]  # (v, v, n, t, t)
+        self.slopes = (across @ weighted @ weight @ x).sum(1)  # (v, k, k)
         traces = np.einsum("vnst,wnts->vw", weighted, weighted, optimize=True)
-        once = np.einsum("vwnst,nts->vw", self._pairs, x @ self.plain @ self._across)
+        spread = weight @ x @ self.plain @ across
+        once = np.einsum("vnst,wnts->vw", weighted, weighted @ spread, optimize=True)
         mixed = self.plain @ self.slopes
         twice = np.einsum("vkl,wlk->vw", mixed, mixed)
         self.information = (traces - 2 * once + twice) / 2
+        inner = np.einsum("nst,vnt->vns", weight, pulled)
+        crossed = np.einsum("nsk,vns->vk", x, inner)
+        self.moves = crossed @ self.plain  # (v, k): how effects change with each variance
+        squares = np.einsum("vns,wns->vw", pulled, inner) - self.moves @ crossed.T
+        self.observed = squares - self.information
+        ends = np.linalg.eigvalsh(self.observed)[[0, -1]]
+        if ends[0] < SINGULAR * ends[1]:  # the mean of both kinds of information never is negative
+            self.observed = squares / 2
 
     def to_fit(self, span: Floats, freedom: int, variances: Floats) -> Fit:
         """Return the fit with the correction of Kenward and Roger; the rest as `Fit` has it."""
-        of_variances = np.linalg.pinv(self.information, hermitian=True)
-        pairs = np.einsum("vw,vwnst->nst", of_variances, self._pairs)
-        crossed = np.einsum(
-            "vw,vkl,wlm->km", of_variances, self.slopes @ self.plain, self.slopes, optimize=True
-        )
-        inner = (self._across @ pairs @ self._x).sum(0) - crossed
-        adjusted = self.plain + 2 * self.plain @ inner @ self.plain
+        of_variances = np.linalg.pinv(self.observed, hermitian=True)
+        adjusted = self.plain + 2 * self.moves.T @ of_variances @ self.moves
         slopes = self.plain @ self.slopes @ self.plain
         return Fit(
             *(self.effects, span, self.plain, adjusted, slopes, of_variances, freedom, variances)

@@ -196,7 +196,7 @@ def curves_by_arm(
 
 @dataclass(frozen=True, slots=True)
 class ArmFlow:
-    """An arm's column of the flow of participants (CONSORT 2010)."""
+    """An arm's column of the flow of participants (CONSORT 2025, item 22a)."""
 
     arm: str
     allocated: int

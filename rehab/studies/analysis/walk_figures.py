@@ -7,6 +7,7 @@ was gained: a share exists only for those who gained, and would condition on the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,34 +55,17 @@ def change(walk: Walk, values: Floats, baseline: float | None) -> float | None:
     return percent if walk.higher_is_better else -percent
 
 
-def early(walk: Walk, history: History) -> float | None:
-    """Return the change of the first strides with feedback."""
-    return change(walk, walk.values(walk.with_feedback)[:ENDS], history.baseline)
+def change_of(choose: Callable[[Walk], Floats]) -> Callable[[Walk, History], float | None]:
+    """Return what computes the change of the values that ``choose`` returns of a walk."""
+    return lambda walk, history: change(walk, choose(walk), history.baseline)
 
 
-def training(walk: Walk, history: History) -> float | None:
-    """Return the change of all strides with feedback."""
-    return change(walk, walk.values(walk.with_feedback), history.baseline)
-
-
-def late(walk: Walk, history: History) -> float | None:
-    """Return the change of the last strides with feedback."""
-    return change(walk, walk.values(walk.with_feedback)[-ENDS:], history.baseline)
-
-
-def catch(walk: Walk, history: History) -> float | None:
-    """Return the change in catch phases."""
-    return change(walk, walk.values(walk.in_kind("catch")), history.baseline)
-
-
-def washout(walk: Walk, history: History) -> float | None:
-    """Return the change in washout."""
-    return change(walk, walk.values(walk.in_kind("washout")), history.baseline)
-
-
-def after_effect(walk: Walk, history: History) -> float | None:
-    """Return the change of the first strides of washout."""
-    return change(walk, walk.values(walk.in_kind("washout"))[:FIRST_AFTER], history.baseline)
+training = change_of(lambda walk: walk.trained)
+early = change_of(lambda walk: walk.trained[:ENDS])
+late = change_of(lambda walk: walk.trained[-ENDS:])
+catch = change_of(lambda walk: walk.values(walk.in_kind("catch")))
+washout = change_of(lambda walk: walk.values(walk.in_kind("washout")))
+after_effect = change_of(lambda walk: walk.values(walk.in_kind("washout"))[:FIRST_AFTER])
 
 
 def washout_loss(walk: Walk, history: History) -> float | None:
@@ -128,7 +112,7 @@ def of_goal(walk: Walk, _history: History) -> float | None:
 
 def cv(walk: Walk, _history: History) -> float | None:
     """Return the variation of the strides with feedback."""
-    return variation(walk.values(walk.with_feedback))
+    return variation(walk.trained)
 
 
 def variation(values: Floats) -> float | None:
@@ -140,7 +124,7 @@ def variation(values: Floats) -> float | None:
 
 def steadiness(walk: Walk, _history: History) -> float | None:
     """Return the SD of the strides with feedback about their line, in percent of the baseline."""
-    values = walk.values(walk.with_feedback)
+    values = walk.trained
     return None if walk.baseline is None else detrended(values / walk.baseline)
 
 
@@ -163,7 +147,7 @@ def memory(values: Floats) -> float | None:
 
 def lag_1(walk: Walk, _history: History) -> float | None:
     """Return the lag-1 autocorrelation of the strides with feedback."""
-    return memory(walk.values(walk.with_feedback))
+    return memory(walk.trained)
 
 
 def error(walk: Walk, _history: History) -> float | None:

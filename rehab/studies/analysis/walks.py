@@ -73,6 +73,11 @@ class Walk:
         """Return the valid values among some strides, in their order."""
         return self.value[where & self.valid]
 
+    @property
+    def trained(self) -> Floats:
+        """The valid values of strides with feedback, in their order."""
+        return self.values(self.with_feedback)
+
 
 # What is read of each stride of the trained leg, in this order.
 COLUMNS = tuple(column.name for column in fields(Walk) if column.name not in Walk.OF_SESSION)

@@ -7,13 +7,15 @@ ours, and short. An item without an answer is still to be written: GARRY says so
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from textwrap import fill
 
 from rehab.studies.models import Study
 from rehab.studies.record.facts import ASKED
 from rehab.studies.record.known import know
 from rehab.studies.results.results import Results
 
+INDENT = "    "
 BY_HAND = "to be written in the report"
 # List; then one line for each item: number | words | what answers it.
 ITEMS = {
@@ -108,7 +110,7 @@ ITEMS = {
         23b | why it ended | ended stopping
         24a | interventions as delivered | delivered
         24b | concomitant care | concomitant
-        25 | baseline data | -
+        25 | baseline data | baseline
         26 | numbers, outcomes, estimates | estimates
         27 | harms | harms_found
         28 | ancillary analyses | further
@@ -182,3 +184,23 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "answer": " ".join(given),
                 "still asked": "; ".join(lacking),
             }
+
+
+def checklist_text(rows: Iterable[dict[str, str]], name: str) -> str:
+    """Return a list as a reader gets it: each item, its answer, what is still asked.
+
+    Parameters
+    ----------
+    rows, name
+        Of `checklist_rows`; a key of `ITEMS`.
+    """
+    lines = [name]
+    for row in rows:
+        if row["list"] == name:
+            lines.append(f"\n{row['item']:<4}{row['what']}")
+            asked = row["still asked"] and f"[Still asked: {row['still asked']}]"
+            texts = filter(None, (row["answer"], asked))
+            lines += [
+                fill(text, 100, initial_indent=INDENT, subsequent_indent=INDENT) for text in texts
+            ]
+    return "\n".join(lines) + "\n"

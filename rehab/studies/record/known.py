@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from statistics import mean, stdev
 from typing import Any
 
+from rehab.studies.analysis.comparison import Interval
+from rehab.studies.analysis.designs import MIN_PARTICIPANTS
 from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.models import Study, StudyMark
 from rehab.studies.participants import StudyEvent
@@ -117,7 +120,6 @@ def _conducted(study: Study) -> dict[str, str]:
 
 def _found(study: Study, results: Results) -> dict[str, str]:
     flow, assessed = results.flow, results.assessed
-    primary = results.find(results.primary).differences
     kinds = StudyEvent.Kind
     revealed = study.events.filter(kind__in=(kinds.UNBLINDED, kinds.EMERGENCY))
     alone = revealed.filter(about="alone").count()
@@ -134,11 +136,8 @@ def _found(study: Study, results: Results) -> dict[str, str]:
             f"{one.visits_unfinished} ended early"
             for one in flow
         ),
-        "estimates": "; ".join(
-            f"{one.group} - {one.reference}: {one.difference.estimate:.3g} "
-            f"[{_end(one.difference.low)}, {_end(one.difference.high)}]"
-            for one in primary
-        ),
+        "baseline": "; ".join(filter(None, (_baseline(results, arm) for arm in results.arms))),
+        "estimates": " ".join(_estimates(results, slug) for slug in results.registered),
         "harms_found": "; ".join(
             f"{row.what}: "
             + ", ".join(f"{arm} {n} in {people}" for arm, (n, people) in row.counts.items())
@@ -150,5 +149,32 @@ def _found(study: Study, results: Results) -> dict[str, str]:
     }
 
 
-def _end(value: float | None) -> str:
-    return "" if value is None else f"{value:.3g}"
+def _baseline(results: Results, arm: str) -> str:
+    """Return how many have a first baseline in an arm, with its mean and standard deviation."""
+    people = [one for one in results.participants if one.is_analyzed and arm in one.arms]
+    found = [one.baseline for one in people if one.baseline is not None]
+    if len(found) < MIN_PARTICIPANTS:
+        return ""
+    measure = next(one.measure for one in people if one.measure)
+    return f"{arm}: {len(found)} with {measure} {mean(found):.3g} (SD {stdev(found):.2g})"
+
+
+def _estimates(results: Results, slug: str) -> str:
+    """Return an outcome's numbers, means and differences, with 95 % intervals."""
+    found, (label, unit) = results.find(slug), OUTCOMES[slug]
+    means = (f"{one.arm} {one.participants} people, {_text(one.mean)}" for one in found.arms)
+    apart = (
+        f"{one.group} - {one.reference} {_text(one.difference)}"
+        + ("" if one.p is None else f", p {one.p:.2g}")
+        for one in found.differences
+    )
+    status = results.registered[slug].status
+    return f"{label}{unit and f' [{unit}]'} ({status}): {'; '.join((*means, *apart))}."
+
+
+def _text(found: Interval | None) -> str:
+    if found is None:
+        return "no mean"
+    if found.low is None or found.high is None:
+        return f"{found.estimate:.3g}"
+    return f"{found.estimate:.3g} [{found.low:.3g}, {found.high:.3g}]"

@@ -22,8 +22,9 @@ EVENTS = (
 )  # fmt: skip
 METHOD = (
     "Linear mixed model by restricted maximum likelihood with variances of each arm's own and the "
-    "small-sample correction of Kenward and Roger; two-sided at 5 %. Secondary outcomes, and pairs "
-    "of several arms, by Holm. Per protocol: without visits that deviated."
+    "small-sample correction of Kenward and Roger by the observed information; two-sided at 5 %. "
+    "Secondary outcomes, and pairs of several arms, by Holm. Per protocol: without visits that "
+    "deviated."
 )
 
 

@@ -1,7 +1,7 @@
 """Which outcomes were registered when, and every change of them since the first registration.
 
 What was registered first stays what it was: a primary outcome that is replaced later is still
-reported first, with the change beside it (CONSORT 2010, items 3b and 6b).
+reported first, with the change beside it (CONSORT 2025, item 10).
 """
 
 from __future__ import annotations

@@ -86,6 +86,7 @@ _PAUSE_REASONS: Choices = {
     PauseReason.PATIENT.value: gettext_noop("on the patient’s page"),
     PauseReason.RESTART.value: gettext_noop("by a restart of the server"),
     PauseReason.REST.value: gettext_noop("for a rest"),
+    PauseReason.HEART_RATE.value: gettext_noop("by the limit of the heart rate"),
 }
 
 _NOTHING: frozenset[float] = frozenset()

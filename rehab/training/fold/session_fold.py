@@ -23,6 +23,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.scoring import RULES_VERSION, score_measurement
 from rehab.training.steps import (
+    HEART_RATE,
     InvalidMeasurement,
     InvalidReason,
     Measurement,
@@ -192,6 +193,10 @@ class SessionFold:
         self.was_walking = running and not backwards
         if running and self.phase.is_over(self.phase_strides, self.phase_s):
             self._advance_phase()
+        limit, rate = self.plan.heart_rate_limit, scored.extra.get(HEART_RATE)
+        if self.state is State.RUNNING and limit is not None and rate is not None and rate > limit:
+            self.state = State.PAUSED
+            self.pause(PauseReason.HEART_RATE)
         return scored
 
     def _count(self, step: ScoredStep, running: bool) -> None:

@@ -23,6 +23,7 @@ const PAUSES = {
   patient: _("Paused on the patient’s page."),
   rest: _("The plan has a rest of %(time)s here."),
   therapist: _("Paused by the therapist."),
+  heart_rate: _("The heart rate is above its limit: let the patient rest."),
 };
 
 const timeOf = (alarm) =>

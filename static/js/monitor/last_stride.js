@@ -37,6 +37,7 @@ export function createLastStride({ state, show }) {
 
   function describeExtra([name, value]) {
     if (name in WORN) return fill(WORN[name], { version: value });
+    if (name === "heart_rate") return fill(_("heart rate %(rate)s/min"), { rate: number(value, 0) });
     return `${name} ${number(+value.toPrecision(3), null)}`;
   }
 

@@ -175,6 +175,22 @@ async def test_a_planned_rest_pauses_everyone_until_the_therapist_goes_on(place,
     assert (await again.until(lambda event: event.get("state") == "running"))["rest_s"] is None
 
 
+async def test_a_heart_rate_above_the_limit_pauses_until_it_is_below(place, begun):
+    session = await begun(place, TRAINING, heart_rate_limit=120)
+    source, monitor = await place.source().open(), await place.monitor(session).open()
+    for rate in (120, 121):
+        await source.walk(4.0, extra={"heart_rate": rate})
+    paused = await monitor.until(lambda event: event.get("state") == "paused")
+    assert paused["pause_reason"] == "heart_rate"
+    assert len(await events_of(session, "heart_rate_limit")) == 1
+    await restart()
+    again = place.monitor(session)
+    assert (await again.watch())["pause_reason"] == "heart_rate"
+    assert (await again.change("resume"))["type"] == "done"
+    stored = [one.reasons async for one in Step.everywhere.filter(session=session)]
+    assert stored == [[], []]
+
+
 async def test_every_third_step_is_told_and_the_score_counts_them_all(place, begun):
     session = await begun(place, TRAINING, schedule=Schedule(interval=3))
     source, tablet = await place.source().open(), await place.tablet(session).open()

@@ -7,7 +7,7 @@ from typing import Any
 
 from channels.db import database_sync_to_async
 
-from rehab.sessions.log import RuleEntry, SessionEvent, Step
+from rehab.sessions.log import RULE_PAUSES, SessionEvent, Step
 from rehab.training.changes import ChangeKind, State
 from rehab.training.controls import CONTROLS
 from rehab.training.measures import Measure
@@ -73,12 +73,12 @@ def _find_reasons(
         reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
     moving = [
         *(kind for kind, one in CONTROLS.items() if one.leads_to in (State.RUNNING, State.PAUSED)),
-        RuleEntry.PLANNED_REST,
+        *RULE_PAUSES.values(),
     ]
     moves = SessionEvent.everywhere.filter(
         session_id=session_id, after_number__lt=number, kind__in=moving
     )
     last = moves.order_by("-pk").values_list("kind", flat=True).first()
-    if last in (ChangeKind.PAUSE, RuleEntry.PLANNED_REST):
+    if last in (ChangeKind.PAUSE, *RULE_PAUSES.values()):
         reasons = add_reason(reasons, InvalidReason.PAUSED)
     return reasons

@@ -29,7 +29,7 @@ from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.robot_orders import RobotOrders
-from rehab.sessions.log import ALARM_KINDS, Remark, RuleEntry, Step
+from rehab.sessions.log import ALARM_KINDS, RULE_PAUSES, Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State
 from rehab.training.controls import Audience
@@ -135,8 +135,8 @@ class LiveSession:
             followed = RuleEntry.GOAL_FOLLOWED
             old = before.goal
             rows.append(self.aggregate.log_event(followed, None, received_at, {}, fold.goal, old))
-        if ChangeKind.PAUSE in changed:
-            rest = RuleEntry.PLANNED_REST
+        if ChangeKind.PAUSE in changed and fold.pause_reason is not None:
+            rest = RULE_PAUSES[fold.pause_reason]
             rows.append(self.aggregate.log_event(rest, None, received_at, {}, fold.rest_s))
         summary = None
         if before.has_moved(fold) or self.aggregate.is_checkpoint_due:

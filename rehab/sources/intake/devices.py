@@ -1,4 +1,6 @@
-"""What a treadmill says of itself: FTMS frames by Bluetooth, or cells of a lab's rows.
+"""What devices beside the signals say: a treadmill's speed, a heart-rate sensor's beats.
+
+They come as frames of Bluetooth, or as cells of a lab's rows.
 
 FTMS: Bluetooth SIG, Fitness Machine Service 1.0, section 4.9, Treadmill Data (0x2ACD). Reading the
 frames from the air is a source's matter; here are bytes and numbers alone.
@@ -10,6 +12,7 @@ import math
 from collections.abc import Mapping
 
 from rehab.sources.intake.rows import BadRow, Cell
+from rehab.training.steps import HEART_RATE
 
 BELT_SPEED, WEIGHT_SUPPORT, INCLINE = "belt_speed_m_s", "weight_support_percent", "incline_percent"
 # Cells of rows, in SI as D-Flow streams its belts; of two belts the mean counts.
@@ -17,6 +20,7 @@ CELLS = {
     BELT_SPEED: (BELT_SPEED, "LeftBelt.Speed", "RightBelt.Speed"),
     WEIGHT_SUPPORT: (WEIGHT_SUPPORT,),
     INCLINE: (INCLINE,),
+    HEART_RATE: (HEART_RATE,),
 }
 NAMES = frozenset(name for names in CELLS.values() for name in names)
 
@@ -62,8 +66,8 @@ def encode_treadmill(speed_m_s: float) -> bytes:
     return b"\x00\x00" + round(speed_m_s / _SPEED_M_S).to_bytes(2, "little")
 
 
-def read_treadmill(cells: Mapping[str, Cell]) -> dict[str, float]:
-    """Return what a lab's row says of the treadmill. What is blank or no number is left out."""
+def read_devices(cells: Mapping[str, Cell]) -> dict[str, float]:
+    """Return what a lab's row says of devices. What is blank or no number is left out."""
     said = {}
     for name, columns in CELLS.items():
         values = [cells.get(column) for column in columns]

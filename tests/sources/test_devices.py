@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from rehab.sources.intake.devices import decode_treadmill, encode_treadmill, read_devices
 from rehab.sources.intake.rows import BadRow
-from rehab.sources.intake.treadmill import decode_treadmill, encode_treadmill, read_treadmill
-from rehab.sources.synthetic.source import find_speed
+from rehab.sources.synthetic.source import find_heart_rate, find_speed
 from tests.sources.intake_harness import IntakeHarness, rows_of
 
 # Frames by the tables of FTMS 1.0, section 4.9.1: flags, then the fields in their order.
@@ -54,16 +54,22 @@ def test_what_is_encoded_is_decoded():
         ({"weight_support_percent": 20.0}, {"weight_support_percent": 20.0}),
         ({"belt_speed_m_s": "fast"}, {}),
         ({"belt_speed_m_s": float("nan")}, {}),
+        ({"heart_rate": 91.0}, {"heart_rate": 91.0}),
         ({"value": 3.9}, {}),
     ],
 )
 def test_a_row_says_it_in_cells(row, said):
-    assert read_treadmill(row) == pytest.approx(said)
+    assert read_devices(row) == pytest.approx(said)
 
 
 def test_the_simulated_one_grows_faster_up_to_an_end():
     speeds = [find_speed(time_s) for time_s in (-1, 0, 59, 60, 240, 9_999)]
     assert speeds == pytest.approx([0.5, 0.5, 0.5, 0.6, 0.9, 0.9])
+
+
+def test_the_simulated_heart_rises_and_settles():
+    rates = [find_heart_rate(time_s) for time_s in (-1, 0, 90, 9_999)]
+    assert rates == [72, 72, 101, 118]
 
 
 def test_strides_carry_what_was_last_said():
