@@ -159,6 +159,12 @@ class RuleEntry(StrEnum):
     PLANNED_REST = "planned_rest"  # the session paused for the rest after a phase
 
 
+class PartEntry(StrEnum):
+    """What else made the session. It changes no score."""
+
+    PLUGIN = "plugin"  # a part of another package: kind, name, package and version in ``data``
+
+
 class Remark(StrEnum):
     """What a PT notes with one tap during a session. It changes no score either.
 
@@ -214,6 +220,7 @@ EVENTS = {
     **{kind: _(control.log_label) for kind, control in CONTROLS.items()},
     RuleEntry.GOAL_FOLLOWED: _("goal followed"),
     RuleEntry.PLANNED_REST: _("planned rest"),
+    PartEntry.PLUGIN: _("plug-in"),
     RobotEntry.STOP: _("robot stop"),
     RobotEntry.ARM: _("robot arm"),
     RobotEntry.DECISION: _("robot decision"),

@@ -23,7 +23,7 @@ from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.research.metadata import write_anonymity, write_crate
 from rehab.exports.research.session_files import ABOUT, KINDS, write_part
-from rehab.exports.research.sinks import has_parquet
+from rehab.exports.research.sinks import FORMATS, available_formats
 from rehab.exports.research.study_files import groups_of, studies_of, study_files
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.people.models import User
@@ -199,7 +199,7 @@ class Package:
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
             yield f"bids/{name}", [text]
         for part in parts:
-            for kind in KINDS:
+            for kind in (*FORMATS, *KINDS):
                 for file in sorted((part / kind).rglob("*.*")):
                     if file.is_file():
                         yield file.relative_to(part).as_posix(), _read(file)
@@ -208,7 +208,7 @@ class Package:
         what = f"study {self.study}" if self.study else "all sessions"
         parquet = (
             "Steps and feedback also as Parquet, a file for each session in one folder for each."
-            if has_parquet()
+            if "parquet" in available_formats()
             else "No Parquet: the server has no pyarrow (pip install 'garry[parquet]')."
         )
         dates = (
