@@ -13,6 +13,7 @@ from django.utils import timezone
 from rehab.exports.backup import write_backup
 from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.management.new_file import new_file
+from rehab.outbox.models import Topic, tell
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
@@ -37,8 +38,13 @@ class Command(BaseCommand):
                 "A backup holds everything about patients, and is encrypted to a public key in "
                 f"GARRY_BACKUP_KEYS. {problem}"
             ) from problem
-        with new_file(file) as out:
-            counts = write_backup(out, recipients, now)
+        try:
+            with new_file(file) as out:
+                counts = write_backup(out, recipients, now)
+        except Exception as problem:
+            for clinic in Clinic.everywhere.all():
+                tell(clinic.pk, Topic.BACKUP, {"problem": type(problem).__name__}, now)
+            raise
         for clinic in Clinic.everywhere.all():
             audit_log.record(
                 Act.BACKUP, None, clinic_id=clinic.pk, about="manage.py backup", now=now
