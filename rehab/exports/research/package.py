@@ -12,13 +12,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from django.db.models import QuerySet
 
 from rehab.exports.archive import write_csv
+from rehab.exports.fhir.resources import garry_version
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.research.metadata import write_anonymity, write_crate
@@ -254,14 +254,6 @@ def _read_about(folder: Path) -> tuple[dict[str, Any], datetime]:
     """Return who asked for an export, for what, and when. Raises OSError, ValueError, KeyError."""
     about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
     return about, datetime.fromisoformat(about["made_at"])
-
-
-def garry_version() -> str:
-    """Return the version of GARRY that is installed."""
-    try:
-        return version("garry")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _concatenate(header: list[str], files: Iterable[Path]) -> Iterator[str | bytes]:

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from rehab.exports.fhir.resources import Pseudonyms, make_bundle
 from rehab.exports.research.bids import EventSink, MotionSink
 from rehab.exports.research.dates import SINCE_1970_S, shift_of, shift_rows
-from rehab.exports.research.fhir import write_bundle
 from rehab.exports.research.recordings import RecordingSink
 from rehab.exports.research.robot_motion import RobotMotionSink
 from rehab.exports.research.sinks import CsvSink, Sink, available_formats, pump
@@ -75,7 +75,9 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
         hides_clocks=shift is not None,
     )
     pump(shift_rows(INCIDENTS.read(selection), shift), [robot])
-    write_bundle(_of(aside / "fhir", session, "json"), user, session, shift)
+    bundle = make_bundle(user, session, Pseudonyms(shift))
+    text = json.dumps(bundle, ensure_ascii=False, indent=1)
+    _of(aside / "fhir", session, "json").write_text(f"{text}\n", "utf-8")
     about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
     row = next(SESSIONS.read(selection))
     about |= {column.name: getattr(row, column.name) for column in PARTICIPANT}
