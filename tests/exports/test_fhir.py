@@ -1,4 +1,4 @@
-"""FHIR: read by the hospital's programs, sent to its server, and never beyond clinic and consent."""
+"""FHIR: read by a hospital, sent to its server, and never beyond clinic and consent."""
 
 from __future__ import annotations
 
