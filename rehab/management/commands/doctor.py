@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import tempfile
 import time
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
-from importlib.metadata import distributions
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from django.apps import apps
 from django.conf import settings
 from django.contrib.staticfiles import finders
 from django.core.checks import run_checks
@@ -26,6 +23,7 @@ from django.utils import timezone
 from rehab.exports.research.sinks import FORMATS
 from rehab.gait.recordings.readers import READERS
 from rehab.management.new_file import new_file
+from rehab.management.problem_report import write_report
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
 from rehab.people.sign_in.first_start import count_pending_migrations
@@ -43,7 +41,6 @@ from robot.motion.gestures import GESTURES
 from robot.plugins import Registry
 
 REGISTRIES: tuple[Registry[Any], ...] = (SOURCES, READERS, MEASURES, BASES, GESTURES, FORMATS)
-RELEVANT = {"garry", "django", "channels", "daphne", "numpy", "scipy", "psycopg", "pyserial"}
 SLOW_DISK_S = 0.05
 SEALED_SINCE = timedelta(days=30)  # whose rows are read again without --deep
 
@@ -91,38 +88,11 @@ class Command(BaseCommand):
                 self.stdout.write(f"{'':<24} → {diagnosis.cure}")
         if report is not None:
             with new_file(report) as out:
-                out.write(write_report(diagnoses, timezone.now()).encode())
+                states = [(one.subject, one.state, bool(one.cure)) for one in diagnoses]
+                plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
+                out.write(write_report(states, plugins, timezone.now()).encode())
         if any(diagnosis.cure for diagnosis in diagnoses):
             raise SystemExit(1)
-
-
-def write_report(diagnoses: list[Diagnosis], now: datetime) -> str:
-    """Return what helps to find a problem: versions, sizes, diagnoses. Nothing that people typed.
-
-    Of settings the names alone: values may be keys or addresses.
-    """
-    found = sorted(
-        (one.name, one.version) for one in distributions() if one.name.lower() in RELEVANT
-    )
-    plugins = sorted({(one.package, one.version) for each in REGISTRIES for one in each.plugins})
-    sizes = [
-        (model._meta.label_lower, model._base_manager.count())
-        for model in apps.get_app_config("rehab").get_models()
-    ]
-    texts = [
-        f"GARRY, {now:%Y-%m-%d %H:%M} UTC",
-        f"Python {platform.python_version()}, {platform.system()} {platform.release()}",
-        f"database: {connection.vendor}; hosted: {settings.HOSTED}",
-        f"set: {', '.join(sorted(name for name in settings.VARIABLES if name in os.environ))}",
-        *(f"{name} {version}" for name, version in (*found, *plugins)),
-        *(f"{label}: {count} rows" for label, count in sizes),
-        *(
-            f"{one.subject}: {'needs care' if one.cure else 'well'}: {one.state}"
-            for one in diagnoses
-        ),
-    ]
-    home = str(settings.DATA_DIR)
-    return "".join(f"{text.replace(home, 'DATA')}\n" for text in texts)
 
 
 def examine(run: Callable[[], Iterator[Diagnosis]]) -> list[Diagnosis]:

@@ -34,7 +34,6 @@ from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 
-
 # Nicknames in a demonstration, which takes no other ones.
 DEMO_NAMES = ("Amber", "Basil", "Clover", "Dill", "Elder", "Fern", "Demo")
 

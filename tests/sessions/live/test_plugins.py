@@ -36,9 +36,10 @@ async def test_source_and_robot_are_noted_with_their_packages(place, begun):
 async def test_what_is_no_package_is_refused(place, begun):
     await begun(place)
     source = await place.source().dial()
-    answer = await source.hello(plugin={**WAGON, "version": "1 <b>"})
-    assert answer["type"] == "error"
-    assert "a version" in answer["message"]
+    bad = {**WAGON, "version": "1 <b>"}
+    await source.say({"type": "hello", "version": 1, "run": "r1", "last": 0, "plugin": bad})
+    _, error = await source.sent_away()
+    assert '"plugin" is an object with kind, name, package, version' in error["message"]
 
 
 async def test_a_measure_and_a_gesture_are_noted_at_the_start(place, begun, monkeypatch):
