@@ -10,7 +10,8 @@ from importlib.metadata import distributions
 
 from django.apps import apps
 from django.conf import settings
-from django.db import connection
+from django.db import DatabaseError, connection
+from django.db.models import Model
 
 from robot.plugins import Plugin
 
@@ -30,7 +31,7 @@ def write_report(
     )
     others = sorted({(one.package, one.version) for one in plugins})
     sizes = [
-        (model._meta.label_lower, model._base_manager.count())
+        (model._meta.label_lower, _count(model))
         for model in apps.get_app_config("rehab").get_models()
     ]
     texts = [
@@ -43,4 +44,13 @@ def write_report(
         *(f"{what}: {'needs care' if bad else 'well'}: {state}" for what, state, bad in states),
     ]
     home = str(settings.DATA_DIR)
-    return "".join(f"{text.replace(home, 'DATA')}\n" for text in texts)
+    lines = (text.replace(home, "DATA").partition("\n")[0] for text in texts)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _count(model: type[Model]) -> int | str:
+    """Return how many rows a model has; what stands in the way is among the diagnoses."""
+    try:
+        return model._base_manager.count()
+    except DatabaseError:
+        return "unknown"

@@ -16,11 +16,13 @@ from django.test import Client, RequestFactory
 from django.urls import URLPattern, URLResolver, get_resolver, reverse
 
 from rehab.boards.models import Leaderboard
+from rehab.exports.fhir.api import TYPES as FHIR_TYPES
 from rehab.patients.family import FamilyLink
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.stations.models import Device, Station
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
@@ -177,6 +179,21 @@ def fill(
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
             return
+        elif wanted == {"fhir_id"}:  # of each kind the clinic's own, by its session
+            of, kind = world.session.pk, name.removeprefix("api:read_")
+            found = {
+                "Patient": f"patient-{world.patient.pk}",
+                "Encounter": f"session-{of}",
+                "Provenance": f"provenance-{of}",
+                "QuestionnaireResponse": f"answers-{of}-{world.rows[QuestionnaireResponse].pk}",
+                "Observation": f"figure-{of}-score",
+            }
+            whose = (world.name, Patient) if kind in found else ()
+            yield Route(name, reverse(name, kwargs={"fhir_id": found.get(kind, "garry")}), *whose)
+        elif wanted == {"fhir_type"}:
+            for kind in FHIR_TYPES:
+                url = reverse(name, kwargs={"fhir_type": kind})
+                yield Route(name, f"{url}?before=2200-01-01T00:00:00Z")
         elif wanted == {"token"}:  # of a family's link; nobody knows one that is there
             yield Route(name, reverse(name, kwargs={"token": "no-such-link"}))
             return

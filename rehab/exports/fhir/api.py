@@ -139,11 +139,11 @@ def _add_calls(kind: str) -> None:
         return _answer(bundle | ({"entry": entries} if entries else {}))
 
     @router.get(
-        f"/fhir/{kind}/{{name}}", response=responses(dict, 404), operation_id=f"read_{kind}"
+        f"/fhir/{kind}/{{fhir_id}}", response=responses(dict, 404), operation_id=f"read_{kind}"
     )
     @for_roles(Role.LEAD, Role.PT)
-    def read(request: HttpRequest, name: Path[str]) -> HttpResponse:
-        return _answer(_find(caller(request), kind, name))
+    def read(request: HttpRequest, fhir_id: Path[str]) -> HttpResponse:
+        return _answer(_find(caller(request), kind, fhir_id))
 
     search.__doc__, read.__doc__ = f"Search {kind} resources.", f"Read one {kind}."
 
@@ -195,14 +195,17 @@ def show_capabilities(request: HttpRequest) -> HttpResponse:
     )
 
 
-@router.get("/fhir/$export", response={**responses(dict), 202: None})
+@router.get("/fhir/$export", response=responses(dict, code=202))
 @for_roles(Role.LEAD, Role.PT, exports=True)
 def start_bulk(request: HttpRequest) -> HttpResponse:
     """Begin an export of the whole clinic (Bulk Data); its files are made while they are read."""
     place = request.build_absolute_uri(request.path).removesuffix("$export")
     before = timezone.now().isoformat(timespec="seconds").replace("+00:00", "Z")
     headers = {"Content-Location": f"{place}bulk?before={before}"}
-    return HttpResponse(status=202, headers=headers)
+    words = "It is ready at Content-Location, at once."
+    issue = {"severity": "information", "code": "informational", "diagnostics": words}
+    outcome = json.dumps({"resourceType": "OperationOutcome", "issue": [issue]})
+    return HttpResponse(outcome, content_type=JSON, status=202, headers=headers)
 
 
 class Before(Schema):
@@ -226,13 +229,13 @@ def show_bulk(request: HttpRequest, wanted: Query[Before]) -> dict[str, Any]:
     }
 
 
-@router.get("/fhir/bulk/{kind}.ndjson", response=responses(dict, 404))
+@router.get("/fhir/bulk/{fhir_type}.ndjson", response=responses(dict, 404))
 @for_roles(Role.LEAD, Role.PT, exports=True)
-def read_bulk(request: HttpRequest, kind: Path[str], wanted: Query[Before]) -> HttpResponse:
+def read_bulk(request: HttpRequest, fhir_type: Path[str], wanted: Query[Before]) -> HttpResponse:
     """Read all resources of one type, one a line."""
-    if kind not in TYPES:
+    if fhir_type not in TYPES:
         raise Http404
-    lines = _lines(_all(caller(request), kind, wanted.before))
+    lines = _lines(_all(caller(request), fhir_type, wanted.before))
     return StreamedResponse(lines, content_type=NDJSON)  # type: ignore[return-value]
 
 
