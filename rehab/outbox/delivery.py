@@ -8,13 +8,13 @@ import json
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cryptography.fernet import InvalidToken
 from django.conf import settings
 from django.db.models import QuerySet
 
-from rehab.outbox.http_post import Refused, post
+from rehab.outbox.http_post import Answer, Refused, post
 from rehab.outbox.models import Endpoint, OutboxMessage
 
 CLAIMED_FOR = timedelta(minutes=2)  # by a server, which may die meanwhile
@@ -76,7 +76,7 @@ def _find_due(now: datetime) -> QuerySet[OutboxMessage]:
     )
 
 
-def deliver_due(now: datetime, send: Callable[..., Any] = post) -> int:
+def deliver_due(now: datetime, send: Callable[..., Answer] = post) -> int:
     """Send what is due; return how many messages were delivered.
 
     A receiver that fails gets no more until the next call. Several servers may call this at once:
@@ -97,7 +97,7 @@ def deliver_due(now: datetime, send: Callable[..., Any] = post) -> int:
     return delivered
 
 
-def _attempt(message: OutboxMessage, now: datetime, send: Callable[..., Any]) -> bool:
+def _attempt(message: OutboxMessage, now: datetime, send: Callable[..., Answer]) -> bool:
     """Send a message and store what that came to. Return whether it was received."""
     endpoint = message.endpoint
     try:
@@ -114,9 +114,22 @@ def _attempt(message: OutboxMessage, now: datetime, send: Callable[..., Any]) ->
         message.note(str(problem), is_final=False, is_delivered=False, now=now)
         return False
     is_delivered = 200 <= answer.status < 300
-    words = f"{answer.status} {'' if is_delivered else answer.text}".strip()
+    said = "" if is_delivered else _tell_why(endpoint, answer)
+    words = f"{answer.status} {said}".strip()
     message.note(words, is_final=answer.status in REFUSALS, is_delivered=is_delivered, now=now)
     if answer.status == GONE:
         endpoint.active = False
         endpoint.save(update_fields=["active"])
     return is_delivered
+
+
+def _tell_why(endpoint: Endpoint, answer: Answer) -> str:
+    """Return why a message was refused; of a FHIR server no words, which may name the patient."""
+    if endpoint.kind != Endpoint.Kind.FHIR:
+        return answer.text
+    try:
+        issues = json.loads(answer.text)["issue"]
+        places = (f"{one['code']} {' '.join(one.get('expression', ()))}" for one in issues)
+        return "; ".join(place.strip() for place in places)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return ""

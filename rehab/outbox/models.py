@@ -52,8 +52,9 @@ class Endpoint(ClinicModel):
     )
     name = models.CharField(_("name"), max_length=64)
     kind = models.CharField(_("kind"), max_length=8, choices=Kind.choices, default=Kind.WEBHOOK)
-    url = models.URLField(
+    url = models.CharField(
         _("address"),
+        max_length=400,
         help_text=_("https://…; addresses within a network only where the host allows them."),
     )
     tells_sessions = models.BooleanField(Topic.SESSION.label, default=True)
@@ -74,8 +75,15 @@ class Endpoint(ClinicModel):
         return self.name
 
     def clean(self) -> None:
-        """Refuse an address with a password in it, which lists and logs would show."""
-        if "@" in urlsplit(self.url or "").netloc:
+        """Refuse what is no address, and one with a password, which lists and logs would show."""
+        try:
+            place = urlsplit(self.url or "")
+            is_address = place.scheme in ("http", "https") and bool(place.hostname)
+        except ValueError:
+            is_address = False
+        if not is_address:
+            raise ValidationError({"url": _("An address begins with https://.")})
+        if "@" in place.netloc:
             raise ValidationError({"url": _("Give the address without a name and password.")})
 
     def tells(self, topic: Topic) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from datetime import timedelta
+from typing import Any
 
 import pytest
 
@@ -129,7 +130,7 @@ def bulk(world, kind, role=Role.PT):
     assert begun.status_code == 202
     manifest = program.get(begun.headers["Content-Location"]).json()
     (url,) = (one["url"] for one in manifest["output"] if one["type"] == kind)
-    answer = program.get(url)
+    answer: Any = program.get(url)
     assert answer.headers["Content-Type"] == "application/fhir+ndjson"
     return b"".join(answer.streaming_content).decode()
 
@@ -217,11 +218,12 @@ def test_an_erased_patient_and_a_refusal_are_shown_and_not_repeated(world, endpo
     type(first).everywhere.filter(pk=first.pk).update(excluded=True)
 
     def refuse(*_):
-        return Answer(422, '{"resourceType": "OperationOutcome"}')
+        issue = {"code": "invalid", "diagnostics": "Rosa", "expression": ["Patient.identifier"]}
+        return Answer(422, json.dumps({"issue": [issue]}))
 
     for minutes in (60, 120):
         deliver_due(NOW + timedelta(minutes=minutes), refuse)
     rows = {row.body["session"]: row for row in OutboxMessage.everywhere.filter(endpoint=endpoint)}
     assert rows[first.pk].answer == "A correction took the session out."
-    assert "OperationOutcome" in rows[second.pk].answer
+    assert rows[second.pk].answer == "422 invalid Patient.identifier"  # without its words
     assert {row.state for row in rows.values()} == {"refused"}

@@ -180,7 +180,7 @@ def fill(
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
             return
         elif wanted == {"fhir_id"}:  # of each kind the clinic's own, by its session
-            of, kind = world.session.pk, name.removeprefix("api:read_")
+            of, what = world.session.pk, name.removeprefix("api:read_")
             found = {
                 "Patient": f"patient-{world.patient.pk}",
                 "Encounter": f"session-{of}",
@@ -188,11 +188,11 @@ def fill(
                 "QuestionnaireResponse": f"answers-{of}-{world.rows[QuestionnaireResponse].pk}",
                 "Observation": f"figure-{of}-score",
             }
-            whose = (world.name, Patient) if kind in found else ()
-            yield Route(name, reverse(name, kwargs={"fhir_id": found.get(kind, "garry")}), *whose)
+            url = reverse(name, kwargs={"fhir_id": found.get(what, "garry")})
+            yield Route(name, url, world.name, Patient) if what in found else Route(name, url)
         elif wanted == {"fhir_type"}:
-            for kind in FHIR_TYPES:
-                url = reverse(name, kwargs={"fhir_type": kind})
+            for what in FHIR_TYPES:
+                url = reverse(name, kwargs={"fhir_type": what})
                 yield Route(name, f"{url}?before=2200-01-01T00:00:00Z")
         elif wanted == {"token"}:  # of a family's link; nobody knows one that is there
             yield Route(name, reverse(name, kwargs={"token": "no-such-link"}))

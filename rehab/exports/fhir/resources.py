@@ -156,9 +156,9 @@ def session_resources(
         test = row.definition
         own = {"system": f"{SYSTEM}:test", "code": row.test, "display": test.label}
         loinc = [{"system": LOINC, "code": test.loinc}] if test.loinc else []
-        code = {"coding": [*loinc, own], "text": test.label}
+        coded = {"coding": [*loinc, own], "text": test.label}
         address = names.address("Observation", "test", session.pk, row.pk)
-        yield address, _observe(code, _at(row.at + shift), row.value, test.unit) | of
+        yield address, _observe(coded, _at(row.at + shift), row.value, test.unit) | of
     for answers in QuestionnaireResponse.objects.visible_to(user).filter(session=session):
         address = names.address("QuestionnaireResponse", "answers", session.pk, answers.pk)
         yield address, _answers(answers, shift) | of

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from asgiref.sync import sync_to_async
 
-from rehab.sessions.live.session import live_session
 from rehab.sessions.log import PartEntry, SessionEvent
 from rehab.sessions.reports.review import review_session
+from rehab.training.measures import MEASURES
 from robot.plugins import Plugin
 
 WAGON = {"kind": "garry.bases", "name": "wagon", "package": "garry-wagon", "version": "1.0"}
@@ -44,7 +44,7 @@ async def test_what_is_no_package_is_refused(place, begun):
 
 async def test_a_measure_and_a_gesture_are_noted_at_the_start(place, begun, monkeypatch):
     measure = Plugin("garry.measures", "a2", "garry-a2", "3", "")
-    monkeypatch.setattr(live_session.MEASURES, "find_plugin", lambda _name: measure)
+    monkeypatch.setattr(MEASURES, "find_plugin", lambda _name: measure)
     session = await begun(place)
     assert await noted(session) == [measure.describe()]
 

@@ -163,7 +163,7 @@ def _tell_receivers(events: Sequence[SessionEvent]) -> None:
         if alarm is None and event.kind not in ENDS:
             continue
         session = event.session
-        about = {"session": session.pk, "station": session.station_id}
+        about: dict[str, Any] = {"session": session.pk, "station": session.station_id}
         about |= {"how": event.kind} if alarm is None else {"reason": event.data.get("reason", "")}
         try:
             with transaction.atomic():
