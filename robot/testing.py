@@ -74,7 +74,7 @@ class Stage:
 
 def is_still(there: Any) -> bool:
     """Whether a base stands, as far as its sensors tell."""
-    return abs(there.twist.v_m_s) < 0.003 and abs(there.twist.w_rad_s) < 0.02
+    return bool(abs(there.twist.v_m_s) < 0.003 and abs(there.twist.w_rad_s) < 0.02)
 
 
 class BaseContract:
