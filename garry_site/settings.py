@@ -6,6 +6,7 @@ and not by a check, which only Django's own commands run.
 """
 
 import os
+from ipaddress import ip_network
 from pathlib import Path
 from urllib.parse import urlsplit
 from zoneinfo import available_timezones
@@ -29,6 +30,7 @@ VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are 
 # --- where and how it runs ----------------------------------------------------------------------
 
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
+DEMO = flag("GARRY_DEMO", False, "a demonstration: only invented patients (set by garry demo)")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
 DATA_DIR = Path(
     text(
@@ -155,6 +157,17 @@ DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 ADDRESS = text(
     "GARRY_ADDRESS", "", "host:port by which the proxy reaches this one of several servers"
 )
+PRIVATE_RECEIVERS = string_list(
+    "GARRY_PRIVATE_RECEIVERS", "", "private networks to which clinics may send webhooks and FHIR"
+)
+for network in PRIVATE_RECEIVERS:
+    try:
+        ip_network(network)
+    except ValueError:
+        raise ImproperlyConfigured(
+            f"GARRY_PRIVATE_RECEIVERS={network!r} is no network. Give 10.1.0.0/16 or 127.0.0.1/32."
+        ) from None
+
 # --- people -------------------------------------------------------------------------------------
 
 AUTH_USER_MODEL = "rehab.User"

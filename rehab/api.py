@@ -19,6 +19,7 @@ from ninja.errors import AuthenticationError, HttpError, ValidationError
 from ninja.openapi.schema import OpenAPISchema, get_schema
 
 from rehab.boards import api as boards
+from rehab.exports.fhir import api as fhir
 from rehab.legacy import api as legacy
 from rehab.people import api as people
 from rehab.people.access import public
@@ -71,7 +72,7 @@ api = Api(
 )
 api.add_decorator(check_roles)
 api.add_decorator(at_clinics_server)
-for room in (people, sessions, boards, legacy):
+for room in (people, sessions, boards, fhir, legacy):
     api.add_router("", room.router)
 
 log = logging.getLogger(__name__)

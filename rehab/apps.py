@@ -17,6 +17,7 @@ class RehabConfig(AppConfig):
 
         from rehab import checks  # noqa: F401
         from rehab.boards.signals import connect_receivers
+        from rehab.exports.fhir.push import install_writer
         from rehab.models import TRACKED
         from rehab.patients import family
         from rehab.people.audit import guards, sign_in_log
@@ -44,3 +45,4 @@ class RehabConfig(AppConfig):
         studies.connect_receivers()
         family.connect_receivers()
         step_up.connect_signals()
+        install_writer()

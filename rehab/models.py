@@ -4,6 +4,7 @@ from rehab.boards import changes, snapshots  # noqa: F401  (these register their
 from rehab.boards.models import Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
+from rehab.outbox.models import Endpoint
 from rehab.patients import family, visits  # noqa: F401
 from rehab.people import chores, server_keys  # noqa: F401
 from rehab.people.audit import moves  # noqa: F401
@@ -33,6 +34,7 @@ TRACKED = (
     Clinic,
     User,
     ApiToken,
+    Endpoint,
     Patient,
     Station,
     Device,

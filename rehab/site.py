@@ -53,6 +53,8 @@ HEADINGS = (
             "User": _("Who works here, and what their role lets them do."),
             "SignOnGroup": _("Which clinic and role a group of the hospital’s sign-on gives."),
             "ApiToken": _("Tokens with which programs use the API."),
+            "Endpoint": _("Programs that are told when a session ends, a patient falls, and more."),
+            "OutboxMessage": _("What they were told, and what was refused."),
             "Clinic": _("Name, language, clock, second factor, how long data is kept."),
         },
     ),

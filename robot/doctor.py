@@ -12,9 +12,11 @@ import time
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
 
+from robot.bases import BASES
 from robot.bases.kobuki import STOP_FRAME, KobukiBase
 from robot.bases.kobuki_protocol.frames import BAUD
 from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
+from robot.motion.gestures import GESTURES
 from robot.port.opening import PortOpener
 from robot.port.owner import SerialPort
 from robot.port.priority import explain_jitter, find_priority, measure_jitter
@@ -83,6 +85,14 @@ def try_computer() -> Iterator[Diagnosis]:
     )
 
 
+def list_plugins() -> Iterator[Diagnosis]:
+    """Yield the bases and gestures of other packages, and why one of them cannot be used."""
+    for plugin in (*BASES.plugins, *GESTURES.plugins):
+        what = f"{plugin.name} of {plugin.package} {plugin.version}"
+        cure = f"pip install --upgrade {plugin.package}" if plugin.problem else ""
+        yield Diagnosis(f"{what}: {plugin.problem or 'in use'}.", cure)
+
+
 def try_cut(port: str) -> Iterator[Diagnosis]:
     """Yield whether a watchdog, or else a person's emergency stop, takes the base's power."""
     try:
@@ -138,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     port = options.port or find_port()
     wrong = 0
-    looks = [check_port(port, list_ports()), try_computer(), listen(port)]
+    looks = [check_port(port, list_ports()), try_computer(), listen(port), list_plugins()]
     for look in [try_cut(port)] if options.cut else looks:
         for diagnosis in look:
             wrong += bool(diagnosis.cure)

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from robot.bases import BaseLost, MobileBase
+from robot.bases import BASES, BaseLost, MobileBase
 from robot.behavior.control_loop import control_loop
 from robot.behavior.performer import NO_LINK, Performer
 from robot.black_box.capture import Capture
@@ -83,7 +83,9 @@ class Worker:
             await self._link.close()
 
     def _greet(self) -> Message:
-        return {"type": "hello", "version": 1, "base": self._base.name}
+        hello: Message = {"type": "hello", "version": 1, "base": self._base.name}
+        plugin = BASES.find_plugin(self._base.name)
+        return hello if plugin is None else hello | {"plugin": plugin.describe()}
 
     def _handle_lost_link(self, reason: str, pause_s: float) -> None:
         self.performer.disconnect(NO_LINK)

@@ -71,8 +71,19 @@ def write_json(data: Any) -> Iterator[str]:
     yield json.dumps(data, cls=DjangoJSONEncoder, ensure_ascii=False, indent=2) + "\n"
 
 
-class ZipResponse(StreamingHttpResponse):
-    """A streamed ZIP. Django's response would collect all of it first when served by ASGI."""
+class StreamedResponse(StreamingHttpResponse):
+    """A streamed file. Django's response would collect all of it first when served by ASGI."""
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        """Yield each part once the previous one is sent, computed in the request's thread."""
+        parts: Any = self.streaming_content
+        make_next = sync_to_async(lambda: next(parts, None))
+        while (part := await make_next()) is not None:
+            yield part
+
+
+class ZipResponse(StreamedResponse):
+    """A streamed ZIP."""
 
     def __init__(self, files: Files, name: str) -> None:
         super().__init__(
@@ -83,10 +94,3 @@ class ZipResponse(StreamingHttpResponse):
                 "Cache-Control": "no-store",
             },
         )
-
-    async def __aiter__(self) -> AsyncIterator[bytes]:
-        """Yield each part once the previous one is sent, computed in the request's thread."""
-        parts: Any = self.streaming_content
-        make_next = sync_to_async(lambda: next(parts, None))
-        while (part := await make_next()) is not None:
-            yield part

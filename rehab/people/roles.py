@@ -55,6 +55,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "AuditEntry": {Role.LEAD: Right.VIEW},
     "LogSeal": {},
     "HistoryEntry": dict.fromkeys(Role, Right.VIEW),
+    "Endpoint": {Role.LEAD: Right.ALL},
+    "OutboxMessage": {Role.LEAD: Right.VIEW},
     "Station": _OF_A_LEAD,
     "Device": _OF_A_LEAD,
     "Pairing": {},

@@ -167,6 +167,12 @@ RULE_PAUSES = {
 }
 
 
+class PartEntry(StrEnum):
+    """What else made the session. It changes no score."""
+
+    PLUGIN = "plugin"  # a part of another package: kind, name, package and version in ``data``
+
+
 class Remark(StrEnum):
     """What a PT notes with one tap during a session. It changes no score either.
 
@@ -223,6 +229,7 @@ EVENTS = {
     RuleEntry.GOAL_FOLLOWED: _("goal followed"),
     RuleEntry.PLANNED_REST: _("planned rest"),
     RuleEntry.HEART_RATE_LIMIT: _("heart rate above its limit"),
+    PartEntry.PLUGIN: _("plug-in"),
     RobotEntry.STOP: _("robot stop"),
     RobotEntry.ARM: _("robot arm"),
     RobotEntry.DECISION: _("robot decision"),

@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from rehab.sources import SOURCES, load_source
+from rehab.sources import SOURCES, summarize
 from rehab.sources.arguments import make_parser
 from rehab.sources.client import (
     Journal,
@@ -52,7 +52,7 @@ EXIT_DONE, EXIT_UNUSABLE, EXIT_REFUSED, EXIT_INTERRUPTED = 0, 2, 3, 130
 
 def make_top_parser() -> ArgumentParser:
     """Return the parser that answers to anything but the name of a source."""
-    names = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in SOURCES.items())
+    names = "\n".join(f"  {name:14}{summarize(name)}" for name in SOURCES)
     parser = ArgumentParser(
         prog="python -m rehab.sources",
         description=f"{__doc__}\nsources, each with its own --help:\n{names}",
@@ -141,7 +141,7 @@ def check_stream(name: str, options: Namespace) -> int:
             reading.result()
 
     try:
-        source = load_source(name)(options, print_status)
+        source = SOURCES[name](options, print_status)
         assert isinstance(source, LiveSource)  # noqa: S101 (others have no such option)
         check = StreamCheck(source.settings, print_status)
         asyncio.run(listen(source, check))
@@ -159,7 +159,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
     url = websocket_url(options.server, SOURCE_PATH)
     token = find_token(options, "GARRY_TOKEN", "a source")
     try:
-        source = load_source(name)(options, print_status)
+        source = SOURCES[name](options, print_status)
     except ValueError as problem:  # RecordingError, GaitInputError, UnsendableStride
         raise SourceError(str(problem)) from None
     log = stack.enter_context(open_log(options.log)) if options.log else None
@@ -184,6 +184,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
             stay=options.stay,
             journal=journal,
             on_ack=on_ack,
+            plugin=SOURCES.find_plugin(name),
             notify=print_status,
         )
 
@@ -223,9 +224,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the source that the command line names and return the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] not in SOURCES:
+        for plugin in SOURCES.plugins:
+            if plugin.problem:
+                print_status(f"{plugin.package}: {plugin.name} cannot be used: {plugin.problem}.")
         make_top_parser().parse_args(words[:1])
     name = words[0]
-    options = make_parser(name, load_source(name)).parse_args(words[1:])
+    options = make_parser(name, SOURCES[name]).parse_args(words[1:])
     if getattr(options, "check", False):
         try:
             return check_stream(name, options)

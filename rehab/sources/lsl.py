@@ -268,6 +268,3 @@ def load_pylsl() -> Any:
             "GARRY: pip install pylsl (on Linux without its own wheel, also the package liblsl)."
         ) from None
     return pylsl
-
-
-SOURCE = LslSource

@@ -103,6 +103,3 @@ class MatlabSource(LiveSource):
                 self._notify(f"MATLAB's goal is {goal:g}; the session's own is what counts.")
             self._goal = goal
         return row
-
-
-SOURCE = MatlabSource

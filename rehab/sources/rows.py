@@ -216,6 +216,3 @@ async def _read_ws(socket: object) -> AsyncIterator[bytes]:
 
 def _name(peer: object) -> str:
     return f"{peer[0]}:{peer[1]}" if isinstance(peer, tuple) else str(peer)
-
-
-SOURCE = RowsSource

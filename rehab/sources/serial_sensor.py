@@ -152,6 +152,3 @@ def find_port() -> str:
         if ports
         else "No sensor is plugged in by USB. Plug it in, or name its port with --port."
     )
-
-
-SOURCE = SerialSensorSource

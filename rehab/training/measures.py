@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from robot.marking import Marked, TranslatableError, gettext_noop
+from robot.plugins import Registry, check_one
 
 GAIN_MIN = 0.5
 GAIN_MAX = 1.5
@@ -282,7 +283,11 @@ PLATE_MEASURES = tuple(
 )
 TYPICAL_SD = {row[3]: row[-1] for row in _PLATES}
 
-MEASURES: dict[str, Measure] = {one.slug: one for one in (A2, *PLATE_MEASURES, *WORN_MEASURES)}
+MEASURES: Registry[Measure] = Registry(
+    "garry.measures",
+    {one.slug: one for one in (A2, *PLATE_MEASURES, *WORN_MEASURES)},
+    check_one(Measure, "slug"),
+)
 WORN_CHANNELS = {one.channel for one in WORN_MEASURES}
 
 

@@ -17,16 +17,21 @@ from robot.bases.kobuki import KobukiBase
 from robot.bases.null import NullBase
 from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.twinned import TwinBase
+from robot.plugins import Registry, check_class
 
 # Name: its class, made with a monotonic clock [s].
-BASES: dict[str, type[MobileBase]] = {
-    "avatar": AvatarBase,
-    "null": NullBase,
-    "kinematic": KinematicBase,
-    "twin": TwinBase,
-    "kobuki": KobukiBase,
-    "rosbridge": RosbridgeBase,
-}
+BASES: Registry[type[MobileBase]] = Registry(
+    "garry.bases",
+    {
+        "avatar": AvatarBase,
+        "null": NullBase,
+        "kinematic": KinematicBase,
+        "twin": TwinBase,
+        "kobuki": KobukiBase,
+        "rosbridge": RosbridgeBase,
+    },
+    check_class(MobileBase),
+)
 
 __all__ = [
     "BASES",

@@ -8,7 +8,7 @@ from typing import Any
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture import Gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gestures import KNOWN_NAMES
+from robot.motion.gestures import known_names
 from robot.motion.limits import Limits
 
 # Why a name cannot be performed.
@@ -48,7 +48,7 @@ class GestureLibrary:
             except BadGesture as problem:
                 name = data.get("name") if isinstance(data, dict) else None
                 # A name that every robot knows means that gesture, whatever else comes under it.
-                if isinstance(name, str) and name not in KNOWN_NAMES:
+                if isinstance(name, str) and name not in known_names():
                     self._received[name] = None
                 problems.append(f"gesture {name}: {problem}")
             else:

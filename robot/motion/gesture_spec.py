@@ -24,7 +24,7 @@ from robot.motion.gesture import (
     stages,
 )
 from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
-from robot.motion.gestures import KNOWN_NAMES
+from robot.motion.gestures import known_names
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.score import read_score
@@ -126,7 +126,7 @@ def check_name(name: Any) -> str:
     """Return a name. Raises BadGesture for an invalid one, and for that of a built-in gesture."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise BadGesture("A gesture's name has 1 to 32 letters, digits, hyphens or underscores.")
-    if name in KNOWN_NAMES:
+    if name in known_names():
         raise BadGesture("Every robot knows {name} already. Choose another name.", name=name)
     return name
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections import ChainMap
+from collections.abc import MutableMapping
+from functools import cache
+from typing import cast
 
 from robot.marking import gettext_noop
-from robot.motion.gesture import Gesture, Waypoint
+from robot.motion.gesture import Gesture, Waypoint, check_gesture
 from robot.motion.pools import IDLE, POOLS, VARIANTS
 from robot.motion.score import FALLING, RISING
+from robot.plugins import Registry, check_one
 from robot.wire.cue_limits import VARIED
 
 # Up to 3 s each, so that a base that answers late is home and still before the next window of 5 s
@@ -53,7 +58,15 @@ SWAY = Gesture(
     ),
 )
 
-GESTURES: dict[str, Gesture] = {gesture.name: gesture for gesture in (CELEBRATE, DROOP, NOD, SWAY)}
+
+def _check(name: str, part: object) -> None:
+    check_one(Gesture, "name")(name, part)
+    check_gesture(cast(Gesture, part))
+
+
+GESTURES: Registry[Gesture] = Registry(
+    "garry.gestures", {one.name: one for one in (CELEBRATE, DROOP, NOD, SWAY)}, _check
+)
 
 # The original's three sequences (gesture_generation.py of 2024; docs/reference/original.md#robot),
 # for replications. It ordered 0.2 m/s and 1.8 rad/s for 1 or 2 s each, without ramps; here are the
@@ -96,6 +109,16 @@ ORIGINALS: dict[str, Gesture] = {
     gesture.name: gesture for gesture in (ORIGINAL_POSITIVE, ORIGINAL_NEGATIVE, ORIGINAL_BINARY)
 }
 
-BUILT_IN = GESTURES | VARIANTS | ORIGINALS | {one.name: one for one in IDLE}  # all, by name
-# All that a cue may name: a gesture is performed each time, of a pool another variant each time.
-KNOWN_NAMES = frozenset({*BUILT_IN, *POOLS, VARIED})
+# All, by name.
+BUILT_IN = ChainMap(
+    VARIANTS,
+    ORIGINALS,
+    {one.name: one for one in IDLE},
+    cast(MutableMapping[str, Gesture], GESTURES),
+)
+
+
+@cache
+def known_names() -> frozenset[str]:
+    """Return all that a cue may name: a gesture each time, of a pool another variant each time."""
+    return frozenset({*BUILT_IN, *POOLS, VARIED})

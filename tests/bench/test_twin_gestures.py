@@ -20,7 +20,9 @@ def run(name, seed, times):
     wheels = [f"--{side}-scale={chance.uniform(1.0, 1.02):.4f}" for side in ("left", "right")]
     with TwinBase(time.monotonic, *wheels) as twin:
         for number in range(times):
-            played = play_gesture((GESTURES | ORIGINALS)[name], twin, time.monotonic, time.sleep)
+            played = play_gesture(
+                ({**GESTURES} | ORIGINALS)[name], twin, time.monotonic, time.sleep
+            )
             pose = played["true_pose"]
             away_m = math.hypot(pose["x_m"], pose["y_m"])
             turned_deg = math.degrees(abs(math.remainder(pose["heading_rad"], math.tau)))
@@ -30,7 +32,7 @@ def run(name, seed, times):
 
 
 @pytest.mark.parametrize(
-    ("name", "times"), [("celebrate", TIMES), *((name, 2) for name in GESTURES | ORIGINALS)]
+    ("name", "times"), [("celebrate", TIMES), *((name, 2) for name in {**GESTURES} | ORIGINALS)]
 )
 def test_it_comes_home(name, times):
     worst_m, worst_deg, farthest_m, outcomes = 0.0, 0.0, 0.0, []

@@ -23,7 +23,7 @@ from rehab.sessions.live.process import STOP_S
 from rehab.sessions.live.pulse import SILENT_S
 from rehab.sessions.live.session import instruments
 from rehab.sessions.pages.server import metrics
-from rehab.sources import load_source
+from rehab.sources import SOURCES
 from rehab.sources.arguments import make_parser as make_source_parser
 from robot.__main__ import make_parser
 from tests.support.servers import ROOT
@@ -59,7 +59,7 @@ def test_a_unit_starts_a_command_that_exists(unit: Path) -> None:
 def parse_source(arguments: list[str]) -> None:
     """Parse a source's options as its command does."""
     options = ["--listen", "tcp://127.0.0.1:9101", "--mass", "75"]
-    make_source_parser("rows", load_source("rows")).parse_args([*arguments, *options])
+    make_source_parser("rows", SOURCES["rows"]).parse_args([*arguments, *options])
 
 
 def read_words(text: str, program: str) -> list[str]:

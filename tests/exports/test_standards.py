@@ -121,8 +121,10 @@ def test_bundles_are_valid_fhir_r4b(files):
         for entry in read.entry:
             subject = getattr(entry.resource, "subject", None)
             assert subject is None or subject.reference in known
-    assert kinds == {"Patient", "Encounter", "Observation", "QuestionnaireResponse"}
+    assert kinds == {
+        *("Patient", "Encounter", "Observation", "QuestionnaireResponse", "Device", "Provenance")
+    }
     spoiled = json.loads(made[0].read_text())
-    del spoiled["entry"][1]["resource"]["status"]
+    del spoiled["entry"][2]["resource"]["status"]
     with pytest.raises(ValueError, match="status"):
         bundle.model_validate(spoiled)

@@ -32,7 +32,7 @@ def hear_sigint():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-@pytest.mark.parametrize("name", GESTURES | ORIGINALS)
+@pytest.mark.parametrize("name", {**GESTURES} | ORIGINALS)
 def test_every_gesture_on_the_simulation(name, capsys):
     assert main(["gesture", name, "--base", "kinematic", "--json", "--times", "2"]) == 0
     for line in capsys.readouterr().out.splitlines():

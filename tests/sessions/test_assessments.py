@@ -6,7 +6,7 @@ from datetime import timedelta
 
 import pytest
 
-from rehab.exports.research.fhir import make_bundle
+from rehab.exports.fhir.resources import Pseudonyms, make_bundle
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment, assessments_with, load_courses
 from tests.support.walks import HIT, make_session, walk
@@ -125,7 +125,7 @@ def test_fhir_has_it_with_its_loinc_code(world):
         Assessment.everywhere.create(
             clinic=world.clinic, patient=world.patient, test=test, value=value, at=NOW
         )
-    bundle = make_bundle(world.people[Role.PT], session, timedelta())
+    bundle = make_bundle(world.people[Role.PT], session, Pseudonyms())
     found = {
         code["code"]: entry["resource"]
         for entry in bundle["entry"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from websockets.asyncio.server import serve
 
-from rehab.sources import load_source
+from rehab.sources import SOURCES
 from rehab.sources.arguments import make_parser
 from rehab.sources.ble.nordic_uart import NordicUart
 from rehab.sources.intake.sensor_frames import compute_checksum
@@ -39,7 +39,7 @@ class Lab:
 
     def make(self, *more: str):
         """Make the source as its command line does."""
-        source = load_source(self.name)
+        source = SOURCES[self.name]
         options = make_parser(self.name, source).parse_args(
             [*(self.typed or self.arguments()), *more, *SETTINGS]
         )

@@ -17,11 +17,13 @@ from django.urls import URLPattern, URLResolver, get_resolver, reverse
 
 from garry_site import urls as site_urls
 from rehab.boards.models import Leaderboard
+from rehab.exports.fhir.api import TYPES as FHIR_TYPES
 from rehab.patients.family import FamilyLink
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.stations.models import Device, Station
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
@@ -183,6 +185,21 @@ def fill(
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
             return
+        elif wanted == {"fhir_id"}:  # of each kind the clinic's own, by its session
+            of, what = world.session.pk, name.removeprefix("api:read_")
+            found = {
+                "Patient": f"patient-{world.patient.pk}",
+                "Encounter": f"session-{of}",
+                "Provenance": f"provenance-{of}",
+                "QuestionnaireResponse": f"answers-{of}-{world.rows[QuestionnaireResponse].pk}",
+                "Observation": f"figure-{of}-score",
+            }
+            url = reverse(name, kwargs={"fhir_id": found.get(what, "garry")})
+            yield Route(name, url, world.name, Patient) if what in found else Route(name, url)
+        elif wanted == {"fhir_type"}:
+            for what in FHIR_TYPES:
+                url = reverse(name, kwargs={"fhir_type": what})
+                yield Route(name, f"{url}?before=2200-01-01T00:00:00Z")
         elif wanted == {"token"}:  # of a family's link; nobody knows one that is there
             yield Route(name, reverse(name, kwargs={"token": "no-such-link"}))
             return

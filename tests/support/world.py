@@ -16,6 +16,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.snapshots import BoardSnapshot
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
+from rehab.outbox.models import Endpoint, OutboxMessage, Topic
 from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
@@ -290,6 +291,12 @@ def build_world(name: str) -> World:
     )
     of_group.group.add(patient)
     study = close_study(name, patient, session, people[Role.PT])
+    endpoint = Endpoint.everywhere.create(
+        clinic=clinic,
+        name=mark(name, Endpoint),
+        url="https://receiver.example/hook",
+        active=False,
+    )
     world = World(name, clinic, people, device, token, more=[of_group])
     for row in (
         clinic,
@@ -371,6 +378,17 @@ def build_world(name: str) -> World:
             role=Role.PT,
             may_steer=True,
             token_hash=f"program-{name}",
+        ),
+        endpoint,
+        OutboxMessage.everywhere.create(
+            clinic=clinic,
+            endpoint=endpoint,
+            topic=Topic.SESSION,
+            body={"session": session.pk},
+            at=NOW,
+            due_at=NOW,
+            state=OutboxMessage.State.REFUSED,
+            answer=mark(name, OutboxMessage),
         ),
         Authenticator.everywhere.create(
             user=people[Role.PT], kind="app", name=mark(name, Authenticator), credential="-"

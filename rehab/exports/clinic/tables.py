@@ -19,6 +19,8 @@ STAYS = {
     "admin.logentry": "the admin's latest clicks; the change history has the values",
     "rehab.boardchange": "what caches of this installation have to forget, for a day",
     "rehab.clinicowner": "which process has the clinic here",
+    "rehab.endpoint": "whom this installation tells something, with secrets under its own key",
+    "rehab.outboxmessage": "what this installation has told, or still has to",
     "rehab.pairing": "tablets that wait some minutes for approval here",
     "rehab.pinattempts": "failed attempts at this installation",
     "rehab.recoverycode": "hashed with the account's number here; an app or passkey makes new ones",

@@ -12,18 +12,18 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from django.db.models import QuerySet
 
 from rehab.exports.archive import write_csv
+from rehab.exports.fhir.resources import garry_version
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.research.metadata import write_anonymity, write_crate
 from rehab.exports.research.session_files import ABOUT, KINDS, write_part
-from rehab.exports.research.sinks import has_parquet
+from rehab.exports.research.sinks import FORMATS, available_formats
 from rehab.exports.research.study_files import groups_of, studies_of, study_files
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.people.models import User
@@ -199,7 +199,7 @@ class Package:
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
             yield f"bids/{name}", [text]
         for part in parts:
-            for kind in KINDS:
+            for kind in (*FORMATS, *KINDS):
                 for file in sorted((part / kind).rglob("*.*")):
                     if file.is_file():
                         yield file.relative_to(part).as_posix(), _read(file)
@@ -208,7 +208,7 @@ class Package:
         what = f"study {self.study}" if self.study else "all sessions"
         parquet = (
             "Steps and feedback also as Parquet, a file for each session in one folder for each."
-            if has_parquet()
+            if "parquet" in available_formats()
             else "No Parquet: the server has no pyarrow (pip install 'garry[parquet]')."
         )
         dates = (
@@ -254,14 +254,6 @@ def _read_about(folder: Path) -> tuple[dict[str, Any], datetime]:
     """Return who asked for an export, for what, and when. Raises OSError, ValueError, KeyError."""
     about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
     return about, datetime.fromisoformat(about["made_at"])
-
-
-def garry_version() -> str:
-    """Return the version of GARRY that is installed."""
-    try:
-        return version("garry")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _concatenate(header: list[str], files: Iterable[Path]) -> Iterator[str | bytes]:

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from rehab.exports.fhir.resources import Pseudonyms, make_bundle
 from rehab.exports.research.bids import EventSink, MotionSink
 from rehab.exports.research.dates import SINCE_1970_S, shift_of, shift_rows
-from rehab.exports.research.fhir import write_bundle
 from rehab.exports.research.recordings import RecordingSink
 from rehab.exports.research.robot_motion import RobotMotionSink
-from rehab.exports.research.sinks import CsvSink, ParquetSink, Sink, has_parquet, pump
+from rehab.exports.research.sinks import CsvSink, Sink, available_formats, pump
 from rehab.exports.selection import Selection
 from rehab.exports.session_table import PARTICIPANT, SESSIONS
 from rehab.exports.step_tables import FEEDBACK, STEPS
@@ -23,8 +23,8 @@ from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import StudyVisit
 
-STRIDE_TABLES = (STEPS, FEEDBACK)  # also as Parquet
-KINDS = ("parquet", "bids", "recordings", "fhir", "robot")  # folders of the export
+STRIDE_TABLES = (STEPS, FEEDBACK)  # also in each of `FORMATS`
+KINDS = ("bids", "recordings", "fhir", "robot")  # folders of the export, beside those
 ABOUT = "about.json"  # what the whole export needs to know of a part
 
 
@@ -43,7 +43,8 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
     shift = shift_of(pseudonym) if shift_dates else None
     sessions = TrainingSession.objects.visible_to(user).filter(pk=session.pk)
     selection = Selection(user, sessions, named=False)
-    for name in KINDS:
+    formats = available_formats()
+    for name in (*formats, *KINDS):
         (aside / name).mkdir()
     motion = MotionSink(aside / "bids", pseudonym, _label(session), session.measure.unit)
     recording = RecordingSink(
@@ -57,10 +58,10 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
     }
     for table in TABLES:  # steps come before events, whose times count from the first step
         sinks: list[Sink] = [CsvSink(aside / table.file), *more.get(table.file, ())]
-        if table in STRIDE_TABLES and has_parquet():
-            place = aside / "parquet" / table.file.removesuffix(".csv")
+        for name, sink in formats.items() if table in STRIDE_TABLES else ():
+            place = aside / name / table.file.removesuffix(".csv")
             place.mkdir()
-            sinks.append(ParquetSink(_of(place, session, "parquet"), table))
+            sinks.append(sink(_of(place, session, sink.ending), table))
         rows: Iterable[Any] = shift_rows(table.read(selection), shift)
         if shift is not None and table is STEPS:
             rows = _from_first_step(rows)
@@ -74,7 +75,9 @@ def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dat
         hides_clocks=shift is not None,
     )
     pump(shift_rows(INCIDENTS.read(selection), shift), [robot])
-    write_bundle(_of(aside / "fhir", session, "json"), user, session, shift)
+    bundle = make_bundle(user, session, Pseudonyms(shift))
+    text = json.dumps(bundle, ensure_ascii=False, indent=1)
+    _of(aside / "fhir", session, "json").write_text(f"{text}\n", "utf-8")
     about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
     row = next(SESSIONS.read(selection))
     about |= {column.name: getattr(row, column.name) for column in PARTICIPANT}

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from rehab.exports.table import Table, Type
 from rehab.people.web.csv_tables import CsvWriter
+from robot.plugins import Registry, check_class
 
 BATCH_ROWS = 1000  # held in memory
 Rows = list[Any]  # as `Table.read` yields them
@@ -54,16 +56,36 @@ class CsvSink:
         self._file.close()
 
 
-def has_parquet() -> bool:
-    """Return whether the library that writes Parquet is installed."""
-    return find_spec("pyarrow") is not None
+class TableSink(Sink):
+    """Writes a table's rows into a file of its own: a format of the export for analysis.
+
+    ``ending``: of its files.
+    """
+
+    ending: ClassVar[str]
+
+    @abstractmethod
+    def __init__(self, file: Path, table: Table) -> None:
+        """Begin a file for a table."""
+
+    @staticmethod
+    def is_available() -> bool:
+        """Return whether the libraries that it needs are installed."""
+        return True
 
 
-class ParquetSink:
+class ParquetSink(TableSink):
     """A table's rows as Parquet: types by the codebook, text and numbers as they are stored.
 
     Each column's unit and meaning stand in its metadata.
     """
+
+    ending = "parquet"
+
+    @staticmethod
+    def is_available() -> bool:
+        """Return whether the library that writes Parquet is installed."""
+        return find_spec("pyarrow") is not None
 
     def __init__(self, file: Path, table: Table) -> None:
         import pyarrow as pa
@@ -107,6 +129,17 @@ class ParquetSink:
     def close(self) -> None:
         """Write the end of the file."""
         self._writer.close()
+
+
+# Name, and folder of the export: the format, of strides and of what patients saw.
+FORMATS: Registry[type[TableSink]] = Registry(
+    "garry.exports", {"parquet": ParquetSink}, check_class(TableSink)
+)
+
+
+def available_formats() -> dict[str, type[TableSink]]:
+    """Return the formats that can be written here, by name."""
+    return {name: one for name, one in FORMATS.items() if one.is_available()}
 
 
 def _to_text(cell: Any) -> str | None:

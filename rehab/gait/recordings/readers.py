@@ -24,6 +24,7 @@ from rehab.gait.recordings.table import Table, join_tables
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
+from robot.plugins import Registry
 
 # What parsers raise for files whose content does not match their ending.
 DAMAGED = (
@@ -33,14 +34,29 @@ DAMAGED = (
 LARGEST = 1e30  # of a sensor's values; a larger one is damage
 BYTES_MAX = 512 * 1024 * 1024
 
-READERS: dict[str, Callable[[Path], Mapping[str, Floats]]] = {
-    ".csv": csv_files.read_table,
-    ".c3d": c3d_files.read_table,
-    ".mot": motion_files.read_storage,
-    ".sto": motion_files.read_storage,
-    ".trc": motion_files.read_markers,
-    ".tsv": motion_files.read_qualisys,
-}
+Reader = Callable[[Path], Mapping[str, Floats]]
+
+
+def _check_reader(name: str, part: object) -> None:
+    if not callable(part):
+        raise TypeError(f"{part!r} reads no file")
+    if not name.isalnum() or name != name.lower():
+        raise ValueError("a reader is named by the ending of its files, in small letters")
+
+
+# Ending of a file: what returns its columns by name, shape (n,) each, with a column of times.
+READERS: Registry[Reader] = Registry(
+    "garry.readers",
+    {
+        "csv": csv_files.read_table,
+        "c3d": c3d_files.read_table,
+        "mot": motion_files.read_storage,
+        "sto": motion_files.read_storage,
+        "trc": motion_files.read_markers,
+        "tsv": motion_files.read_qualisys,
+    },
+    _check_reader,
+)
 
 
 class RecordedSignals(NamedTuple):
@@ -83,8 +99,8 @@ def read_any_table(*paths: Path) -> Table:
         raise GaitInputError(
             f"{path.name} has more than {BYTES_MAX // 2**20} MiB. Export a minute of walking."
         )
-    endings = [ending.lower() for ending in path.suffixes if ending.lower() != ".gz"]
-    reader = READERS.get(endings[-1] if endings else ".csv", csv_files.read_table)
+    endings = [ending.lower()[1:] for ending in path.suffixes if ending.lower() != ".gz"]
+    reader = READERS.get(endings[-1] if endings else "csv", csv_files.read_table)
     try:
         if reader is csv_files.read_table and motion_files.is_exported(path):
             reader = motion_files.read_export

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from django.utils import timezone
 from rehab.exports.backup import write_backup
 from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.management.new_file import new_file
+from rehab.outbox.models import Topic, tell
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
@@ -32,15 +34,11 @@ class Command(BaseCommand):
         """Write the backup. An existing file is replaced only by a complete one."""
         now = timezone.now()
         try:
-            recipients = read_recipients(settings.BACKUP_KEYS)
-        except InvalidKey as problem:
-            raise CommandError(
-                "A backup holds everything about patients, and is encrypted to a public key in "
-                f"GARRY_BACKUP_KEYS. {problem}"
-            ) from problem
-        close_keys_again(recipients)
-        with new_file(file) as out:
-            counts = write_backup(out, recipients, now)
+            counts = _write(file, now)
+        except Exception as problem:
+            for clinic in Clinic.everywhere.all():
+                tell(clinic.pk, Topic.BACKUP, {"problem": type(problem).__name__}, now)
+            raise
         for clinic in Clinic.everywhere.all():
             audit_log.record(
                 Act.BACKUP, None, clinic_id=clinic.pk, about="manage.py backup", now=now
@@ -50,3 +48,17 @@ class Command(BaseCommand):
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "
             f"{counts['rehab.trainingsession']} sessions, {counts['rehab.step']} steps."
         )
+
+
+def _write(file: Path, now: datetime) -> dict[str, int]:
+    """Write the backup; return how many rows of each model it has. Raises CommandError."""
+    try:
+        recipients = read_recipients(settings.BACKUP_KEYS)
+    except InvalidKey as problem:
+        raise CommandError(
+            "A backup holds everything about patients, and is encrypted to a public key in "
+            f"GARRY_BACKUP_KEYS. {problem}"
+        ) from problem
+    close_keys_again(recipients)
+    with new_file(file) as out:
+        return write_backup(out, recipients, now)

@@ -9,6 +9,7 @@ import time
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
+from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -19,6 +20,10 @@ from django.core.management import BaseCommand
 from django.db import DatabaseError, connection
 from django.utils import timezone
 
+from rehab.exports.research.sinks import FORMATS
+from rehab.gait.recordings.readers import READERS
+from rehab.management.new_file import new_file
+from rehab.management.problem_report import write_report
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
 from rehab.people.sign_in.first_start import count_pending_migrations
@@ -27,9 +32,15 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import DamagedLog, check_log
+from rehab.sources import SOURCES
 from rehab.stations.models import Device
 from rehab.training.changes import OPEN_STATES, State
+from rehab.training.measures import MEASURES
+from robot.bases import BASES
+from robot.motion.gestures import GESTURES
+from robot.plugins import Registry
 
+REGISTRIES: tuple[Registry[Any], ...] = (SOURCES, READERS, MEASURES, BASES, GESTURES, FORMATS)
 SLOW_DISK_S = 0.05
 SEALED_SINCE = timedelta(days=30)  # whose rows are read again without --deep
 
@@ -56,7 +67,16 @@ class Command(BaseCommand):
             help="also fold the logs of all open sessions again, and compare all steps with seals",
         )
 
-    def handle(self, *args: Any, deep: bool = False, **options: Any) -> None:
+        parser.add_argument(
+            "--report",
+            type=Path,
+            metavar="FILE",
+            help="also write FILE, to report a problem with: no patient, name or key is in it",
+        )
+
+    def handle(
+        self, *args: Any, deep: bool = False, report: Path | None = None, **options: Any
+    ) -> None:
         """Print the diagnoses. Exits with status 1 where something needs a cure."""
         last = (examine_session_logs, examine_all_steps) if deep else (examine_new_steps,)
         examinations = (*EXAMINATIONS, *last)
@@ -66,6 +86,11 @@ class Command(BaseCommand):
             self.stdout.write(f"{diagnosis.subject:<12} {mark:<11} {diagnosis.state}")
             if diagnosis.cure:
                 self.stdout.write(f"{'':<24} → {diagnosis.cure}")
+        if report is not None:
+            with new_file(report) as out:
+                states = [(one.subject, one.state, bool(one.cure)) for one in diagnoses]
+                plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
+                out.write(write_report(states, plugins, timezone.now()).encode())
         if any(diagnosis.cure for diagnosis in diagnoses):
             raise SystemExit(1)
 
@@ -177,6 +202,19 @@ def examine_session_logs() -> Iterator[Diagnosis]:
         yield Diagnosis("session logs", "whole, and the same by checkpoint as from their start")
 
 
+def examine_plugins() -> Iterator[Diagnosis]:
+    """Diagnose what other packages add; what cannot be loaded is left out, and named here."""
+    plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
+    for one in plugins:
+        about = f"{one.group} {one.name} of {one.package} {one.version}"
+        cure = f"pip install --upgrade {one.package}, or pip uninstall {one.package}."
+        yield Diagnosis(
+            "plug-ins", f"{about}: {one.problem or 'in use'}", cure if one.problem else ""
+        )
+    if not plugins:
+        yield Diagnosis("plug-ins", "none")
+
+
 def examine_children() -> Iterator[Diagnosis]:
     """Diagnose the child processes of the server."""
     report = settings.DATA_DIR / "children.json"
@@ -247,6 +285,7 @@ EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (
     examine_database,
     examine_files,
     examine_sessions,
+    examine_plugins,
     examine_children,
     examine_tokens,
     examine_seals,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, ClassVar
 
+from django.conf import settings
 from django.core.exceptions import NON_FIELD_ERRORS, ValidationError
 from django.db import models, transaction
 from django.utils.translation import gettext_lazy as _
@@ -32,6 +33,9 @@ from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
+
+# Nicknames in a demonstration, which takes no other ones.
+DEMO_NAMES = ("Amber", "Basil", "Clover", "Dill", "Elder", "Fern", "Demo")
 
 
 def generate_pseudonym() -> str:
@@ -267,6 +271,13 @@ class Patient(ClinicModel):
         """
         if self.erased_at is not None:
             raise PatientErased
+        if settings.DEMO and not (self.nickname in DEMO_NAMES and self.code.startswith("demo")):
+            raise ValidationError(
+                {
+                    "nickname": _("This is a demonstration. Take one of: %(names)s; code: demo-1.")
+                    % {"names": ", ".join(DEMO_NAMES)}
+                }
+            )
         if self.stroke_month is not None:
             self.stroke_month = self.stroke_month.replace(day=1)
         if self.boards == BoardsConsent.OWN or self.simulated:

@@ -12,6 +12,7 @@ from channels.db import database_sync_to_async
 from django.db.models import Q
 from django.utils import timezone
 
+from rehab.outbox.delivery import deliver_due, is_due
 from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
@@ -32,6 +33,7 @@ log = logging.getLogger(__name__)
 PAGE_BEATS = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 SWEEP = 5 * PAGE_BEATS
 CHECKPOINT = 8  # heartbeats
+OUTBOX = round(5 / ROBOT_HEARTBEAT_S)
 SEAL = round(600 / ROBOT_HEARTBEAT_S)
 # Of the robots, one after the other: a thousand at once hold up steps (docs/performance.md).
 PARTS = 3
@@ -61,6 +63,7 @@ class Routines:
                 (SWEEP, self.check_sign_ins),
                 (CHECKPOINT, self._checkpoint_log),
                 (SEAL, self._seal_logs),
+                (OUTBOX, self._deliver),
             )
         ]
 
@@ -138,6 +141,12 @@ class Routines:
         # In a thread apart: it pauses between batches, and pages must not wait for it.
         seal = database_sync_to_async(seal_sessions, thread_sensitive=False)
         await seal(timezone.now(), mine, PAUSE_S)
+
+    async def _deliver(self) -> None:
+        if not await database_sync_to_async(is_due)(timezone.now()):
+            return
+        # In a thread apart: a receiver may take seconds to answer, and pages must not wait for it.
+        await database_sync_to_async(deliver_due, thread_sensitive=False)(timezone.now())
 
     async def check_sign_ins(self) -> None:
         """Extend sign-ins at a running session; close sockets that are no longer authorized.

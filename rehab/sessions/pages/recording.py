@@ -17,7 +17,6 @@ from rehab.people.roles import Role
 from rehab.sessions.setup.recordings import (
     BYTES_MAX,
     CHANNELS,
-    ENDINGS,
     MASS_MAX_KG,
     MASS_MIN_KG,
     PART_BYTES,
@@ -26,6 +25,7 @@ from rehab.sessions.setup.recordings import (
     UploadRefused,
     add_part,
     check_upload,
+    find_endings,
     name_recording,
     recordings_folder,
     uploaded_file,
@@ -57,7 +57,7 @@ def check_recording(request: HttpRequest) -> HttpResponse:
     """Show what an upload's columns are taken for; store it once a person has confirmed them."""
     asked = request.POST
     context: dict[str, Any] = {
-        "endings": ",".join(ENDINGS),
+        "endings": ",".join(find_endings()),
         "bytes_max": BYTES_MAX,
         "mib_max": BYTES_MAX // 2**20,
         "part_bytes": PART_BYTES,
@@ -186,6 +186,6 @@ def _quote(pair: str) -> str:
 
 def _refusal() -> str:
     return _("Choose a file of %(kinds)s with at most %(most)d MiB.") % {
-        "kinds": ", ".join(ENDINGS),
+        "kinds": ", ".join(find_endings()),
         "most": BYTES_MAX // 2**20,
     }

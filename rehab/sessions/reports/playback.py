@@ -29,6 +29,7 @@ from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import (
     ALARM_KINDS,
     EVENTS,
+    PartEntry,
     Remark,
     RobotEntry,
     RuleEntry,
@@ -53,7 +54,7 @@ log = logging.getLogger(__name__)
 
 AUDIENCES = (Audience.PATIENT, Audience.MONITOR)
 # Folding finds again what these record.
-KINDS = [kind for kind in map(str, EVENTS) if kind not in list(RuleEntry)]
+KINDS = [kind for kind in map(str, EVENTS) if kind not in [*RuleEntry, *PartEntry]]
 # The source is there from the first step on: what a log does not hold is not shown as a fault.
 PRESENCE: Message = {"source": True, "robot": False, "tablets": 0, "storage": ""}
 

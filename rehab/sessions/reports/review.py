@@ -15,7 +15,7 @@ from rehab.people.models import User
 from rehab.sessions.conditions import format_noted
 from rehab.sessions.control_text import describe_change
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.log import FallSeverity, Remark, RobotEntry, SessionEvent, Step
+from rehab.sessions.log import FallSeverity, PartEntry, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
@@ -101,6 +101,8 @@ def describe_event(event: SessionEvent, plan: SessionPlan) -> str:
         return describe_change(control, old, value, plan)
     if event.kind == Remark.FALL_SEVERITY:
         return str(FallSeverity(int(event.value or 0)).label).capitalize()
+    if event.kind == PartEntry.PLUGIN:
+        return "{package} {version}: {name}".format(**event.data)
     label = str(EVENT_LABELS.get(event.kind) or event.get_kind_display().capitalize())  # type: ignore[call-overload]
     return f"{label} {format_noted(event.kind, event.value)}".rstrip()
 

@@ -17,7 +17,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gestures import GESTURES, KNOWN_NAMES, ORIGINALS
+from robot.motion.gestures import GESTURES, ORIGINALS, known_names
 from robot.motion.pools import POOLS, VARIANTS
 from robot.wire.cue_limits import VARIED
 
@@ -43,7 +43,7 @@ def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
 def known_gesture_choices(by: User) -> set[str]:
     """Return all choices without their labels."""
     composed = ComposedGesture.objects.visible_to(by).values_list("name", flat=True)
-    return {DEFAULT_GESTURE, NO_GESTURE, *KNOWN_NAMES, *composed}
+    return {DEFAULT_GESTURE, NO_GESTURE, *known_names(), *composed}
 
 
 def cue_from_choices(above: str, below: str, valence: str, patient: Patient) -> CueGestures:
@@ -60,7 +60,7 @@ def choices_from_cue(cue: CueGestures, valence: str, patient: Patient, by: User)
     """Return the choices for a cue; the default for a gesture that was deleted."""
     default = valences_of(patient.clinic_id)[valence].cue
     composed = ComposedGesture.objects.visible_to(by).values_list("name", flat=True)
-    known = {None, *KNOWN_NAMES, *composed}
+    known = {None, *known_names(), *composed}
     return _choice(cue.above, default.above, known), _choice(cue.below, default.below, known)
 
 
@@ -76,7 +76,7 @@ def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, 
     Raises InvalidSetting for an unknown gesture, and for one that no robot would play.
     """
     named = {name for name in (cue.above, cue.below) if name is not None}
-    for name in sorted(named - KNOWN_NAMES):
+    for name in sorted(named - known_names()):
         row = ComposedGesture.everywhere.filter(clinic=patient.clinic_id, name=name).first()
         if row is None:
             raise InvalidSetting(

@@ -14,6 +14,7 @@ import sys
 import threading
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from django.db import close_old_connections
 from django.utils.text import slugify
 from django.utils.translation import gettext
 
+from robot.plugins import find_names
 from robot.wire.limits import TIME_MAX_S
 
 BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
@@ -41,7 +43,7 @@ PASSED_ON = {
 RETAINED_S = 86_400.0  # an upload that was not stored as a recording
 _one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
 # What `rehab.gait.recordings.readers` reads; it is not imported, as servers do without numpy.
-ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".trc", ".tsv", ".txt")
+OWN_ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".trc", ".tsv", ".txt")
 FILES_MAX = 4  # of one walk: forces, moments, angles, markers
 SIDES, CHANNELS = ("left", "right"), ("force", "moment", "angle")
 MASS_MIN_KG, MASS_MAX_KG = 10, 300
@@ -67,6 +69,12 @@ class Checked:
     wrong: list[str]
 
 
+@cache
+def find_endings() -> tuple[str, ...]:
+    """Return the endings of files that can be read here, those of plug-ins last."""
+    return (*OWN_ENDINGS, *(f".{name}" for name in find_names("garry.readers") if name.isalnum()))
+
+
 def recordings_folder() -> Path:
     """Return the folder of the recordings that the set-up offers."""
     folder: Path = settings.DATA_DIR / "recordings"
@@ -79,7 +87,7 @@ def uploaded_file(person: int, ending: str, place: int = 0) -> Path:
     ``place`` counts the files of one walk. Raises UploadRefused for a kind of file that cannot be
     read.
     """
-    if ending not in ENDINGS or not 0 <= place < FILES_MAX:
+    if ending not in find_endings() or not 0 <= place < FILES_MAX:
         raise UploadRefused
     folder: Path = settings.DATA_DIR / "uploads"
     folder.mkdir(mode=0o700, exist_ok=True)

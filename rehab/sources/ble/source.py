@@ -223,6 +223,3 @@ def _import_bleak() -> ModuleType:
             "Bluetooth needs the package bleak. Install it: pip install 'garry[ble]'"
         ) from None
     return bleak
-
-
-SOURCE = BleSource

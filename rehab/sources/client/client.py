@@ -15,6 +15,7 @@ from rehab.sources.client.playback import UNSENT_MAX, StridePlayback
 from rehab.sources.client.step_queue import StepQueue
 from rehab.training.steps import Measurement
 from robot.link import Link, LinkRefused, Message
+from robot.plugins import Plugin
 from robot.wire.close_codes import CloseCode
 
 # Before asking for the station's next session, where the last one's end closed the connection.
@@ -41,6 +42,8 @@ class SourceClient:
         Where a live source's strides are kept over the end of this program.
     on_ack
         Called with session and number of each acknowledgment.
+    plugin
+        Of which package the source is a part; None for GARRY's own.
     notify
         Called with lines for the person who runs the source.
     sleep
@@ -57,13 +60,14 @@ class SourceClient:
         stay: bool = False,
         journal: Journal | None = None,
         on_ack: Callable[[int, int], None] = lambda _session, _number: None,
+        plugin: Plugin | None = None,
         notify: Callable[[str], None] = lambda _text: None,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.run_id = run or secrets.token_hex(8)
         self._link = dial(greet=self._greet, on_lost=self._note_lost_link)
         self._wanted_session = session
-        self._stay = stay
+        self._stay, self._plugin = stay, plugin
         self._notify = notify
         self._sleep = sleep
         self._feed = feed
@@ -153,6 +157,8 @@ class SourceClient:
             hello["clock_s"] = self._feed.clock_s
         if self._wanted_session is not None:
             hello["session"] = self._wanted_session
+        if self._plugin is not None:
+            hello["plugin"] = self._plugin.describe()
         return hello
 
     def _note_lost_link(self, reason: str, pause_s: float) -> None:

@@ -108,6 +108,3 @@ def holds_signals(path: Path) -> bool:
     return {"time", "LeftGRF_y"} <= names or (
         "time_s" in names and bool({"left_force_n", "right_force_n"} & names)
     )
-
-
-SOURCE = RecordingSource

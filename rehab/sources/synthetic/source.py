@@ -135,6 +135,3 @@ def make_opener(options: Namespace, notify: Notify) -> Callable[[SyntheticWalker
         return SignalWalker(walker, maker, detector, *([keep] if keep else []))
 
     return open_signals
-
-
-SOURCE = SyntheticSource

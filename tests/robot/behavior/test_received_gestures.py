@@ -64,7 +64,7 @@ def test_what_comes_under_a_built_in_name_does_not_take_the_gesture_away(stage, 
 
 
 def test_a_robot_s_own_gesture_is_not_replaced(stage):
-    stage.robot.gestures.builtin = GESTURES | {"wave": GESTURES["nod"]}
+    stage.robot.gestures.builtin = {**GESTURES} | {"wave": GESTURES["nod"]}
     stage.hear(type="cue", cue=CUE | {"above": "wave", "gestures": [WAVE]})
     stage.walk(*[1.2] * 6)
     assert stage.of("decision")[0]["reason"] == "bad_gesture"

@@ -19,7 +19,7 @@ from robot.motion.gesture_spec import (
     parse_gesture,
     to_data,
 )
-from robot.motion.gestures import KNOWN_NAMES
+from robot.motion.gestures import known_names
 from robot.motion.limits import DEFAULT_LIMITS, REACH_M, TETHER_M, TICK_S
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME
@@ -98,7 +98,7 @@ def test_what_no_base_should_perform_is_refused_with_the_cure(moves, cure):
         validate_gesture(data(*moves))
 
 
-@pytest.mark.parametrize("name", sorted(KNOWN_NAMES))
+@pytest.mark.parametrize("name", sorted(known_names()))
 def test_no_name_stands_for_two_gestures(name):
     with pytest.raises(BadGesture, match="Choose another name"):
         build_gesture(name, NOD)

@@ -11,7 +11,7 @@ from rehab.training.valences import VALENCES
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture import VISIBLE_M, VISIBLE_RAD, Gesture, Waypoint
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gestures import GESTURES, KNOWN_NAMES
+from robot.motion.gestures import GESTURES, known_names
 from robot.motion.limits import REACH_M
 from robot.motion.path import Drive, Turn, plan_path
 from robot.motion.pose import HOME, Pose
@@ -27,7 +27,7 @@ poses = st.builds(Pose, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-3
 def test_every_cue_names_gestures_that_exist():
     cues = [valence.cue for valence in VALENCES.values()]
     named = {name for cue in cues for name in (cue.above, cue.below) if name is not None}
-    assert named <= KNOWN_NAMES
+    assert named <= known_names()
 
 
 @pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda one: one.name)

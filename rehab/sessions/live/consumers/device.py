@@ -6,6 +6,7 @@ from abc import abstractmethod
 from typing import ClassVar
 
 from django.utils import timezone
+from msgspec import to_builtins
 
 from rehab.sessions.live.auth import (
     authenticate,
@@ -18,7 +19,7 @@ from rehab.sessions.live.auth import (
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.devices import ConnectedDevice
-from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.protocol.messages import PartOf, read_frame
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
@@ -37,6 +38,7 @@ class DeviceSocket(Socket):
     slot: str
     device: Device | None = None
     hello_received = False
+    plugin: PartOf | None = None  # that it is a part of
     rotates = False  # it can store another token, and none is being given
 
     @property
@@ -156,6 +158,8 @@ class DeviceSocket(Socket):
         self.live, self.slot = live, slot
         setattr(live, self.slot, self)
         live.announce_presence(timezone.now())
+        if self.plugin is not None:
+            live.note_plugin(to_builtins(self.plugin), timezone.now())
         await self.on_attach(live)
 
     def choose_slot(self, live: LiveSession) -> str:

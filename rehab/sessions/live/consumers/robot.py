@@ -12,13 +12,19 @@ from django.utils import timezone
 
 from rehab.sessions.incidents import store_incident
 from rehab.sessions.live.consumers.device import DeviceSocket
-from rehab.sessions.live.protocol.messages import Incident, read_incident, read_report
+from rehab.sessions.live.protocol.fields import read_fields
+from rehab.sessions.live.protocol.messages import (
+    Incident,
+    RobotHello,
+    read_incident,
+    read_report,
+)
 from rehab.sessions.live.session.hub import Lagged, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
-from robot.wire.frames import BadFrame, read_name
+from robot.wire.frames import BadFrame
 from robot.wire.incident import MOTION
 from robot.wire.limits import MAX_REPORT_CHARS
 
@@ -40,7 +46,7 @@ class RobotConsumer(DeviceSocket):
         """Handle hello and reports."""
         match message.get("type"):
             case "hello":
-                read_name(message, "base")
+                self.plugin = read_fields(message, RobotHello).plugin
                 await self.join_station(None)
             case "report":
                 self._handle_report(message, text)

@@ -115,7 +115,7 @@ class SourceConsumer(DeviceSocket):
         live.announce_presence(timezone.now())
 
     async def _handle_hello(self, hello: Hello) -> None:
-        self.side = hello.side
+        self.side, self.plugin = hello.side, hello.plugin
         self.lateness = Lateness(
             hello.run,
             time.monotonic(),

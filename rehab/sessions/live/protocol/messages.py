@@ -59,6 +59,18 @@ class Incident(Struct, frozen=True):
     ]
 
 
+Version = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9_.!+-]{0,64}\Z", description="a version")]
+
+
+class PartOf(Struct, frozen=True):
+    """Of which package a source or base is, where it is none of GARRY's own."""
+
+    kind: Name
+    name: Name
+    package: Name
+    version: Version
+
+
 class Hello(Struct, frozen=True):
     """A source's first frame."""
 
@@ -69,6 +81,14 @@ class Hello(Struct, frozen=True):
     speed: Positive | None = 1.0  # None: as fast as it can
     clock_pauses: bool = False  # its clock stands while the session is paused
     side: Side | None = None  # of a worn sensor: on the leg that is not trained it brings contacts
+    plugin: PartOf | None = None
+
+
+class RobotHello(Struct, frozen=True):
+    """A robot's first frame."""
+
+    base: Name
+    plugin: PartOf | None = None
 
 
 class _Pose(Struct):

@@ -13,6 +13,7 @@ from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.conditions import CONDITIONS, planned_conditions
 from rehab.sessions.log import (
     ALARM_KINDS,
+    PartEntry,
     Remark,
     RobotEntry,
     RuleEntry,
@@ -154,7 +155,7 @@ class SessionAggregate:
 
     def log_event(
         self,
-        kind: RobotEntry | Remark | RuleEntry,
+        kind: PartEntry | RobotEntry | Remark | RuleEntry,
         by: User | None,
         at: datetime,
         data: dict[str, Any],

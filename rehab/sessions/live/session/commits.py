@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import msgspec
 from django.db import connection, transaction
 
+from rehab.outbox.models import Topic, tell
+from rehab.sessions.alarms import Alarm, alarm_of
 from rehab.sessions.live.session.aggregate import Row, StepRow, Summary
 from rehab.sessions.log import (
     RobotEntry,
@@ -24,6 +26,7 @@ from rehab.sessions.log import (
 )
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
+from rehab.training.changes import ChangeKind
 from rehab.training.steps import ScoredStep
 
 log = logging.getLogger(__name__)
@@ -76,6 +79,10 @@ def _insert_statement(count: int, mark: str) -> str:
     return f"INSERT INTO rehab_step ({columns}) VALUES {', '.join([row] * count)}"  # noqa: S608
 
 
+ALARM_TOPICS = {Alarm.FALL: Topic.FALL, Alarm.ROBOT_STOP: Topic.INCIDENT}
+ENDS = (ChangeKind.FINISH, ChangeKind.ABORT)
+
+
 class Fenced(RuntimeError):
     """Another process has claimed the clinic; this one must not write to its sessions."""
 
@@ -120,6 +127,7 @@ def commit(jobs: Sequence[Job]) -> None:
         if events:
             SessionEvent.everywhere.bulk_create(events)
             _note_robot_orders(events)
+            _tell_receivers(events)
             # After an end, the log may be sealed to it already. A row that is updated twice would
             # wait for its clinic's (PostgreSQL checks foreign keys again).
             updated = {job.session_id for job in jobs if job.summary is not None}
@@ -145,6 +153,23 @@ def _announce_figures(patients: set[int]) -> None:
             figures_stored.send(SessionMetric, patients=patients)
     except Exception:
         log.exception("Boards miss new figures; they follow within a day.")
+
+
+def _tell_receivers(events: Sequence[SessionEvent]) -> None:
+    """Store what receivers are told of these events; no step is lost where that fails."""
+    for event in events:
+        alarm = alarm_of(event)
+        topic = ALARM_TOPICS[alarm] if alarm else Topic.SESSION
+        if alarm is None and event.kind not in ENDS:
+            continue
+        session = event.session
+        about: dict[str, Any] = {"session": session.pk, "station": session.station_id}
+        about |= {"how": event.kind} if alarm is None else {"reason": event.data.get("reason", "")}
+        try:
+            with transaction.atomic():
+                tell(session.clinic_id, topic, about, event.at)
+        except Exception:
+            log.exception("Receivers of clinic %s miss a message", session.clinic_id)
 
 
 def _note_robot_orders(events: Sequence[SessionEvent]) -> None:

@@ -29,11 +29,22 @@ from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.robot_orders import RobotOrders
-from rehab.sessions.log import ALARM_KINDS, RULE_PAUSES, Remark, RuleEntry, Step
+from rehab.sessions.log import (
+    ALARM_KINDS,
+    RULE_PAUSES,
+    PartEntry,
+    Remark,
+    RuleEntry,
+    Step,
+)
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State
 from rehab.training.controls import Audience
+from rehab.training.measures import MEASURES
+from rehab.training.plans import SessionPlan
 from rehab.training.steps import Measurement, ScoredStep
+from robot.motion.gestures import GESTURES
+from robot.plugins import Plugin
 
 RECENT_STEPS = 60  # strides that a page's chart may begin with
 
@@ -79,6 +90,7 @@ class LiveSession:
         self.recently_used = True  # since the last sweep of idle sessions
         self.uncommitted = 0
         self.gate = SubscriptionGate()
+        self._plugins: list[Message] = []  # that were noted since it was loaded
         self.about: Message = {
             "session": session.pk,
             "nickname": session.patient.nickname,
@@ -153,11 +165,25 @@ class LiveSession:
         before = Before.of(fold)
         rows = self.aggregate.change(change, by, at)
         events = events_of_change(fold, before, change)
+        if change.kind == ChangeKind.START:
+            for plugin in find_plugins(fold.plan):
+                rows += self._log_plugin(plugin.describe(), at)
         changed = [change.kind]
         if change.kind == ChangeKind.PHASE and fold.goal != before.goal:
             changed.append(ChangeKind.GOAL)
         self._submit(rows, events, changed, self.aggregate.summary(), stored=stored)
         return stored
+
+    def note_plugin(self, plugin: Message, at: datetime) -> None:
+        """Log that a part of another package takes part, unless that is known."""
+        if self.is_open and (rows := self._log_plugin(plugin, at)):
+            self._submit(rows, [], [])
+
+    def _log_plugin(self, plugin: Message, at: datetime) -> list[Row]:
+        if plugin in self._plugins:
+            return []
+        self._plugins.append(plugin)
+        return [self.aggregate.log_event(PartEntry.PLUGIN, None, at, dict(plugin))]
 
     def remark(
         self, what: Remark, value: float | None, by: User | None, at: datetime
@@ -301,6 +327,14 @@ class LiveSession:
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._submit([], [], [], stored=stored)
         await stored
+
+
+def find_plugins(plan: SessionPlan) -> list[Plugin]:
+    """Return the parts of other packages that a plan names: its measure, the robot's gestures."""
+    cue = plan.valence.cue
+    found = [MEASURES.find_plugin(plan.measure.slug)]
+    found += [GESTURES.find_plugin(name) for name in (cue.above, cue.below) if name]
+    return [one for one in found if one is not None]
 
 
 def _ago_s(moment: datetime | None, now: datetime) -> float | None:

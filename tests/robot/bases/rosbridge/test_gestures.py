@@ -36,7 +36,7 @@ def test_a_session_s_gesture_in_a_closed_loop(stage):
     assert (status["open_loop"], status["bumpers"]) == (False, True)
 
 
-@pytest.mark.parametrize("name", cases(GESTURES | VARIANTS))
+@pytest.mark.parametrize("name", cases({**GESTURES} | VARIANTS))
 def test_an_open_loop_is_short_timed_and_told(name):
     stage = Stage(OPEN)
     stage.robot.odometry = ""

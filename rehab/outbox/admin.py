@@ -1,0 +1,103 @@
+"""Admin of receivers, and of the messages to them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django import forms
+from django.contrib import admin, messages
+from django.db.models import QuerySet
+from django.http import HttpRequest, HttpResponse
+from django.template.response import TemplateResponse
+from django.utils import timezone
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.outbox.models import Endpoint, OutboxMessage
+from rehab.people.sign_in.factors.factors import close_secret
+from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
+from rehab.people.web.row_forms import ClinicForm
+
+
+class EndpointForm(ClinicForm):
+    """A receiver, with the token that a FHIR server asks for."""
+
+    token = forms.CharField(
+        label=_("token of the FHIR server"),
+        required=False,
+        widget=forms.PasswordInput,
+        help_text=_("Sent as a Bearer token; empty to leave it as it is."),
+    )
+
+
+@admin.register(Endpoint)
+class EndpointAdmin(ScopedAdmin):
+    """Receivers of a clinic; the secret that signs is shown once, when it is made."""
+
+    form = EndpointForm
+    list_display = ("name", "kind", "url", "active")
+    fields = (
+        *("name", "kind", "url", "token", "active"),
+        *("tells_sessions", "tells_falls", "tells_incidents", "tells_backups", "tells_exports"),
+    )
+    actions = row_actions = ("renew_secrets",)
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fixed fields: another kind is another receiver."""
+        return () if obj is None else ("kind",)
+
+    @asks_who_it_is
+    def changeform_view(self, *args: Any, **kwargs: Any) -> HttpResponse:
+        """Show a receiver, to which data go; ask for the password."""
+        return super().changeform_view(*args, **kwargs)
+
+    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
+        """Save the row; a new one gets a secret."""
+        token = form.cleaned_data.get("token")
+        if obj.kind == Endpoint.Kind.FHIR:
+            obj.secret = close_secret(token) if token else obj.secret
+        elif not change:
+            obj.shown_secret = obj.new_secret()
+        super().save_model(request, obj, form, change)
+
+    def response_add(self, request: HttpRequest, obj: Any, *args: Any, **kwargs: Any) -> Any:
+        """Show the secret of a new receiver."""
+        if secret := getattr(obj, "shown_secret", ""):
+            return self._show_secrets(request, [(obj, secret)])
+        return super().response_add(request, obj, *args, **kwargs)
+
+    @admin.action(description=_("Give new secrets (old ones stop at once)"), permissions=["change"])
+    @asks_who_it_is
+    def renew_secrets(self, request: HttpRequest, rows: QuerySet[Endpoint]) -> HttpResponse:
+        """Replace what signs the messages to the chosen webhooks, and show it."""
+        issued = [(row, row.new_secret()) for row in rows.filter(kind=Endpoint.Kind.WEBHOOK)]
+        for row, _secret in issued:
+            row.save(update_fields=["secret"])
+        return self._show_secrets(request, issued)
+
+    def _show_secrets(self, request: HttpRequest, issued: list[tuple[Any, str]]) -> HttpResponse:
+        context = {
+            **self.admin_site.each_context(request),
+            "title": gettext("New secrets"),
+            "opts": self.opts,
+            "issued": issued,
+            "is_kept": True,
+        }
+        return TemplateResponse(request, "admin/new_tokens.html", context)
+
+
+@admin.register(OutboxMessage)
+class OutboxMessageAdmin(ScopedAdmin):
+    """What was sent, and what waits or was refused."""
+
+    list_display = ("at", "endpoint", "topic", "state", "attempts", "answer", "due_at")
+    list_filter = ("state", "topic")
+    list_select_related = ("endpoint",)
+    actions = row_actions = viewer_actions = ("send_again",)
+
+    @admin.action(description=_("Send again"), permissions=["view"])
+    def send_again(self, request: HttpRequest, rows: QuerySet[OutboxMessage]) -> None:
+        """Let the chosen messages be sent again."""
+        for row in rows:
+            row.send_again(timezone.now())
+        messages.success(request, gettext("They are sent again."))

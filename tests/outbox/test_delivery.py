@@ -1,0 +1,224 @@
+"""Messages to receivers: stored with what they report, signed, tried again, replayed."""
+
+from __future__ import annotations
+
+import base64
+import json
+from datetime import timedelta
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from threading import Thread
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.db import transaction
+from django.urls import reverse
+
+from rehab.exports.encryption import generate_key
+from rehab.outbox.delivery import deliver_due, is_due, sign
+from rehab.outbox.http_post import Answer
+from rehab.outbox.models import PAUSES, Endpoint, OutboxMessage, Topic, tell
+from rehab.people.roles import Role
+from rehab.sessions.live.session.aggregate import Row, SessionAggregate
+from rehab.sessions.log import Remark
+from rehab.training.changes import Change, ChangeKind
+from tests.support.clock import START as NOW
+from tests.support.walks import walk
+from tests.support.world import build_world, store
+
+pytestmark = pytest.mark.django_db
+
+
+def add_endpoint(world, **fields):
+    usual = {"name": "Hook", "url": "https://hook.example/in"}
+    endpoint = Endpoint(clinic=world.clinic, **usual | fields)
+    endpoint.new_secret()
+    endpoint.save()
+    return endpoint
+
+
+@pytest.fixture
+def endpoint(world):
+    return add_endpoint(world)
+
+
+class Receiver:
+    """Answers what it is told to, and remembers what it received."""
+
+    def __init__(self, *answers):
+        self.answers = list(answers)
+        self.received = []
+
+    def __call__(self, url, body, headers, allowed):
+        answer = self.answers.pop(0) if self.answers else 200
+        if isinstance(answer, Exception):
+            raise answer
+        self.received.append((body, headers))
+        return Answer(answer, "no more" if answer >= 300 else "")
+
+
+def messages(endpoint):
+    return OutboxMessage.everywhere.filter(endpoint=endpoint).order_by("pk")
+
+
+def test_a_session_and_a_fall_are_told_and_name_no_patient(world, endpoint):
+    session = walk(world.patient, "binary", [4.0] * 4, end=None)
+    aggregate = SessionAggregate.load(session)
+    rows: list[Row] = [aggregate.log_event(Remark.FALL, None, NOW, {})]
+    rows += aggregate.change(Change(ChangeKind.FINISH), None, NOW)
+    store(aggregate, rows)
+    assert [one.topic for one in messages(endpoint)] == ["patient.fall", "session.ended"]
+    receiver = Receiver()
+    assert deliver_due(NOW + timedelta(hours=1), receiver) == 2
+    ended = json.loads(receiver.received[1][0])
+    assert ended["data"] == {"session": session.pk, "station": None, "how": "finish"}
+    sent = b"".join(body for body, _ in receiver.received)
+    assert world.patient.nickname.encode() not in sent
+    assert world.patient.pseudonym.encode() not in sent
+
+
+def test_what_is_rolled_back_is_not_told(world, endpoint):
+    with transaction.atomic():
+        tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+        transaction.set_rollback(True)
+    assert not is_due(NOW)
+
+
+def test_the_reference_library_verifies_a_signature(world, endpoint):
+    standardwebhooks = pytest.importorskip("standardwebhooks")
+    tell(world.clinic.pk, Topic.EXPORT, {"sessions": 3}, NOW)
+    receiver = Receiver()
+    deliver_due(NOW, receiver)
+    ((body, headers),) = receiver.received
+    webhook = standardwebhooks.Webhook(endpoint.open_secret())
+    assert webhook.verify(body, dict(headers))["data"] == {"sessions": 3}
+    with pytest.raises(standardwebhooks.WebhookVerificationError):
+        webhook.verify(body + b" ", dict(headers))
+
+
+def test_the_example_of_the_specification():
+    secret = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"
+    body = b'{"test": 2432232314}'
+    signature = "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE="
+    assert sign(secret, "msg_p5jXN8AQM9LWM0D4loKWxJek", 1614265330, body) == signature
+
+
+def test_an_hour_away_loses_nothing_and_keeps_the_key(world, endpoint):
+    for number in range(3):
+        tell(world.clinic.pk, Topic.EXPORT, {"sessions": number}, NOW)
+    keys = [one.key for one in messages(endpoint)]
+    away, now = Receiver(*[OSError("no route")] * 1000), NOW
+    while now < NOW + timedelta(hours=1):
+        assert deliver_due(now, away) == 0
+        now += timedelta(seconds=5)
+    back = Receiver()
+    while is_due(now) or messages(endpoint).filter(state="waiting").exists():
+        deliver_due(now, back)
+        now += timedelta(minutes=10)
+    assert sorted(headers["webhook-id"] for _, headers in back.received) == sorted(keys)
+    assert {one.state for one in messages(endpoint)} == {"delivered"}
+
+
+def test_a_receiver_that_never_answers_is_given_up_and_can_be_told_again(world, endpoint):
+    tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    now = NOW
+    for _ in range(len(PAUSES) + 1):
+        deliver_due(now, Receiver(503))
+        now += PAUSES[-1]
+    message = messages(endpoint).get()
+    assert (message.state, message.attempts) == ("refused", len(PAUSES) + 1)
+    assert message.answer == "503 no more"
+    address = reverse("admin:rehab_outboxmessage_changelist")
+    world.lead.post(address, {"action": "send_again", "_selected_action": [message.pk]})
+    assert deliver_due(now + timedelta(days=400), Receiver()) == 1
+
+
+@pytest.mark.parametrize(("status", "active"), [(400, True), (404, True), (410, False)])
+def test_a_refusal_is_final_and_shown(world, endpoint, status, active):
+    tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    deliver_due(NOW, Receiver(status))
+    endpoint.refresh_from_db()
+    assert messages(endpoint).get().state == "refused"
+    assert endpoint.active == active
+    page = world.lead.get(reverse("admin:rehab_outboxmessage_changelist")).content.decode()
+    assert f"{status} no more" in page
+
+
+def test_a_message_is_claimed_by_one_server(world, endpoint):
+    tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    inner = Receiver()
+
+    def meanwhile(*arguments):
+        assert deliver_due(NOW, inner) == 0  # another server, while this one waits for an answer
+        return Answer(200, "")
+
+    assert deliver_due(NOW, meanwhile) == 1
+    assert inner.received == []
+
+
+def test_a_receiver_that_fails_does_not_hold_up_another(world, endpoint):
+    add_endpoint(world, name="Second")
+    for _ in range(2):
+        tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    assert deliver_due(NOW, Receiver(OSError("away"), 200, 200)) == 2
+
+
+def test_another_clinic_is_told_nothing(world, endpoint):
+    other = build_world("basil")
+    walk(other.patient, "binary", [4.0] * 4)
+    assert not messages(endpoint).exists()
+    page = other.lead.get(reverse("admin:rehab_endpoint_change", args=[endpoint.pk]))
+    assert page.status_code in (302, 404)
+
+
+def test_a_failed_backup_is_told(world, endpoint, settings, tmp_path, monkeypatch):
+    settings.BACKUP_KEYS = [generate_key()[1]]
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("rehab.management.commands.backup.write_backup", fail)
+    with pytest.raises(CommandError, match="cannot be written"):
+        call_command("backup", str(tmp_path / "all.age"))
+    assert messages(endpoint).get().body == {"problem": "CommandError"}
+
+
+def test_a_lead_adds_a_receiver_and_sees_its_secret_once(world):
+    form = {"name": "EHR", "kind": "webhook", "url": "https://ehr.example/", "active": "on"}
+    page = world.lead.post(reverse("admin:rehab_endpoint_add"), form, follow=True)
+    endpoint = Endpoint.everywhere.get(name="EHR")
+    secret = endpoint.open_secret()
+    assert len(base64.b64decode(secret.removeprefix("whsec_"))) == 32
+    assert secret in page.content.decode()
+    assert secret not in endpoint.secret
+    page = world.lead.get(reverse("admin:rehab_endpoint_change", args=[endpoint.pk]))
+    assert secret not in page.content.decode()
+    for role in (Role.PT, Role.RESEARCHER):
+        client = world.pt if role is Role.PT else None
+        if client is not None:
+            assert client.get(reverse("admin:rehab_endpoint_changelist")).status_code == 403
+
+
+class Hook(BaseHTTPRequestHandler):
+    received: list[bytes] = []
+
+    def do_POST(self):
+        self.received.append(self.rfile.read(int(self.headers["Content-Length"])))
+        self.send_response(204)
+        self.end_headers()
+
+    def log_message(self, *_):
+        pass
+
+
+def test_over_a_real_socket_where_the_host_allows_the_network(world, settings):
+    with HTTPServer(("127.0.0.1", 0), Hook) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        endpoint = add_endpoint(world, url=f"http://127.0.0.1:{server.server_port}/hook")
+        tell(world.clinic.pk, Topic.EXPORT, {"sessions": 1}, NOW)
+        assert deliver_due(NOW) == 0
+        assert "GARRY_PRIVATE_RECEIVERS" in messages(endpoint).get().answer
+        messages(endpoint).get().send_again(NOW)
+        settings.PRIVATE_RECEIVERS = ["127.0.0.0/8"]
+        assert deliver_due(NOW) == 1
+        server.shutdown()
+    assert json.loads(Hook.received[0])["type"] == "export.ready"
