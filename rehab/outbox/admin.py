@@ -14,7 +14,6 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.outbox.models import Endpoint, OutboxMessage
-from rehab.people.sign_in.factors.factors import close_secret
 from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
 from rehab.people.web.row_forms import ClinicForm
 
@@ -55,7 +54,8 @@ class EndpointAdmin(ScopedAdmin):
         """Save the row; a new one gets a secret."""
         token = form.cleaned_data.get("token")
         if obj.kind == Endpoint.Kind.FHIR:
-            obj.secret = close_secret(token) if token else obj.secret
+            if token:
+                obj.store_secret(token)
         elif not change:
             obj.shown_secret = obj.new_secret()
         super().save_model(request, obj, form, change)

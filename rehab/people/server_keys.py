@@ -28,6 +28,7 @@ class Purpose(models.TextChoices):
     AUTHENTICATORS = "authenticators", "garry.second_factors apps"
     DATES = "dates", "garry.exports.dates"
     TOMBSTONES = "tombstones", "garry.import_tombstones"
+    RECEIVERS = "receivers", "garry.outbox secrets"
 
 
 class ServerKey(models.Model):

@@ -15,7 +15,6 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
-from rehab.people.sign_in.factors.factors import close_secret
 from tests.support.clock import START as NOW
 from tests.support.programs import ROOT, program_of
 from tests.support.walks import walk
@@ -167,13 +166,15 @@ class FhirServer:
 
 @pytest.fixture
 def endpoint(world):
-    return Endpoint.everywhere.create(
+    endpoint = Endpoint(
         clinic=world.clinic,
         name="EHR",
         kind=Endpoint.Kind.FHIR,
         url="https://ehr.example/fhir",
-        secret=close_secret("ehr-token"),
     )
+    endpoint.store_secret("ehr-token")
+    endpoint.save()
+    return endpoint
 
 
 def test_a_push_survives_an_hour_away_and_repeats_change_nothing(world, endpoint):

@@ -34,6 +34,7 @@ class CannotMove(ValueError):
 ENCRYPTED = {
     "rehab.study": ("sealed", Purpose.STUDIES),
     "rehab.authenticator": ("credential", Purpose.AUTHENTICATORS),
+    "rehab.endpoint": ("secret", Purpose.RECEIVERS),  # which stays where it is
 }
 
 
