@@ -4,7 +4,7 @@ import shlex
 
 import pytest
 
-from rehab.sources import SOURCES, load_source
+from rehab.sources import SOURCES
 from rehab.sources.arguments import make_parser
 from rehab.stations.programs import PROGRAMS
 
@@ -14,7 +14,7 @@ SERVER = "http://192.168.7.2:8000"
 def parse(command):
     python, flag, module, name, *options = shlex.split(command)
     assert (python, flag, module) == ("python", "-m", "rehab.sources")
-    return name, make_parser(name, load_source(name)).parse_args(options)
+    return name, make_parser(name, SOURCES[name]).parse_args(options)
 
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda one: one.source.split()[0])
