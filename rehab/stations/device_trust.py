@@ -15,7 +15,6 @@ from django.utils.translation import gettext as _
 
 from rehab.people.audit.audit_log import Act, record, truncate_address
 from rehab.people.models import User
-from rehab.people.models.blinding import assessors
 from rehab.people.networks import is_outside
 from rehab.people.roles import Role
 from rehab.stations.models import Device
@@ -30,7 +29,7 @@ class NotTrusted(ValueError):
 def approvers() -> QuerySet[User]:
     """Return the accounts that may let a tablet or phone of their clinic in."""
     carers = User.everywhere.filter(is_active=True, role__in=[Role.LEAD, Role.PT])
-    return carers.exclude(pk__in=assessors().values("pk"))
+    return carers.exclude(pk__in=User.everywhere.assessors().values("pk"))
 
 
 def check_approval(by: User, address: str, device: str, now: datetime) -> None:

@@ -8,7 +8,7 @@ from rehab.boards.choices import Participants
 from rehab.boards.models import Leaderboard
 from rehab.people.consent.models import Purpose, has_consented
 from rehab.people.models import Patient
-from rehab.people.models.blinding import RUNNING
+from rehab.people.models.accounts import RUNNING
 
 
 def eligible_patients(board: Leaderboard) -> QuerySet[Patient]:

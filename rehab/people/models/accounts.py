@@ -8,7 +8,7 @@ from django.contrib.auth.base_user import BaseUserManager
 from django.contrib.auth.models import AbstractUser, UserManager
 from django.core.exceptions import ValidationError
 from django.db import models
-from django.db.models import F, Q
+from django.db.models import F, Q, QuerySet
 from django.utils.crypto import constant_time_compare, salted_hmac
 from django.utils.translation import gettext_lazy as _
 
@@ -16,9 +16,19 @@ from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedManager
 
+RUNNING = "running"  # a study's state while it enrolls and walks
+
 
 class ServerUserManager(UserManager["User"]):
-    """Creates accounts for the server's own work. `createsuperuser` creates a host."""
+    """Accounts for the server's own work. `createsuperuser` creates a host."""
+
+    def assessors(self) -> QuerySet[User]:
+        """Return the accounts that assess in a running study, and so must not know an arm."""
+        return self.filter(
+            study_marks__study__state=RUNNING,
+            study_marks__task="assessor",
+            study_marks__ended_at=None,
+        )
 
     def create_superuser(
         self,
@@ -84,10 +94,11 @@ class User(AbstractUser):
 
     def clean(self) -> None:
         """Refuse a role in which an assessor of a running study would learn the arms."""
-        from rehab.people.models.blinding import assessors
-
         super().clean()
-        if self.role in {Role.LEAD, Role.HOST} and assessors().filter(pk=self.pk).exists():
+        if (
+            self.role in {Role.LEAD, Role.HOST}
+            and User.everywhere.assessors().filter(pk=self.pk).exists()
+        ):
             raise ValidationError(
                 _(
                     "This account assesses in a running study, and in that role would know the "

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from django.db.models import QuerySet
 
+from rehab.people.models.accounts import RUNNING, User
 from rehab.people.models.patients import Patient
 from rehab.people.roles import Role
-
-if TYPE_CHECKING:
-    from rehab.people.models.accounts import User
-
-RUNNING = "running"  # a study's state while it enrolls and walks
 
 
 def hidden_patients(user: User) -> QuerySet[Patient]:
@@ -30,17 +24,6 @@ def hidden_patients(user: User) -> QuerySet[Patient]:
         enrollments__study__marks__user=user,
         enrollments__study__marks__task="assessor",
         enrollments__study__marks__ended_at=None,
-    )
-
-
-def assessors() -> QuerySet[User]:
-    """Return the accounts that assess in a running study, and so must not know an arm."""
-    from rehab.people.models.accounts import User
-
-    return User.everywhere.filter(
-        study_marks__study__state=RUNNING,
-        study_marks__task="assessor",
-        study_marks__ended_at=None,
     )
 
 
