@@ -25,8 +25,7 @@ from rehab.gait.strides import Flag, RejectionReason, Stride
 # mass, unit or plate.
 SUPPORTED_BELOW = 0.95
 WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
-# What is wrong with a plate or its moment, as with both feet on it: then a step is no measure of
-# the other leg's.
+# What is wrong where both feet are on a plate: then a step is no measure of the other leg's.
 UNLIKE_STEPS = {
     RejectionReason.CROSS_STEP,
     RejectionReason.FORCE_LOST,
