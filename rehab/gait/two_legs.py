@@ -25,6 +25,15 @@ from rehab.gait.strides import Flag, RejectionReason, Stride
 # mass, unit or plate.
 SUPPORTED_BELOW = 0.95
 WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
+# What is wrong where both feet are on a plate: then a step is no measure of the other leg's.
+UNLIKE_STEPS = {
+    RejectionReason.CROSS_STEP,
+    RejectionReason.FORCE_LOST,
+    RejectionReason.FORCE_TOO_LARGE,
+    RejectionReason.MOMENT_OUT_OF_STEP,
+    RejectionReason.SHORT_STANCE,
+    RejectionReason.WEIGHT,
+}
 LATEST_S = 2.5  # between two steps that are compared; later, somebody stood between them
 ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its change to running
 
@@ -161,7 +170,10 @@ class TwoLegDetector(Detector):
             impulse=stride.stance.propulsion_impulse_n_s_kg,
         )
         last = self._latest.get(other.side)
-        self._latest[leg.side] = step
+        wrong = {*reasons, *stride.reasons}
+        # A moment that came late was nobody else's.
+        is_own = RejectionReason.LATE in wrong or wrong.isdisjoint(UNLIKE_STEPS)
+        self._latest[leg.side] = step if is_own else StepFigures(begin_s=this.begin_s)
         if last is None or not this.begin_s - last.begin_s < LATEST_S:
             last = StepFigures(begin_s=this.begin_s)
         margin_m, foot_m, belt_m_s = None, stride.stance.position_m, stride.stance.belt_m_s

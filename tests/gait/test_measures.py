@@ -185,8 +185,6 @@ def test_against_numpy_alone(name, median, most):
         ("propulsion_impulse_n_s_kg", 0.004),
         ("braking_impulse_n_s_kg", 0.004),
         ("propulsion_percent", 1.0),
-        ("stance_ratio_percent", 0.7),
-        ("swing_ratio_percent", 1.2),
         ("step_time_ratio_percent", 0.8),
         ("step_length_ratio_percent", 0.8),
         ("walking_ratio_mm_min", 0.05),
@@ -195,8 +193,20 @@ def test_against_numpy_alone(name, median, most):
 def test_of_another_person_and_system_against_numpy_alone(name, median):
     """gaitalytics, whose other foot often steps on both plates: the valid strides."""
     found = compare("gaitalytics", name)
-    assert len(found) >= 4
+    assert len(found) >= 3
     assert np.median(found) < median
+
+
+def test_no_step_is_compared_with_one_of_both_feet():
+    """Its stance is that of two feet: the ratio would be 65 %."""
+    _, strides = open_gaitalytics()
+    after = next(one for one in strides if abs(one.initial_contact_s - 2.35) < 0.05)
+    crossed = next(one for one in strides if abs(one.initial_contact_s - 1.76) < 0.05)
+    assert after.valid
+    assert not crossed.valid
+    assert after.stance_ratio_percent is None
+    ratios = [one.stance_ratio_percent for one in strides if one.valid and one.stance_ratio_percent]
+    assert all(85 < ratio < 115 for ratio in ratios)
 
 
 def compare(walk, name):

@@ -236,7 +236,7 @@ def test_the_documented_example_reads(parse):
     assert example is not None
     recording = parse(example[1])
 
-    assert [phase.strides for phase in recording.phases] == [3, 4, 2]
+    assert [phase.strides for phase in recording.phases] == [2, 3, 1]
     assert recording.goal == 3.9
 
 
