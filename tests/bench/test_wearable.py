@@ -11,6 +11,7 @@ import pytest
 
 from rehab.gait.wearables import WearableDetector, WearableStride
 from tests.support.data import signals
+from tests.support.other_walkers import OTHERS
 from tests.support.simulated_leg import random_mounting
 from tests.support.worn_sensors import (
     GAITMAP_HZ,
@@ -215,6 +216,24 @@ def test_after_a_stroke():
         assert np.median(spreads) <= 15
     assert signs == len(shares) == 72
     assert weakest == 8
+
+
+def test_other_people_and_sensors():
+    """Each leg again as a slower, weaker, noisier … one: as many strides as before."""
+    known = {walk.name: len(measure(walk)[0]) for walk in stroke_walks()}
+    for name, change in OTHERS.items():
+        shares, wrong = {}, 0
+        for walk in stroke_walks():
+            found, detector = measure(change(walk))
+            shares[walk.name] = len(found) / known[walk.name]
+            # Sensors of all legs sit alike: y to the right.
+            left = np.dot(random_mounting(7) if name == "turned" else np.eye(3), (0, -1, 0))
+            wrong += detector.left is not None and float(np.dot(detector.left, left)) < 0
+        outside = [leg for leg, share in shares.items() if not 0.96 <= share <= 1.02]
+        low, high = min(shares.values()), max(shares.values())
+        print(f"\n{name}: {low:.1%} … {high:.1%}, {wrong} signs wrong, outside {outside}", end="")
+        assert wrong == 0
+        assert len(outside) <= 2
 
 
 def test_strides_are_known_soon():

@@ -1,4 +1,4 @@
-"""A clinic's first day without a laboratory: from the first sign-in to a recorded leg that walks."""
+"""A clinic's first day without a laboratory: from the first sign-in to a recording that walks."""
 
 from __future__ import annotations
 
