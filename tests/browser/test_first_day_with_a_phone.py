@@ -1,4 +1,4 @@
-"""A clinic's first day without a laboratory: from the first sign-in to a leg that walks."""
+"""A clinic's first day without a laboratory: from the first sign-in to a recording that walks."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from rehab.stations.https.certificate import network_address
 from tests.support.browsers import PATIENCE_MS, SIZES, picture, sign_in
+from tests.support.data import signals
 from tests.support.servers import Server, free_port, serve
 from tests.support.worn_phone import read_steps
 
@@ -41,6 +42,7 @@ def open_screen(browser: Browser, url: str, size: str) -> Page:
 
 def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     server, address = new_clinic
+    leg = signals("stroke_imu") / "pp02_001_leftshank.csv.gz"
     begin_s, taps = time.monotonic(), []
 
     def tap(page: Page, what: str, name: str) -> None:
@@ -53,8 +55,6 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     taps.append("sign in")
     tap(pt, "text=First steps, one by one", "first steps")
     picture(pt, "first-steps")
-    pt.goto("/first-steps/?step=tablet")
-    taps.append("the step Tablet")
     expect(pt.locator("main")).to_contain_text(f"{address}/tablet/")
     tablet = open_screen(browser, address, "tablet-landscape")
     tablet.goto("/tablet/")
@@ -73,8 +73,10 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     phone.set_viewport_size({"width": SIZES["phone"][0], "height": SIZES["phone"][1]})
     phone.wait_for_selector("[data-begin]:enabled")
     picture(phone, "phone-strap")
+    phone.set_input_files("[data-recording]", leg)
+    taps.append("choose a recording")
     tap(phone, "[data-begin]", "begin")
-    expect(phone.locator("[data-check=still]")).to_have_class("done")
+    expect(phone.locator("[data-check=still]")).to_be_visible()
     picture(phone, "phone-check")
     tap(pt, "text=To the therapist’s page", "the therapist's page")
     expect(phone.locator("[data-show=verdict]")).to_have_text("Good.", timeout=PATIENCE_MS)

@@ -8,6 +8,7 @@ import pytest
 from rehab.gait import GaitInputError, WearableDetector
 from rehab.gait.__main__ import main
 from rehab.gait.wearables import Doubt
+from tests.support.other_walkers import OTHERS
 from tests.support.simulated_leg import (
     STRIDE_S,
     SWING_S,
@@ -44,6 +45,13 @@ def test_the_weakest_foot_is_found_with_the_right_sign(name, strides):
         assert 0.55 < np.median([one.stance_share for one in found]) < 0.75
         times = np.array([one.stride_s for one in found])
         assert times.std() / times.mean() < 0.12
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_people_and_sensors_lose_no_stride(name):
+    walk = next(stroke_walks("pp03_005_leftfoot")).picked(slice(0, 4000))
+    plain, found = measure(walk)[0], measure(OTHERS[name](walk))[0]
+    assert abs(len(found) - len(plain)) <= 1
 
 
 def test_a_rate_alone_has_the_right_sign_too():

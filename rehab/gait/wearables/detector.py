@@ -45,7 +45,8 @@ class WearableDetector:
     It finds about which axis the leg swings, and which end of that axis points to the walker's left
     by two signs that must not disagree: where the leg travels, and that it is quiet in what are
     then its stances. Until that is known no stride is returned; those that wait are returned then.
-    Thresholds follow the person. A stride is known at most 0.15 s after the initial contact that ends it.
+    Thresholds follow the person. A stride is known at most 0.15 s after the initial contact that
+    ends it.
 
     Parameters
     ----------

@@ -30,6 +30,7 @@ SKIPPED = "skipped_first_steps"  # key of the browser session
 def first_steps(request: HttpRequest) -> HttpResponse:
     """Show one step at a time; each can be done here, is looked at live, and can be skipped."""
     user = user_of(request)
+    first_station(clinic_of(user))  # named anew in the first step, by who wants to
     found = {step.slug: step.look(user, timezone.now()) for step in STEPS}
     skipped = set(request.session.get(SKIPPED, []))
     if request.method == "POST" and request.POST.get("skip") in found:
@@ -45,7 +46,6 @@ def first_steps(request: HttpRequest) -> HttpResponse:
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
     }
     if slug == "tablet":
-        first_station(clinic_of(user))  # who skips the step before has one all the same
         context |= tablet_address(request) | {"stations": Station.objects.visible_to(user)}
     acted = _act(request, slug, context)
     return acted or render(request, "patients/first_steps.html", context)

@@ -11,7 +11,7 @@ import { RecentSamples } from "garry/sensor/recent";
 import { Sender } from "garry/sensor/sender";
 import { toStep } from "garry/sensor/stride";
 import { Symmetry } from "garry/sensor/symmetry";
-import { walkInstead } from "garry/sensor/trial";
+import { fetchLeg, readRecording, walkInstead } from "garry/sensor/trial";
 
 const HOLD_MS = 2_000;
 const TICK_MS = 500;
@@ -78,8 +78,8 @@ function refuse(text) {
 }
 
 function findTrouble() {
-  if (document.hidden) return "hidden";
-  if (heard_s !== null && now_s() - heard_s > 1) return "gap";
+  if (!isTrial && document.hidden) return "hidden";
+  if (!isTrial && heard_s !== null && now_s() - heard_s > 1) return "gap";
   if (detector.isInDoubt) return "doubt";
   if (movedUntil_s > now_s()) return "moved";
   const minor = battery < LOW_BATTERY ? "battery" : elsewhere_deg ? "elsewhere" : "";
@@ -164,6 +164,8 @@ async function watchBattery() {
 }
 
 async function begin() {
+  const leg = isTrial && (await chooseLeg());
+  if (isTrial && !leg) return;
   // iOS asks the person, and only after a tap.
   if (!isTrial && typeof DeviceMotionEvent.requestPermission === "function") {
     const answer = await DeviceMotionEvent.requestPermission().catch(() => "denied");
@@ -178,7 +180,7 @@ async function begin() {
   });
   sender.onContact = (contact) => symmetry.note(contact);
   await sender.open();
-  if (isTrial) walkInstead(body.dataset.trial, take);
+  if (leg) walkInstead(leg, take);
   else window.addEventListener("devicemotion", take);
   setInterval(tick, TICK_MS);
   document.addEventListener("visibilitychange", () => {
@@ -188,6 +190,16 @@ async function begin() {
   keepAwake();
   watchBattery();
   step("check");
+}
+
+// Who walks in a trial; null where a file was chosen that cannot.
+async function chooseLeg() {
+  const [file] = document.querySelector("[data-recording]").files;
+  const read = file ? readRecording(file) : fetchLeg(body.dataset.trial);
+  return read.catch(({ message }) => {
+    show("strap", message);
+    return null;
+  });
 }
 
 function holdToLeave(button) {
@@ -213,6 +225,7 @@ if (!isTrial && (!window.isSecureContext || !("DeviceMotionEvent" in window))) {
   body.dataset.place = place;
   show("where", fill(_("%(side)s %(place)s"), { side: SIDES[side], place: PLACES[place] }));
   show("strap", STRAPS[place]);
+  document.querySelector("[data-trial-only]").hidden = !isTrial;
   step("strap");
   const start = document.querySelector("[data-begin]");
   start.addEventListener("click", begin);

@@ -1,26 +1,55 @@
-// A simulated leg instead of this device's sensors, to try the page: stands, then walks for as long as it is open.
+// Another leg instead of this device's sensors, to try the page: a simulated one, or a recording that a person chose.
+
+import { _ } from "garry/shared/language";
 
 const EVERY_MS = 10;
+const PAUSE_S = 0.2; // before a recording begins again: no stride reaches across
+const COUNT_HZ = 100;
+const COUNTS = 65_536; // from which packet counters begin again
 
-export async function walkInstead(address, take) {
-  const { stand, walk } = await (await fetch(address)).json(); // rows of a second and stride: s, m/s², °/s
+// What a leg does first, and what it does again and again: rows of s, m/s², °/s.
+export async function fetchLeg(address) {
+  const { stand, walk } = await (await fetch(address)).json();
+  return [stand, walk].map((rows) => ({ rows, length_s: rows[rows.length - 1][0] + 1 / 60 }));
+}
+
+// The same of a file as this page saves it (recent.js); a first column in whole numbers counts samples, 100 a second.
+export async function readRecording(file) {
+  const bytes = file.stream();
+  const text = file.name.endsWith(".gz") ? bytes.pipeThrough(new DecompressionStream("gzip")) : bytes;
+  const [, ...lines] = (await new Response(text).text()).trim().split(/\r?\n/);
+  const table = lines.map((line) => line.split(",").map(Number));
+  if (table.length < 2 || table.some((row) => row.length !== 7 || !row.every(Number.isFinite))) {
+    throw new Error(_("Choose a table with commas: time in seconds, three accelerations (m/s²), three rates (rad/s)."));
+  }
+  const first = table[0][0];
+  const isCount = table.every(([at]) => Number.isInteger(at));
+  const toSeconds = (at) => (isCount ? ((at - first + COUNTS) % COUNTS) / COUNT_HZ : at - first);
+  const rows = table.map(([at, ...six]) => [
+    toSeconds(at),
+    ...six.slice(0, 3),
+    ...six.slice(3).map((rate) => (rate * 180) / Math.PI),
+  ]);
+  const walk = { rows, length_s: rows[rows.length - 1][0] + PAUSE_S };
+  return [walk, walk];
+}
+
+export function walkInstead([first, again], take) {
   const begin = performance.now();
-  const length_s = (rows) => rows[rows.length - 1][0] + 1 / 60;
-  const [first_s, stride_s] = [length_s(stand), length_s(walk)];
-  let [rows, start_s, next] = [stand, 0, 0];
+  let [part, start_s, next] = [first, 0, 0];
   setInterval(() => {
     const now_s = (performance.now() - begin) / 1000;
-    while (start_s + rows[next][0] <= now_s) {
-      const [at_s, ax, ay, az, gx, gy, gz] = rows[next];
+    while (start_s + part.rows[next][0] <= now_s) {
+      const [at_s, ax, ay, az, gx, gy, gz] = part.rows[next];
       take({
         timeStamp: begin + 1000 * (start_s + at_s),
         accelerationIncludingGravity: { x: ax, y: ay, z: az },
         rotationRate: { beta: gx, gamma: gy, alpha: gz },
       });
       next += 1;
-      if (next < rows.length) continue;
-      start_s += rows === stand ? first_s : stride_s;
-      [rows, next] = [walk, 0];
+      if (next < part.rows.length) continue;
+      start_s += part.length_s;
+      [part, next] = [again, 0];
     }
   }, EVERY_MS);
 }
