@@ -34,8 +34,10 @@ SEALED_SINCE = timedelta(days=30)  # whose rows are read again each night
 
 
 def ship_logs(now: datetime) -> str:
-    """Append what was sealed of the logs to the file stored elsewhere."""
-    return _called("shiplogs", _setting("GARRY_SHIPPED_LOGS", settings.SHIPPED_LOGS))
+    """Append what was sealed of the logs to the file stored elsewhere, if there is one."""
+    if not settings.SHIPPED_LOGS:
+        return "GARRY_SHIPPED_LOGS is not set: nothing is shipped."
+    return _called("shiplogs", settings.SHIPPED_LOGS)
 
 
 def retention(now: datetime) -> str:
@@ -155,7 +157,7 @@ def _run_in(folder: Path, *command: str) -> str:
     """Run a command of an installation in this folder, on SQLite. Raises CommandError."""
     own = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
     done = subprocess.run(
-        [sys.executable, "manage.py", *command],
+        [sys.executable, "-m", "garry_site", *command],
         cwd=settings.BASE_DIR,
         env=own | {"GARRY_DATA_DIR": str(folder)},
         capture_output=True,
