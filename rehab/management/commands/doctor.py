@@ -26,6 +26,7 @@ from rehab.management.new_file import new_file
 from rehab.management.problem_report import write_report
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
+from rehab.people.server_keys import ServerKey
 from rehab.people.sign_in.first_start import count_pending_migrations
 from rehab.sessions import seals as session_seals
 from rehab.sessions.live.database import owners
@@ -258,6 +259,17 @@ def examine_seals() -> Iterator[Diagnosis]:
         yield Diagnosis("logs", state, "Start the server: it seals them." if late else "")
 
 
+def examine_keys() -> Iterator[Diagnosis]:
+    """Diagnose the server's own keys."""
+    stored = list(ServerKey.objects.all())
+    closed = ", ".join(str(one) for one in stored if one.open() is None)
+    cure = "GARRY_SECRET_KEY is another one now: see manage.py rotatekeys --help."
+    if closed:
+        yield Diagnosis("keys", f"{closed}: not opened", cure)
+    else:
+        yield Diagnosis("keys", f"all {len(stored)} open")
+
+
 def examine_new_steps() -> Iterator[Diagnosis]:
     """Diagnose the seals of all sessions, and the steps and events that were sealed lately."""
     return _examine_steps(timezone.now() - SEALED_SINCE)
@@ -289,4 +301,5 @@ EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (
     examine_children,
     examine_tokens,
     examine_seals,
+    examine_keys,
 )

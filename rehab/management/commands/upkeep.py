@@ -23,19 +23,23 @@ from django.conf import settings
 from django.core.management import BaseCommand, CommandError, call_command
 from django.utils import timezone
 
-from rehab.people.audit import seals
+from rehab.management.commands.doctor import (
+    Diagnosis,
+    examine_keys,
+    examine_new_steps,
+    examine_seals,
+)
 from rehab.people.chores import record_chore
-from rehab.people.server_keys import ServerKey
-from rehab.sessions import seals as session_seals
 
 NAMED = "garry-{:%Y-%m-%d}.backup"
 RENEWED = timedelta(days=14)  # before a certificate ends; certbot does so 30 days before
-SEALED_SINCE = timedelta(days=30)  # whose rows are read again each night
 
 
 def ship_logs(now: datetime) -> str:
-    """Append what was sealed of the logs to the file stored elsewhere."""
-    return _called("shiplogs", _setting("GARRY_SHIPPED_LOGS", settings.SHIPPED_LOGS))
+    """Append what was sealed of the logs to the file stored elsewhere, if there is one."""
+    if not settings.SHIPPED_LOGS:
+        return "GARRY_SHIPPED_LOGS is not set: nothing is shipped."
+    return _called("shiplogs", settings.SHIPPED_LOGS)
 
 
 def retention(now: datetime) -> str:
@@ -56,18 +60,12 @@ def backup(now: datetime) -> str:
 
 def check_seals(now: datetime) -> str:
     """Compare logs with their seals, and the steps that were sealed lately."""
-    broken = [*seals.find_broken(), *session_seals.find_broken(now - SEALED_SINCE)]
-    if broken:
-        raise CommandError(f"{len(broken)} are not as they were sealed: {'; '.join(broken[:5])}")
-    return "All seals hold."
+    return _examined(*examine_seals(), *examine_new_steps())
 
 
 def check_keys(now: datetime) -> str:
     """Open the server's own keys."""
-    closed = [str(one) for one in ServerKey.objects.all() if one.open() is None]
-    if closed:
-        raise CommandError(f"{', '.join(closed)}: not opened. See manage.py rotatekeys --help.")
-    return "All keys open."
+    return _examined(*examine_keys())
 
 
 def check_certificate(now: datetime) -> str:
@@ -145,6 +143,14 @@ def _setting(name: str, value: str) -> str:
     return value
 
 
+def _examined(*diagnoses: Diagnosis) -> str:
+    """Return what `manage.py doctor` finds. Raises CommandError where something needs a cure."""
+    bad = [f"{one.state}. {one.cure}" for one in diagnoses if one.cure]
+    if bad:
+        raise CommandError(f"{len(bad)} need care: {' '.join(bad[:5])}")
+    return "; ".join(one.state for one in diagnoses)
+
+
 def _called(*command: Any) -> str:
     out = StringIO()
     call_command(*command, stdout=out)
@@ -155,7 +161,7 @@ def _run_in(folder: Path, *command: str) -> str:
     """Run a command of an installation in this folder, on SQLite. Raises CommandError."""
     own = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
     done = subprocess.run(
-        [sys.executable, "manage.py", *command],
+        [sys.executable, "-m", "garry_site", *command],
         cwd=settings.BASE_DIR,
         env=own | {"GARRY_DATA_DIR": str(folder)},
         capture_output=True,
