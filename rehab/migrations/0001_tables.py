@@ -1335,7 +1335,7 @@ class Migration(migrations.Migration):
                             ("attended", "Sessions attended"),
                             ("target_met", "Days on which the target was met"),
                         ],
-                        help_text="Whoever has more of this comes first; after that, whoever was earlier.",
+                        help_text="Who has more of this stands first; after that, who was earlier.",
                         max_length=32,
                         verbose_name="of equal figures, first",
                     ),
@@ -1368,7 +1368,7 @@ class Migration(migrations.Migration):
                         choices=[
                             ("after_session", "After a session"),
                             ("waiting", "While the tablet waits"),
-                            ("pt_only", "Only here, for therapists"),
+                            ("pt_only", "Only here, to therapists"),
                         ],
                         default="after_session",
                         max_length=16,
@@ -1608,7 +1608,7 @@ class Migration(migrations.Migration):
                 (
                     "nickname",
                     models.CharField(
-                        help_text="Shown on the screens, so that patient and therapist can check.",
+                        help_text="What the screens say, so that patient and therapist can check.",
                         max_length=32,
                         verbose_name="nickname",
                     ),
@@ -1659,7 +1659,7 @@ class Migration(migrations.Migration):
                     "birth_year",
                     models.PositiveSmallIntegerField(
                         blank=True,
-                        help_text="Researchers see only the decade of age.",
+                        help_text="Researchers see the ten years of age alone.",
                         null=True,
                         validators=[
                             django.core.validators.MinValueValidator(1900),
@@ -1672,7 +1672,7 @@ class Migration(migrations.Migration):
                     "stroke_month",
                     models.DateField(
                         blank=True,
-                        help_text="Researchers see only the months since then.",
+                        help_text="Researchers see the months since then alone.",
                         null=True,
                         verbose_name="month of the stroke",
                     ),
@@ -1723,7 +1723,7 @@ class Migration(migrations.Migration):
                     "screen_still",
                     models.BooleanField(
                         default=False,
-                        help_text="No confetti, and nothing moves except the level.",
+                        help_text="No confetti, and nothing moves but the level.",
                         verbose_name="calm page",
                     ),
                 ),
@@ -1731,7 +1731,7 @@ class Migration(migrations.Migration):
                     "screen_sounds",
                     models.BooleanField(
                         default=False,
-                        help_text="A soft tone for each step, the higher the better; a second one for points. The patient can mute it on the page.",
+                        help_text="A soft tone a step, the higher the better; a second one for points. The patient can mute it on the page.",
                         verbose_name="sounds",
                     ),
                 ),
@@ -2602,7 +2602,7 @@ class Migration(migrations.Migration):
                             ("near_fall", "near fall"),
                             ("fall", "fall"),
                             ("fall_severity", "hurt by the fall"),
-                            ("fall_withdrawn", "it was not a fall"),
+                            ("fall_withdrawn", "it was no fall"),
                             ("fall_acknowledged", "fall seen by a therapist"),
                             ("stop_acknowledged", "robot’s stop seen by a therapist"),
                             ("verbal_cue", "verbal cue"),
@@ -3867,7 +3867,7 @@ class Migration(migrations.Migration):
                     "close",
                     models.BooleanField(
                         db_default=False,
-                        help_text="Too uncertain to count as a hit or a miss.",
+                        help_text="Too uncertain to count as hit or miss.",
                         verbose_name="close",
                     ),
                 ),
@@ -3875,7 +3875,7 @@ class Migration(migrations.Migration):
                     "late",
                     models.BooleanField(
                         db_default=False,
-                        help_text="It arrived too late to be shown live.",
+                        help_text="It came too late to be shown as live.",
                         verbose_name="late",
                     ),
                 ),
