@@ -76,10 +76,8 @@ class Command(BaseCommand):
             population = Population(dropout=options["dropout"])
             trial = example_trial(options["participants"], options["visits"], population)
             clinic, _is_new = Clinic.everywhere.get_or_create(name=options["clinic"])
-            study = find_or_plan(clinic, trial, seed, now)
-            if options["facts"]:
-                study.facts = json.loads(options["facts"].read_text("utf-8"))
-                study.save(update_fields=["facts"])
+            facts = json.loads(options["facts"].read_text("utf-8")) if options["facts"] else {}
+            study = find_or_plan(clinic, trial, seed, now, facts)
             give_way = Pace(rest_s=GIVE_WAY_S if connection.vendor == "sqlite" else 0.0)
             for done in walk_study(study, trial, seed, now, give_way):
                 self._tell(f"{done} of {trial.participants} participants")

@@ -181,7 +181,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "list": name,
                 "item": number,
                 "what": words,
-                "answer": " ".join(given),
+                "answer": " ".join(one if one.endswith(".") else f"{one}." for one in given),
                 "still asked": "; ".join(lacking),
             }
 

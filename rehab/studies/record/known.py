@@ -5,10 +5,10 @@ from __future__ import annotations
 from statistics import mean, stdev
 from typing import Any
 
-from rehab.studies.analysis.comparison import Interval
+from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
 from rehab.studies.analysis.outcomes import OUTCOMES
-from rehab.studies.models import Study, StudyMark
+from rehab.studies.models import Arm, Study, StudyMark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.document import describe
 from rehab.studies.registration.estimands import METHOD, SUMMARY, estimands
@@ -56,24 +56,28 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
     [primary, *_secondary] = list(estimands(document))
     names = [OUTCOMES.get(slug, (slug, ""))[0] for slug in document["secondary_outcomes"]]
     spending = plan.get("spending")
-    follow_up = visits.get("days_to_follow_up")
+    walked: dict[str, str] = {}  # the arms of each sequence of phases
+    for arm in arms:
+        phases = _phases(arm["phases"])
+        walked[phases] = f"{walked[phases]}, {arm['code']}" if phases in walked else arm["code"]
+    follow_up, crossed = visits.get("days_to_follow_up"), document["design"] == "crossover"
     return {
         "title": document["title"],
         "question": document["question"],
         "design": f"Randomized, {document['design']}, {len(arms)} arms, {ratio}, {framework}.",
         "arms": "; ".join(
-            f"{arm['code']} ({arm['name']}): {arm['feedback_type']} feedback, gain {arm['gain']:g},"
-            f" protocol {arm['protocol']}, robot at {arm['robot_intensity']:g}"
+            f"{arm['code']} ({arm['name']}): {arm['feedback_type']} feedback of {arm['measure']}, "
+            f"shown at {arm['gain']:.0%}, robot's gestures at {arm['robot_intensity']:.0%}"
             for arm in arms
         ),
-        "phases": "; ".join(
-            f"{arm['code']}: {', '.join(phase['name'] for phase in arm['phases'])}" for arm in arms
-        ),
+        "phases": f"Goal: {document['goal_percent_of_baseline']:g} % of the baseline. "
+        + "; ".join(f"{codes}: {phases}" for phases, codes in walked.items()),
         "eligibility": primary["population"],
         "outcomes": f"Primary: {primary['variable']} Secondary: {', '.join(names) or 'none'}.",
-        "timeline": f"{visits['in_each_period']} visits in each period, "
-        f"{visits['days_between']} days apart; {visits['days_between_periods']} days between "
-        f"periods; follow-up after {follow_up or 'no'} days.",
+        "timeline": f"Visits{' in each period' * crossed}: {visits['in_each_period']}, days "
+        f"between them: {visits['days_between']}"
+        + f", between periods: {visits['days_between_periods']}" * crossed
+        + (f", to the follow-up: {follow_up}." if follow_up else "; no follow-up."),
         "participants": f"{document['participants']} participants are planned.",
         "allocation": f"{METHODS[allocation['method']]}; factors: {factors}.",
         "sequence": "GARRY draws it from a seed of 128 random bits; the rule is in the protocol.",
@@ -93,6 +97,19 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "consents": "Each consent to research names its text's version; a new version of the study "
         "may require each participant's consent before the next visit.",
     }
+
+
+def _phases(phases: list[dict[str, Any]]) -> str:
+    return ", ".join(
+        f"{one['name']}{' without feedback' * (not one['feedback'])} ({_length(one)})"
+        for one in phases
+    )
+
+
+def _length(phase: dict[str, Any]) -> str:
+    strides, seconds = phase["strides"], phase["seconds"]
+    known = (strides and f"{strides} strides", seconds and f"{seconds:g} s")
+    return " or ".join(filter(None, known)) or "until the therapist ends it"
 
 
 def _conducted(study: Study) -> dict[str, str]:
@@ -136,7 +153,7 @@ def _found(study: Study, results: Results) -> dict[str, str]:
             f"{one.visits_unfinished} ended early"
             for one in flow
         ),
-        "baseline": "; ".join(filter(None, (_baseline(results, arm) for arm in results.arms))),
+        "baseline": "; ".join(filter(None, (_baseline(results, arm) for arm in study.arms.all()))),
         "estimates": " ".join(_estimates(results, slug) for slug in results.registered),
         "harms_found": "; ".join(
             f"{row.what}: "
@@ -149,14 +166,14 @@ def _found(study: Study, results: Results) -> dict[str, str]:
     }
 
 
-def _baseline(results: Results, arm: str) -> str:
+def _baseline(results: Results, arm: Arm) -> str:
     """Return how many have a first baseline in an arm, with its mean and standard deviation."""
-    people = [one for one in results.participants if one.is_analyzed and arm in one.arms]
+    people = (one for one in results.participants if one.is_analyzed and arm.code in one.arms)
     found = [one.baseline for one in people if one.baseline is not None]
     if len(found) < MIN_PARTICIPANTS:
         return ""
-    measure = next(one.measure for one in people if one.measure)
-    return f"{arm}: {len(found)} with {measure} {mean(found):.3g} (SD {stdev(found):.2g})"
+    of_arm = f"{mean(found):.3g} (SD {stdev(found):.2g})"
+    return f"{arm.code}: {len(found)} people, {arm.measure.name} {of_arm} {arm.measure.unit}"
 
 
 def _estimates(results: Results, slug: str) -> str:
@@ -164,12 +181,16 @@ def _estimates(results: Results, slug: str) -> str:
     found, (label, unit) = results.find(slug), OUTCOMES[slug]
     means = (f"{one.arm} {one.participants} people, {_text(one.mean)}" for one in found.arms)
     apart = (
-        f"{one.group} - {one.reference} {_text(one.difference)}"
-        + ("" if one.p is None else f", p {one.p:.2g}")
+        f"{one.group} - {one.reference} {_text(one.difference)}" + _p(results, slug, one)
         for one in found.differences
     )
     status = results.registered[slug].status
     return f"{label}{unit and f' [{unit}]'} ({status}): {'; '.join((*means, *apart))}."
+
+
+def _p(results: Results, slug: str, one: Difference) -> str:
+    adjusted = results.adjusted_p.get((slug, one.group, one.reference))
+    return "" if one.p is None or adjusted is None else f", p {one.p:.2g} (Holm {adjusted:.2g})"
 
 
 def _text(found: Interval | None) -> str:

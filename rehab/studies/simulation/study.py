@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from functools import partial
 
@@ -30,7 +30,9 @@ PLACE = Place(source="simulated", simulated=True)
 PROTOCOL = "Simulated study"
 
 
-def find_or_plan(clinic: Clinic, trial: Trial, seed: int, now: datetime) -> Study:
+def find_or_plan(
+    clinic: Clinic, trial: Trial, seed: int, now: datetime, facts: Mapping[str, str] | None = None
+) -> Study:
     """Return the simulated study of a seed, planned, registered and started where it is new.
 
     Parameters
@@ -43,6 +45,8 @@ def find_or_plan(clinic: Clinic, trial: Trial, seed: int, now: datetime) -> Stud
         0 to ``SEED_MAX``; part of the study's code, which is unique in a clinic.
     now
         The time of its registration and start.
+    facts
+        What it is registered with of `record.facts`.
 
     Raises
     ------
@@ -54,7 +58,7 @@ def find_or_plan(clinic: Clinic, trial: Trial, seed: int, now: datetime) -> Stud
     code = f"SIM{seed}"
     known = Study.everywhere.filter(clinic=clinic, code=code).first()
     if known is None:
-        return _plan(clinic, code, trial, seed, now)
+        return _plan(clinic, code, trial, seed, now, facts or {})
     if (known.participants, known.visits) != (trial.participants, trial.visits):
         raise InvalidSetting(
             "Seed {seed} has {participants} participants and {visits} visits in this clinic. Give "
@@ -66,7 +70,9 @@ def find_or_plan(clinic: Clinic, trial: Trial, seed: int, now: datetime) -> Stud
     return known
 
 
-def _plan(clinic: Clinic, code: str, trial: Trial, seed: int, now: datetime) -> Study:
+def _plan(
+    clinic: Clinic, code: str, trial: Trial, seed: int, now: datetime, facts: Mapping[str, str]
+) -> Study:
     install_defaults()
     protocol = _find_protocol(clinic)
     study = Study.everywhere.create(
@@ -79,6 +85,7 @@ def _plan(clinic: Clinic, code: str, trial: Trial, seed: int, now: datetime) -> 
         visits=trial.visits,
         primary_outcome=OUTCOME,
         secondary_outcomes=list(SECONDARY),
+        facts=dict(facts),
         sealed=seal(trial.secret(seed)),
     )
     measure = MeasureDefinition.everywhere.get(clinic=None, slug=A2.slug)
