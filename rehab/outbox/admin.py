@@ -8,7 +8,6 @@ from django import forms
 from django.contrib import admin, messages
 from django.db.models import QuerySet
 from django.http import HttpRequest, HttpResponse
-from django.template.response import TemplateResponse
 from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
@@ -16,6 +15,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.outbox.models import Endpoint, OutboxMessage
 from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
 from rehab.people.web.row_forms import ClinicForm
+from rehab.people.web.token_admin import show_once
 
 
 class EndpointForm(ClinicForm):
@@ -63,7 +63,7 @@ class EndpointAdmin(ScopedAdmin):
     def response_add(self, request: HttpRequest, obj: Any, *args: Any, **kwargs: Any) -> Any:
         """Show the secret of a new receiver."""
         if secret := getattr(obj, "shown_secret", ""):
-            return self._show_secrets(request, [(obj, secret)])
+            return show_once(self, request, [(obj, secret)], gettext("New secrets"), is_kept=True)
         return super().response_add(request, obj, *args, **kwargs)
 
     @admin.action(description=_("Give new secrets (old ones stop at once)"), permissions=["change"])
@@ -73,17 +73,7 @@ class EndpointAdmin(ScopedAdmin):
         issued = [(row, row.new_secret()) for row in rows.filter(kind=Endpoint.Kind.WEBHOOK)]
         for row, _secret in issued:
             row.save(update_fields=["secret"])
-        return self._show_secrets(request, issued)
-
-    def _show_secrets(self, request: HttpRequest, issued: list[tuple[Any, str]]) -> HttpResponse:
-        context = {
-            **self.admin_site.each_context(request),
-            "title": gettext("New secrets"),
-            "opts": self.opts,
-            "issued": issued,
-            "is_kept": True,
-        }
-        return TemplateResponse(request, "admin/new_tokens.html", context)
+        return show_once(self, request, issued, gettext("New secrets"), is_kept=True)
 
 
 @admin.register(OutboxMessage)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from django.contrib import admin, messages
@@ -14,6 +15,25 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.sign_in.tokens import TokenModel, renew_token
 from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
+
+
+def show_once(
+    options: ScopedAdmin,
+    request: HttpRequest,
+    issued: Sequence[tuple[Any, str]],
+    title: str,
+    *,
+    is_kept: bool = False,
+) -> HttpResponse:
+    """Show secrets of rows, this one time; ``is_kept``: the server has more than their hashes."""
+    context = {
+        **options.admin_site.each_context(request),
+        "title": title,
+        "opts": options.opts,
+        "issued": issued,
+        "is_kept": is_kept,
+    }
+    return TemplateResponse(request, "admin/new_tokens.html", context)
 
 
 class TokenAdmin(ScopedAdmin):
@@ -71,10 +91,4 @@ class TokenAdmin(ScopedAdmin):
         self, request: HttpRequest, issued: list[tuple[TokenModel, str]]
     ) -> HttpResponse:
         """Show new tokens in the answer itself: a message would keep them in a cookie."""
-        context = {
-            **self.admin_site.each_context(request),
-            "title": gettext("New tokens"),
-            "opts": self.opts,
-            "issued": issued,
-        }
-        return TemplateResponse(request, "admin/new_tokens.html", context)
+        return show_once(self, request, issued, gettext("New tokens"))
