@@ -90,7 +90,7 @@ LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
 # the last digits of sums, which are added up in another order.
 VARYING = re.compile(
     r'csrfmiddlewaretoken" value="\w+"|nonce="[^"]+"|"data-csrf": "\w+"|\d{1,2}:\d\d(:\d\d)?|'
-    r'"?\d{4}-\d\d-\d\d[T ][^"<]*|[\d.]+ GB|(?<=\.\d{9})\d+'
+    r'"?\d{4}-\d\d-\d\d[T ][^"<,\n]*|[\d.]+ GB|(?<=\.\d{9})\d+'
 )
 
 
