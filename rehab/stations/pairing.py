@@ -95,7 +95,7 @@ def find_by_code(code: str, by: User, now: datetime) -> Pairing:
         raise PairingRefused(
             _("No tablet shows this code now. Codes last five minutes; look at the tablet again.")
         )
-    check_approval(by, pairing.address, f"tablet, {pairing.browser}", now)
+    check_approval(by, pairing.address, f"tablet {pairing.browser}".rstrip(), now)
     return pairing
 
 
