@@ -192,7 +192,6 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, visit):
     expect(page.locator(".gesture-floor .errornote")).to_contain_text("ends turned by 45°")
     page.get_by_role("button", name="Lead it home").click()
     expect(page.locator(".gesture-floor .words")).to_contain_text("up to 0.14 m from home")
-    page.screenshot(path="/tmp/robot36/editor.png", full_page=True)
     page.click("[name=_save]")
     expect(page.locator("#result_list")).to_contain_text("big-hello")
 
