@@ -72,7 +72,7 @@ export class WalkerView {
     for (const [name, value] of Object.entries({ stroke: "#9aa6af", "stroke-width": 0.011 }))
       this.#mast.setAttribute(name, value);
     this.#screen = add(
-      shape("rect", { class: "screen", x: -0.09, y: -0.065, width: 0.18, height: 0.13, rx: 0.012, fill: "#f8fbfd" }) +
+      shape("path", { d: "M-.09 -.065h.18v.13h-.18z", fill: "#f8fbfd", stroke: "#22313a", "stroke-width": 0.006 }) +
         shape("g", { transform: `scale(${FACE_SCALE}) translate(0 .045)`, color: "#22313a" }, FACE),
     );
     this.draw({ poses: [] });
