@@ -12,9 +12,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from rehab.gait import GaitInputError
+from rehab.gait.settings import check_rate
 from rehab.gait.signals.filters import find_last
 from rehab.gait.stances import analysis, plausibility
 from rehab.gait.stances.analysis import StanceAnalyzer
+from rehab.gait.stances.lag_watch import MOMENT_LAG_S, LagWatch
 from tests.gait.corpus import READERS, find_clean, open_corpus
 
 pytest.importorskip("ezc3d")
@@ -99,3 +102,17 @@ def test_limits_lie_beyond_what_five_people_reach(name):
 def test_no_ankle_turns_back_before_its_foot_leaves():
     turning = [one["turning"] for strides in measure_people().values() for one in strides]
     assert min(turning) > 0.1 > -plausibility.BACKWARD_SHARE
+
+
+@pytest.mark.parametrize(("stance_s", "is_beyond"), [(0.7, True), (0.9, True), (2.2, False)])
+def test_lags_are_judged_by_the_pace_of_a_stance(stance_s, is_beyond):
+    """Of 40 ms: who takes twice the time for a stance takes it for what happens in it."""
+    watch = LagWatch(MOMENT_LAG_S)
+    watch.add(0.04, stance_s)
+    assert (watch.beyond_s > 0) is is_beyond
+
+
+def test_fifty_samples_a_second_by_stamps_are_enough():
+    check_rate(49.9)
+    with pytest.raises(GaitInputError):
+        check_rate(45.0)

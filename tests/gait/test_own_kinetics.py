@@ -158,6 +158,51 @@ def test_a_c3d_whose_second_axis_is_upward_gets_its_plates(tmp_path):
         assert found[name] == pytest.approx(expected[name], abs=1e-3, nan_ok=True)
 
 
+def write_type(file, kind):
+    """Turn plates of type 2 into such that tell where a force presses, or of eight forces."""
+    plates, analogs = file["parameters"]["FORCE_PLATFORM"], file["data"]["analogs"]
+    places = np.array(plates["CHANNEL"]["value"]) - 1
+    origins = np.array(plates["ORIGIN"]["value"])
+    beside, before, below = 200.0, 120.0, 40.0  # mm
+    for plate, (rows, (ox, oy, oz)) in enumerate(zip(places.T, origins.T, strict=True)):
+        fx, fy, fz, mx, my, mz = analogs[0, rows]
+        mx, my = mx + oy * fz - oz * fy, my + oz * fx - ox * fz  # at the surface
+        if kind == 1:
+            safe = np.where(np.abs(fz) > 5, fz, np.inf)
+            analogs[0, rows] = fx, fy, fz, -my / safe, mx / safe, mz
+            continue
+        across, along = (mx + below * fy) / before, (my - below * fx) / beside
+        signs = ((1, -1), (1, 1), (-1, 1), (-1, -1))
+        corners = [(fz + a * across + b * along) / 4 for a, b in signs]
+        added = np.array([[fx / 2, fx / 2, fy / 2, fy / 2, *corners]])
+        file["data"]["analogs"] = np.concatenate([file["data"]["analogs"], added], axis=1)
+        for name, value in (("LABELS", "k"), ("UNITS", "N"), ("DESCRIPTIONS", "")):
+            values = file["parameters"]["ANALOG"][name]["value"]
+            values += [f"{value}{plate}{n}" if name == "LABELS" else value for n in range(8)]
+        for name, value in (("SCALE", 1.0), ("OFFSET", 0), ("GAIN", 1)):
+            values = file["parameters"]["ANALOG"][name]
+            values["value"] = np.append(values["value"], [value] * 8)
+    count = analogs.shape[1]
+    if kind == 3:
+        plates["CHANNEL"]["value"] = np.arange(8 * places.shape[1]).reshape(-1, 8).T + count + 1
+    depth = (0.0, 0.0, 0.0) if kind == 1 else (beside, before, -below)
+    plates["ORIGIN"]["value"] = np.repeat(np.array([depth]).T, places.shape[1], axis=1)
+    plates["TYPE"]["value"] = np.full(places.shape[1], kind)
+
+
+@pytest.mark.parametrize("kind", [1, 3])
+def test_plates_of_other_types_come_to_the_same(kind, tmp_path):
+    path = read_lab_file(FILES["BTK motion3"])
+    file, other = ezc3d.c3d(str(path)), tmp_path / "other.c3d"
+    write_type(file, kind)
+    del file["data"]["meta_points"]
+    file.write(str(other))
+    expected, found = read_any_table(path), read_any_table(other)
+    for name in ("plates.left", "plates.right", "own.left_moment_nm", "own.right_moment_nm"):
+        bearing = expected[f"plates.{'left' if 'left' in name else 'right'}"] > 100
+        assert found[name][bearing] == pytest.approx(expected[name][bearing], abs=0.05, nan_ok=True)
+
+
 def sagittal_rows(count=400, rate_hz=100.0):
     """Return a leg of known statics: the foot tips about its toe under a leaning force."""
     t_s = np.arange(count) / rate_hz

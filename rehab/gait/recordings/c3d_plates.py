@@ -14,7 +14,7 @@ import numpy as np
 from rehab.gait.recordings.ankle import add_computed
 from rehab.gait.recordings.c3d_parameters import read_labels, read_values
 from rehab.gait.recordings.columns import CHANNELS, MEDIAL, SIDES, SIGNAL_LAYOUTS
-from rehab.gait.recordings.markers import CENTERS, MALLEOLI, PLACES, find_markers
+from rehab.gait.recordings.markers import ANKLES, CENTERS, PLACES, find_markers
 from rehab.gait.recordings.plates import assign_plates
 from rehab.gait.recordings.table import Table
 from rehab.gait.signals.filters import Floats
@@ -108,7 +108,7 @@ def _read_markers(
 
     markers, centers = {}, {}
     for side in SIDES:
-        has_malleolus = read(side, MALLEOLI) is not None
+        has_malleolus = read(side, ANKLES) is not None
         for place, (outer, inner) in PLACES.items():
             marker, beside = read(side, outer), read(side, inner)
             center = read(side, CENTERS.get(place, ()))

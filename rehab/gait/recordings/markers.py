@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
+from itertools import chain
 
 SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 OUTER = re.compile(r"lateral|lat|outer|out|ext")
@@ -35,7 +36,11 @@ PLACES = {
     "toe": (TOES, FIFTHS),
     "hip": (TROCHANTERS, ()),
 }
-MALLEOLI = ANKLES
+KNOWN = {
+    name
+    for names in (*CENTERS.values(), *map(chain.from_iterable, PLACES.values()))
+    for name in names
+}
 
 
 def find_markers(labels: Collection[str]) -> dict[tuple[str, str], str]:
@@ -48,33 +53,29 @@ def find_markers(labels: Collection[str]) -> dict[tuple[str, str], str]:
     """
     found: dict[tuple[str, str], str] = {}
     for label in labels:
-        for side, place in _read_label(label.rpartition(":")[2]):
-            found.setdefault((side, place), label)
+        side, rest = _split_side(label.rpartition(":")[2])
+        if side:
+            found.setdefault((side, _name_place(rest)), label)
     return found
 
 
-def _read_label(label: str) -> list[tuple[str, str]]:
-    """Return the sides and places that a label may stand for; of most there is none."""
+def _split_side(label: str) -> tuple[str, str]:
+    """Return the side that a label names, or empty, and its other words as one."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", label)
     words = [word for word in re.split(r"[\W_]+", spaced.lower()) if word]
     sides = [SIDES[word] for word in words if word in SIDES]
     if len(sides) == 1:
-        rest = "".join(word for word in words if word not in SIDES)
-        return [(sides[0], _name_place(rest))]
+        return sides[0], "".join(word for word in words if word not in SIDES)
     whole = "".join(words)
-    if not sides and whole[:1] in SIDES and len(whole) > 2:
-        return [(SIDES[whole[0]], _name_place(whole[1:]))]
-    return []
+    return ("", "") if sides or len(whole) < 3 else (SIDES.get(whole[0], ""), whole[1:])
 
 
 def _name_place(rest: str) -> str:
     """Return a place in the words of the table: ``anklemed`` is ``mm``."""
-    known = {name for both in PLACES.values() for names in both for name in names}
-    if rest in known or rest in {name for names in CENTERS.values() for name in names}:
-        return rest
-    for joint, (outer, inner) in (("ankle", PLACES["ankle"]), ("knee", PLACES["knee"])):
-        if INNER.sub("", rest, count=1) in outer and INNER.search(rest):
+    for joint in () if rest in KNOWN else ("ankle", "knee"):
+        outer, inner = PLACES[joint]
+        if INNER.search(rest) and INNER.sub("", rest, count=1) in outer:
             return inner[0]
-        if OUTER.sub("", rest, count=1) in outer and OUTER.search(rest):
+        if OUTER.search(rest) and OUTER.sub("", rest, count=1) in outer:
             return joint
     return "mm" if rest == "med" else rest  # CGM2's medial malleolus
