@@ -153,7 +153,7 @@ def test_straight_walks_turns_and_standing(lost):
           f"{missed} of {known} missed; turns {dict(turns)}; "
           f"{false} false in {outside_s / 60:.1f} min outside")  # fmt: skip
     assert false <= 0.3 * outside_s / 60
-    assert turns["wrong"] <= bool(lost)
+    assert turns["wrong"] == 0
     if lost:
         wrong = sum(one > 0.06 for one in stances)
         print(f"{fewer} strides fewer by {gaps} gaps of 0.1 s; {wrong} of {len(stances)} stances "
