@@ -108,9 +108,12 @@ def test_a_certificate_that_ends_soon_is_told_before(settings, tmp_path, monkeyp
     own.make(["garry.example.org"], timezone.now())
     shown = own.server.read_text().partition("-----BEGIN EC")[0].partition("-----BEGIN PRIV")[0]
     asked = []
-    monkeypatch.setattr(
-        ssl, "get_server_certificate", lambda where, timeout: asked.append(where) or shown
-    )
+
+    def show(where: tuple[str, int], timeout: float) -> str:
+        asked.append(where)
+        return shown
+
+    monkeypatch.setattr(ssl, "get_server_certificate", show)
     settings.ALLOWED_HOSTS = [".garry.example.org"]
     assert "valid until" in do("certificate")
     monkeypatch.setattr(upkeep, "RENEWED", timedelta(days=10_000))
