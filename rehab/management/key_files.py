@@ -10,7 +10,7 @@ from typing import BinaryIO
 from django.core.management import CommandError
 from pyrage.x25519 import Identity
 
-from rehab.exports.encryption import read_identities
+from rehab.exports.encryption import InvalidKey, read_identities
 
 
 def read_key_file(path: Path | None) -> list[Identity]:
@@ -22,7 +22,8 @@ def read_key_file(path: Path | None) -> list[Identity]:
     except OSError as problem:
         raise CommandError(f"{path} cannot be read: {problem.strerror}.") from problem
     except ValueError as problem:  # InvalidKey, or no text at all
-        raise CommandError(f"{path} holds no key. {problem}") from problem
+        cure = problem if isinstance(problem, InvalidKey) else "It is no text file."
+        raise CommandError(f"{path} holds no key. {cure}") from problem
 
 
 @contextmanager

@@ -86,14 +86,14 @@ def test_the_weekly_restore_is_red_where_a_backup_is_damaged(folder, world):
     assert not list(folder.parent.glob("restore-*"))  # the scratch database is gone
     (file,) = folder.glob("*.backup")
     whole = file.read_bytes()
-    for damaged in (whole[:-1], whole[:3000] + bytes([whole[3000] ^ 1]) + whole[3001:]):
-        file.write_bytes(damaged)
-        assert "damaged or was cut off" in do("weekly")
+    file.write_bytes(whole[:3000] + bytes([whole[3000] ^ 1]) + whole[3001:])
+    assert "damaged or was cut off" in do("weekly")
     assert not Chore.objects.get(name="restore").is_well
     assert not list(folder.parent.glob("restore-*"))
 
 
 @pytest.mark.server
+@pytest.mark.long
 @pytest.mark.django_db(transaction=True)
 def test_a_backup_whose_keys_nothing_opens_is_red(folder, world, monkeypatch):
     do("keys")

@@ -23,11 +23,13 @@ from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.audit.moves import ClinicMove
 from rehab.people.audit.seals import LogSeal
+from rehab.people.chores import Chore
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import BoardsConsent, Clinic, Patient, SignOnGroup, User
 from rehab.people.roles import Role
+from rehab.people.server_keys import ServerKey
 from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
@@ -84,6 +86,8 @@ MOVED: dict[str, Any] = {
     "shifts": {},
     "digests": {},
 }
+
+OF_THE_SERVER = {Chore, ServerKey}  # no clinic's rows; no page shows them
 
 
 @dataclass
@@ -157,8 +161,8 @@ class World:
 
 
 def scoped_models() -> list[type[Any]]:
-    """Return every model of the app, found by itself."""
-    return list(apps.get_app_config("rehab").get_models())
+    """Return every model of the app but the server's own, found by itself."""
+    return [one for one in apps.get_app_config("rehab").get_models() if one not in OF_THE_SERVER]
 
 
 def agreeing(patient: Patient) -> Patient:
