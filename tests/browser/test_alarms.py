@@ -235,7 +235,9 @@ def test_the_cause_comes_first_and_has_its_button(
         expect(first).to_contain_text("it bumped into something")
         expect(monitor.locator("[data-alarm]")).to_have_count(1)
         first.get_by_role("button", name="I have seen it").click()
-        expect(first).to_contain_text("The robot is standing still: it bumped into something. Clear its way.")
+        expect(first).to_contain_text(
+            "The robot is standing still: it bumped into something. Clear its way."
+        )
         first.get_by_role("button", name="Let it move").click()
         expect(monitor.locator("[data-alarm=robot]")).to_have_count(0)
         hear(robot, "arm")
