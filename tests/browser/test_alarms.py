@@ -175,7 +175,7 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
             expect(readiness).to_have_text("✓ Tablet shows Rosa✓ Sensor✓ Robot")
             expect(monitor.locator(".mirror h2")).to_have_text("Rosa sees now")
             monitor.click("[data-robot=stop]")
-            expect(readiness).to_contain_text("! Robot stopped: let it move first")
+            expect(readiness).to_contain_text("! Robot stopped: first let it move")
             expect(monitor.locator("[data-presence=robot]")).to_contain_text("! stopped")
             begin(monitor, feet)
             expect(readiness).to_be_hidden()
