@@ -31,7 +31,7 @@ TAPS = """() => document.querySelector("[data-fall]").addEventListener("pointerd
   ({ timeStamp }) => window.tapped_at = performance.timeOrigin + timeStamp, true)"""
 
 SILENT_4_S = """() => document.querySelector("[data-alarm=source]")
-  ?.textContent.includes("The sensor is silent for 4 s.")"""
+  ?.textContent.includes("The sensor has been silent for 4 s.")"""
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_undo_withdraws_the_note_alone(server: Server, monitor: Page, walk: Walk
         undo = monitor.locator("[data-withdraw]")
         expect(undo).to_have_text("It was not a fall (10 s)")
         monitor.clock.fast_forward(3_000)
-        expect(undo).to_have_text(re.compile(r"no fall \([4-7] s\)"))
+        expect(undo).to_have_text(re.compile(r"not a fall \([4-7] s\)"))
         undo.click()
         expect(monitor.locator("#strip")).to_contain_text("it was not a fall")
         assert [kind for kind, _ in noted(server, walk)][2:] == ["fall", "fall_withdrawn"]
@@ -146,7 +146,7 @@ def test_a_silent_sensor_is_seen_heard_and_felt(
         monitor.wait_for_function(SILENT_4_S)  # which looks at each frame; `expect` once a second
         print("silence to banner, s:", took_s := time.monotonic() - silent_at)
         assert took_s <= 4.5
-        expect(alarm).to_contain_text("Look at the sensor, or pause.")
+        expect(alarm).to_contain_text("Check the sensor, or pause.")
         patient.wait_for_selector("body[data-look=still]")
         expect(patient.locator(".sub")).to_contain_text("Keep walking")
         assert (len(monitor.evaluate("heard")), len(monitor.evaluate("felt"))) == (4, 1)
@@ -175,18 +175,18 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
             expect(readiness).to_have_text("✓ Tablet shows Rosa✓ Sensor✓ Robot")
             expect(monitor.locator(".mirror h2")).to_have_text("Rosa sees now")
             monitor.click("[data-robot=stop]")
-            expect(readiness).to_contain_text("! Robot stopped: let it move first")
+            expect(readiness).to_contain_text("! Robot stopped: first let it move")
             expect(monitor.locator("[data-presence=robot]")).to_contain_text("! stopped")
             begin(monitor, feet)
             expect(readiness).to_be_hidden()
             robot = monitor.locator("[data-alarm=robot]")
-            expect(robot).to_contain_text("The robot stands: it was stopped.")
+            expect(robot).to_contain_text("The robot is standing still: it was stopped.")
             monitor.get_by_role("button", name="Let it move").first.click()
             expect(robot).to_have_count(0)
             expect(monitor.locator("[data-presence=robot]")).to_contain_text("✓")
-        expect(monitor.locator("[data-alarm=tablet]")).to_contain_text("The tablet is lost")
+        expect(monitor.locator("[data-alarm=tablet]")).to_contain_text("The tablet has dropped out")
         expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no tablet")
-    expect(monitor.locator("[data-alarm=robot]")).to_contain_text("The robot is lost")
+    expect(monitor.locator("[data-alarm=robot]")).to_contain_text("The robot has dropped out")
 
 
 @pytest.mark.essential
@@ -235,7 +235,9 @@ def test_the_cause_comes_first_and_has_its_button(
         expect(first).to_contain_text("it bumped into something")
         expect(monitor.locator("[data-alarm]")).to_have_count(1)
         first.get_by_role("button", name="I have seen it").click()
-        expect(first).to_contain_text("The robot stands: it bumped into something. Clear its way.")
+        expect(first).to_contain_text(
+            "The robot is standing still: it bumped into something. Clear its way."
+        )
         first.get_by_role("button", name="Let it move").click()
         expect(monitor.locator("[data-alarm=robot]")).to_have_count(0)
         hear(robot, "arm")

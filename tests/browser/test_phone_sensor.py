@@ -79,7 +79,7 @@ def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
     with browser.new_context(base_url=server.url) as pocket:
         page = pocket.new_page()
         page.goto("/sensor/")
-        expect(page.locator("[data-show=refusal]")).to_contain_text("Scan the square")
+        expect(page.locator("[data-show=refusal]")).to_contain_text("Scan the QR code")
         page = pocket.new_page()
         page.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false })")
         page.goto("/sensor/#token=x&place=shank&side=left")

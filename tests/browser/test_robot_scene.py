@@ -123,7 +123,7 @@ def test_a_robot_away_from_home_says_so_and_is_let_go_on_by_a_person(server, bro
         report(robot, state="away", reason="away_from_home", gesture=None, pose=pose(0.08))
         expect(page.locator("[data-show=robot-state]")).to_have_text("away from its place")
         expect(page.locator("[data-show=robot-why]")).to_have_text(
-            "It stands: away from its place."
+            "It is standing still: away from its place."
         )
         expect(page.locator("[data-show=robot-cure]")).to_have_text(
             "Carry it back to its mark, facing as before. Put it on its mark, nobody near it, then:"

@@ -87,7 +87,7 @@ def test_an_app_and_its_recovery_codes(page: Page, server: Server) -> None:
     expect(page.locator("#id_code")).to_be_focused()
     page.keyboard.type(used)
     page.tap("[type=submit]")
-    expect(page.locator(".errorlist")).to_contain_text("or was used")
+    expect(page.locator(".errorlist")).to_contain_text("or has been used")
     page.fill("#id_code", fresh_code(secret, used))
     page.tap("[type=submit]")
     expect(page).to_have_url(f"http://localhost:{server.port}/patients/new/")

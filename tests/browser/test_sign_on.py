@@ -149,5 +149,5 @@ def test_a_stranger_of_a_group_gets_an_account_and_another_none(
     sign_out(page)
     page.click("text=City Hospital")
     sign_on(page, "eve")
-    expect(page.locator(".notes")).to_contain_text("No account here belongs to your hospital")
+    expect(page.locator(".notes")).to_contain_text("No account here is linked to your hospital")
     assert "eve" not in roles(hospital.server)

@@ -253,5 +253,5 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         expect(why).to_have_text("")
         stop.click()
         hear(robot, "stop")
-        expect(why).to_have_text("It stands: it was stopped.")
+        expect(why).to_have_text("It is standing still: it was stopped.")
         expect(monitor.locator(".safety .stop")).to_have_text("Robot stopped")

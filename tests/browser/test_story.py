@@ -70,7 +70,7 @@ def begin(story: Story) -> None:
     page.tap(".try summary")
     page.tap("label:has-text('Simulated patient, good')")
     page.tap(f"label:has-text('Place {story.number}')")
-    page.tap("text=To the patient’s page")
+    page.tap("[name=then][value=walk]")
     page.tap("[data-change=start]")
     story.session = int(page.url.rstrip("/").split("/")[-1])
 
@@ -174,5 +174,5 @@ def like_last_time_is_three_taps(page: Page, server: Server) -> None:
     page.tap("text=Try a demo")
     page.tap("text=Change something")
     page.tap("label:has-text('Place 0')")
-    page.tap("text=To the patient’s page")
+    page.tap("[name=then][value=walk]")
     expect(page.locator(".wrong")).to_contain_text("still has an open session of Rosa 0")

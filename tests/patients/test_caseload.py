@@ -61,7 +61,7 @@ def test_the_page_lists_patients_of_this_clinic_alone(world):
     assert case.missed == now.date() - timedelta(2)
     page = client_of(world).get("/caseload/?only=due").content.decode()
     assert world.patient.nickname in page
-    assert "did not come" in page
+    assert "missed" in page
     assert other.patient.nickname not in page
     walk(world.patient, "positive", [HIT, HIT])
     TrainingSession.everywhere.filter(patient=world.patient).update(simulated=False, active_s=60)

@@ -281,7 +281,7 @@ def test_a_password_that_cannot_be_checked_now_is_no_wrong_one(client, settings,
         answer = client.post("/sign-in/", form)
         assert answer.status_code == 429
         assert answer.headers["Retry-After"] == "5"
-        assert "Too many people sign in" in answer.content.decode()
+        assert "Too many people are signing in" in answer.content.decode()
     full._places.release()
     assert client.post("/sign-in/", form).status_code == 302
 

@@ -179,7 +179,7 @@ def set_up_app(client: Client):
 def test_an_app_is_kept_once_it_shows_the_right_code(client, pt):
     assert enter(client) == "/start/"
     wrong = client.post(reverse("add-app"), {"code": "000000"})
-    assert "This code does not fit" in wrong.content.decode()
+    assert "This code is not right" in wrong.content.decode()
     assert not factors.authenticators_of(pt).exists()
     kept, secret = set_up_app(client)
     shown = re.findall("<code>([^<]+)</code>", kept.content.decode())

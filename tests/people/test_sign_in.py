@@ -67,8 +67,8 @@ def test_signing_out_takes_a_post(client, pt):
 def test_a_wrong_password_is_told_without_telling_who_exists(client, pt):
     known = enter(client, "wrong").content.decode()
     unknown = enter(client, "wrong", username="nobody").content.decode()
-    assert "Name and password do not fit" in known
-    assert "Name and password do not fit" in unknown
+    assert "Name and password do not match" in known
+    assert "Name and password do not match" in unknown
 
 
 def test_the_page_can_be_read_by_a_screen_reader(client):

@@ -50,7 +50,7 @@ def group(user: User, name: str, role: Role) -> None:
 def test_an_account_is_found_by_its_subject_and_by_nothing_else(linked):
     assert sign_on.find_account({"sub": "4711"}) == linked
     for claims in ({"sub": "4712", "preferred_username": linked.username}, {"sub": ""}):
-        with pytest.raises(SignOnRefused, match="No account here belongs"):
+        with pytest.raises(SignOnRefused, match="No account here is linked"):
             sign_on.find_account(claims)
 
 

@@ -153,7 +153,7 @@ def test_a_code_counts_like_the_password_and_once(kind, lead):
     assert 'name="code"' in client.get(url).content.decode()
     assert client.post(url, {"code": code}).headers["Location"] == reverse("add-app")
     assert not asks(client.get(reverse("add-app")))
-    assert "or was used" in client.post(url, {"code": code}).content.decode()
+    assert "or has been used" in client.post(url, {"code": code}).content.decode()
 
 
 def test_wrong_codes_lock_as_they_do_at_the_sign_in(lead):

@@ -237,7 +237,7 @@ def test_a_form_that_does_not_say_what_it_showed_alters_nothing(world, rosa):
     session = walk(rosa, "positive", strides(3, 1))
     sent = {"patient": rosa.pk, "counts": "no", "note": "", "reason": "The cable was loose."}
     page = client_of(world).post(reverse("correct", args=[session.pk]), sent)
-    assert "meanwhile" in page.content.decode()
+    assert "in the meantime" in page.content.decode()
     session.refresh_from_db()
     assert not session.excluded
 

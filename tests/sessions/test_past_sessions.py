@@ -45,8 +45,8 @@ def items(page: str) -> list[str]:
 def day_and_time(days_ago: int) -> str:
     """Return how a list tells when a session began, so many days before the test."""
     then = (NOW - timedelta(days=days_ago)).astimezone(HERE.tzinfo)
-    year = f", {then.year}" if then.year != HERE.year else ""
-    return f"{then:%b} {then.day}{year} {then:%H:%M}"
+    year = f" {then.year}" if then.year != HERE.year else ""
+    return f"{then.day} {then:%b}{year} {then:%H:%M}"
 
 
 def test_the_list_tells_type_date_duration_score_hit_rate_and_goal(client, patient):

@@ -390,7 +390,7 @@ def test_the_demo_is_one_simulated_patient(pt, world):
 def test_patients_are_found_by_name_or_code(pt, patient):
     for words in ("ros", "K7-2"):
         assert "Rosa" in pt.get("/start/", {"q": words}).content.decode()
-    assert "Nobody is called" in pt.get("/start/", {"q": "xyz"}).content.decode()
+    assert "No patient is called" in pt.get("/start/", {"q": "xyz"}).content.decode()
 
 
 def test_the_page_says_what_each_protocol_has_and_how_long_it_takes(pt, patient):

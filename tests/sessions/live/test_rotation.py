@@ -49,7 +49,7 @@ async def test_the_old_token_dies_when_the_new_one_was_used(place, kind):
     assert await AuditEntry.everywhere.filter(act=Act.TOKEN_COPY).acount() == 1
     row = await row_of(row)
     state = await sync_to_async(format_device_state)(row, now)
-    assert state.startswith("somebody used its old token on")
+    assert state.startswith("its old token was used on")
 
 
 def connected_device(row):

@@ -160,7 +160,7 @@ async def test_a_clinic_has_no_more_running_sessions_than_one_process_serves(
     first, second, third = [await ready(place, at_station=False) for _ in range(3)]
     await change(first, "start")
     await change(second, "start")
-    with pytest.raises(NotAllowed, match="2 sessions of this clinic run already"):
+    with pytest.raises(NotAllowed, match="2 sessions of this clinic are already running"):
         await change(third, "start")
     await change(second, "pause")
     await change(third, "start")
