@@ -51,6 +51,7 @@ PLAN = Row(
     words_vary="<words_vary>",
     adaptation=Row(mode="suggest"),
     close_steps=Row(part=0.12),
+    heart_rate_limit=141,
 )
 PATIENT = Row(
     pseudonym="P-1", birth_year=1970, stroke_month=date(2029, 3, 1), severity="mild",
@@ -101,7 +102,8 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
             "goal_follows": "suggest", "close_part": 0.12, "imported": True, "source": "<source>",
             "age_band": "60-69", "months_since_stroke": 17, "severity": "mild",
             "paretic_side": "right", "device": "<device>", "belt_speed": 0.7,
-            "weight_support": 23.0, "mean_belt_speed": 0.8, "mean_weight_support": 25.0,
+            "weight_support": 23.0, "heart_rate_limit": 141,
+            "mean_belt_speed": 0.8, "mean_weight_support": 25.0,
             "walking_aid": 0.9, "orthosis": 0.75, "handrail": 0.65, "helping_hand": 0.55,
             "highest_exertion": 6.0, "highest_pain": 4.0,
         },

@@ -148,4 +148,5 @@ def test_what_is_offered_makes_a_plan_and_is_read_from_it() -> None:
         "device",
         "belt_speed",
         "weight_support",
+        "heart_rate_limit",
     }

@@ -102,6 +102,7 @@ def test_one_tap_fills_the_set_up_and_leaves_person_and_place(pt, world, patient
         "minutes": "20",
         "belt_speed": "",
         "weight_support": "",
+        "heart_rate_limit": "",
         "protocol": str(preset.protocol_id),
         "robot": "gentle",
         "robot_above": "nod",

@@ -181,7 +181,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "list": name,
                 "item": number,
                 "what": words,
-                "answer": " ".join(one if one.endswith(".") else f"{one}." for one in given),
+                "answer": " ".join([*(f"{one.rstrip('.')}." for one in given[:-1]), *given[-1:]]),
                 "still asked": "; ".join(lacking),
             }
 
