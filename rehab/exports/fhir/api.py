@@ -124,7 +124,12 @@ def _answer(resource: Resource) -> HttpResponse:
 def _add_calls(kind: str) -> None:
     """Add the calls of one type of resource."""
 
-    @router.get(f"/fhir/{kind}", response=responses(dict, 404), operation_id=f"search_{kind}")
+    @router.get(
+        f"/fhir/{kind}",
+        response=responses(dict, 404),
+        operation_id=f"search_{kind}",
+        url_name=f"search_{kind}",
+    )
     @for_roles(Role.LEAD, Role.PT)
     def search(request: HttpRequest, wanted: Query[Search]) -> HttpResponse:
         found, has_more = _search(caller(request), kind, wanted)
