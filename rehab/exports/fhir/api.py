@@ -144,7 +144,10 @@ def _add_calls(kind: str) -> None:
         return _answer(bundle | ({"entry": entries} if entries else {}))
 
     @router.get(
-        f"/fhir/{kind}/{{fhir_id}}", response=responses(dict, 404), operation_id=f"read_{kind}"
+        f"/fhir/{kind}/{{fhir_id}}",
+        response=responses(dict, 404),
+        operation_id=f"read_{kind}",
+        url_name=f"read_{kind}",
     )
     @for_roles(Role.LEAD, Role.PT)
     def read(request: HttpRequest, fhir_id: Path[str]) -> HttpResponse:
