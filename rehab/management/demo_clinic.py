@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.models.patients import DEMO_NAMES
+from rehab.people.models.choices import DEMO_NAMES
 from rehab.people.roles import Role
 from rehab.sessions.live.headless import simulate_strides
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate

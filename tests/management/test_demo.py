@@ -10,7 +10,7 @@ from django.core.management import CommandError, call_command
 
 from rehab.management import demo_clinic
 from rehab.people.models import Patient
-from rehab.people.models.patients import DEMO_NAMES
+from rehab.people.models.choices import DEMO_NAMES
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from tests.support.clock import START as NOW

@@ -124,7 +124,12 @@ def _answer(resource: Resource) -> HttpResponse:
 def _add_calls(kind: str) -> None:
     """Add the calls of one type of resource."""
 
-    @router.get(f"/fhir/{kind}", response=responses(dict, 404), operation_id=f"search_{kind}")
+    @router.get(
+        f"/fhir/{kind}",
+        response=responses(dict, 404),
+        operation_id=f"search_{kind}",
+        url_name=f"search_{kind}",
+    )
     @for_roles(Role.LEAD, Role.PT)
     def search(request: HttpRequest, wanted: Query[Search]) -> HttpResponse:
         found, has_more = _search(caller(request), kind, wanted)
@@ -139,7 +144,10 @@ def _add_calls(kind: str) -> None:
         return _answer(bundle | ({"entry": entries} if entries else {}))
 
     @router.get(
-        f"/fhir/{kind}/{{fhir_id}}", response=responses(dict, 404), operation_id=f"read_{kind}"
+        f"/fhir/{kind}/{{fhir_id}}",
+        response=responses(dict, 404),
+        operation_id=f"read_{kind}",
+        url_name=f"read_{kind}",
     )
     @for_roles(Role.LEAD, Role.PT)
     def read(request: HttpRequest, fhir_id: Path[str]) -> HttpResponse:

@@ -61,3 +61,7 @@ class ErasureReason(models.TextChoices):
     ASKED = "asked", _("The patient asks for it")
     MISTAKE = "mistake", _("Was entered by mistake")
     RETENTION = "retention", _("Kept long enough")
+
+
+# Nicknames in a demonstration, which takes no other ones.
+DEMO_NAMES = ("Amber", "Basil", "Clover", "Dill", "Elder", "Fern", "Demo")

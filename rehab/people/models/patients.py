@@ -21,6 +21,7 @@ from rehab.people.field_policy import (
     retained,
 )
 from rehab.people.models.choices import (
+    DEMO_NAMES,
     SIDES,
     BoardsConsent,
     EndReason,
@@ -33,9 +34,6 @@ from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.random_codes import random_code
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
-
-# Nicknames in a demonstration, which takes no other ones.
-DEMO_NAMES = ("Amber", "Basil", "Clover", "Dill", "Elder", "Fern", "Demo")
 
 
 def generate_pseudonym() -> str:

@@ -19,7 +19,8 @@ from rehab.sessions.live.auth import (
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.devices import ConnectedDevice
-from rehab.sessions.live.protocol.messages import PartOf, read_frame
+from rehab.sessions.live.protocol.fields import PartOf
+from rehab.sessions.live.protocol.messages import read_frame
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device

@@ -29,6 +29,17 @@ Code = Annotated[
     str, Meta(pattern=rf"\A(?:{NAME.pattern})?\Z", description=f"{NAME_WORDS}, or empty")
 ]
 
+Version = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9_.!+-]{0,64}\Z", description="a version")]
+
+
+class PartOf(msgspec.Struct, frozen=True):
+    """Of which package a source or base is, where it is none of GARRY's own."""
+
+    kind: Name
+    name: Name
+    package: Name
+    version: Version
+
 
 def read_fields(message: Any, kind: type[Fields]) -> Fields:
     """Return the fields of a message. Raises BadFrame, which says what to send instead."""

@@ -21,6 +21,7 @@ from rehab.sessions.live.protocol.fields import (
     Message,
     Name,
     Number,
+    PartOf,
     Positive,
     Whole,
     read_fields,
@@ -57,18 +58,6 @@ class Incident(Struct, frozen=True):
             description=f"a text of at most {MAX_TEXT_CHARS} characters",
         ),
     ]
-
-
-Version = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9_.!+-]{0,64}\Z", description="a version")]
-
-
-class PartOf(Struct, frozen=True):
-    """Of which package a source or base is, where it is none of GARRY's own."""
-
-    kind: Name
-    name: Name
-    package: Name
-    version: Version
 
 
 class Hello(Struct, frozen=True):
