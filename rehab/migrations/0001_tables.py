@@ -13,6 +13,7 @@ from django.db import migrations, models
 
 import rehab.boards.changes
 import rehab.feedback.translation
+import rehab.outbox.models
 import rehab.people.audit.history
 import rehab.people.models.accounts
 import rehab.people.models.clinics
@@ -53,6 +54,18 @@ class Migration(migrations.Migration):
     ]
 
     operations = [
+        migrations.CreateModel(
+            name="Chore",
+            fields=[
+                ("name", models.CharField(max_length=32, primary_key=True, serialize=False)),
+                ("succeeded_at", models.DateTimeField(null=True)),
+                ("failed_at", models.DateTimeField(null=True)),
+                ("said", models.TextField(blank=True)),
+            ],
+            options={
+                "ordering": ["name"],
+            },
+        ),
         migrations.CreateModel(
             name="Clinic",
             fields=[
@@ -731,6 +744,78 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
+            name="Endpoint",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("name", models.CharField(max_length=64, verbose_name="name")),
+                (
+                    "kind",
+                    models.CharField(
+                        choices=[
+                            ("webhook", "Webhook (Standard Webhooks)"),
+                            ("fhir", "FHIR R4 server: sessions"),
+                        ],
+                        default="webhook",
+                        max_length=8,
+                        verbose_name="kind",
+                    ),
+                ),
+                (
+                    "url",
+                    models.CharField(
+                        help_text="https://…; addresses within a network only where the host allows them.",
+                        max_length=400,
+                        verbose_name="address",
+                    ),
+                ),
+                (
+                    "tells_sessions",
+                    models.BooleanField(default=True, verbose_name="a session ended"),
+                ),
+                ("tells_falls", models.BooleanField(default=True, verbose_name="a patient fell")),
+                (
+                    "tells_incidents",
+                    models.BooleanField(default=True, verbose_name="a robot stopped by itself"),
+                ),
+                (
+                    "tells_backups",
+                    models.BooleanField(default=True, verbose_name="a backup failed"),
+                ),
+                (
+                    "tells_exports",
+                    models.BooleanField(default=True, verbose_name="an export is ready"),
+                ),
+                ("active", models.BooleanField(default=True, verbose_name="active")),
+                ("secret", models.TextField(editable=False)),
+                ("created_at", models.DateTimeField(auto_now_add=True, verbose_name="created at")),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="endpoints",
+                        to="rehab.clinic",
+                        verbose_name="clinic",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "receiver",
+                "verbose_name_plural": "receivers",
+                "ordering": ["name"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
             name="Enrollment",
             fields=[
                 (
@@ -1335,7 +1420,7 @@ class Migration(migrations.Migration):
                             ("attended", "Sessions attended"),
                             ("target_met", "Days on which the target was met"),
                         ],
-                        help_text="Who has more of this stands first; after that, who was earlier.",
+                        help_text="Whoever has more of this comes first; after that, whoever was earlier.",
                         max_length=32,
                         verbose_name="of equal figures, first",
                     ),
@@ -1368,7 +1453,7 @@ class Migration(migrations.Migration):
                         choices=[
                             ("after_session", "After a session"),
                             ("waiting", "While the tablet waits"),
-                            ("pt_only", "Only here, to therapists"),
+                            ("pt_only", "Only here, for therapists"),
                         ],
                         default="after_session",
                         max_length=16,
@@ -1556,6 +1641,87 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
+            name="OutboxMessage",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "key",
+                    models.CharField(
+                        default=rehab.outbox.models.new_key, max_length=64, unique=True
+                    ),
+                ),
+                (
+                    "topic",
+                    models.CharField(
+                        choices=[
+                            ("session.ended", "a session ended"),
+                            ("patient.fall", "a patient fell"),
+                            ("robot.incident", "a robot stopped by itself"),
+                            ("backup.failed", "a backup failed"),
+                            ("export.ready", "an export is ready"),
+                        ],
+                        max_length=32,
+                        verbose_name="what",
+                    ),
+                ),
+                ("body", models.JSONField(verbose_name="content")),
+                ("at", models.DateTimeField(verbose_name="at")),
+                ("due_at", models.DateTimeField(verbose_name="next attempt")),
+                ("attempts", models.PositiveSmallIntegerField(default=0, verbose_name="attempts")),
+                (
+                    "state",
+                    models.CharField(
+                        choices=[
+                            ("waiting", "waiting"),
+                            ("delivered", "delivered"),
+                            ("refused", "refused"),
+                        ],
+                        default="waiting",
+                        max_length=16,
+                        verbose_name="state",
+                    ),
+                ),
+                (
+                    "answer",
+                    models.CharField(blank=True, max_length=500, verbose_name="last answer"),
+                ),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="+",
+                        to="rehab.clinic",
+                        verbose_name="clinic",
+                    ),
+                ),
+                (
+                    "endpoint",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="messages",
+                        to="rehab.endpoint",
+                        verbose_name="receiver",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "message to a receiver",
+                "verbose_name_plural": "messages to receivers",
+                "ordering": ["-at", "-pk"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
             name="Pairing",
             fields=[
                 (
@@ -1608,7 +1774,7 @@ class Migration(migrations.Migration):
                 (
                     "nickname",
                     models.CharField(
-                        help_text="What the screens say, so that patient and therapist can check.",
+                        help_text="Shown on the screens, so that patient and therapist can check.",
                         max_length=32,
                         verbose_name="nickname",
                     ),
@@ -1659,7 +1825,7 @@ class Migration(migrations.Migration):
                     "birth_year",
                     models.PositiveSmallIntegerField(
                         blank=True,
-                        help_text="Researchers see the ten years of age alone.",
+                        help_text="Researchers see only the decade of age.",
                         null=True,
                         validators=[
                             django.core.validators.MinValueValidator(1900),
@@ -1672,7 +1838,7 @@ class Migration(migrations.Migration):
                     "stroke_month",
                     models.DateField(
                         blank=True,
-                        help_text="Researchers see the months since then alone.",
+                        help_text="Researchers see only the months since then.",
                         null=True,
                         verbose_name="month of the stroke",
                     ),
@@ -1723,7 +1889,7 @@ class Migration(migrations.Migration):
                     "screen_still",
                     models.BooleanField(
                         default=False,
-                        help_text="No confetti, and nothing moves but the level.",
+                        help_text="No confetti, and nothing moves except the level.",
                         verbose_name="calm page",
                     ),
                 ),
@@ -1731,7 +1897,7 @@ class Migration(migrations.Migration):
                     "screen_sounds",
                     models.BooleanField(
                         default=False,
-                        help_text="A soft tone a step, the higher the better; a second one for points. The patient can mute it on the page.",
+                        help_text="A soft tone for each step, the higher the better; a second one for points. The patient can mute it on the page.",
                         verbose_name="sounds",
                     ),
                 ),
@@ -2555,6 +2721,27 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
+            name="ServerKey",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("purpose", models.CharField(max_length=16)),
+                ("number", models.PositiveIntegerField()),
+                ("sealed", models.TextField()),
+                ("recovery", models.TextField(blank=True)),
+            ],
+            options={
+                "ordering": ["purpose", "-number"],
+                "constraints": [
+                    models.UniqueConstraint(fields=("purpose", "number"), name="server_key_number")
+                ],
+            },
+        ),
+        migrations.CreateModel(
             name="SessionEvent",
             fields=[
                 (
@@ -2592,6 +2779,8 @@ class Migration(migrations.Migration):
                             ("chart_style", "chart style"),
                             ("goal_followed", "goal followed"),
                             ("planned_rest", "planned rest"),
+                            ("heart_rate_limit", "heart rate above its limit"),
+                            ("plugin", "plug-in"),
                             ("robot_stop", "robot stop"),
                             ("robot_arm", "robot arm"),
                             ("robot_decision", "robot decision"),
@@ -2602,7 +2791,7 @@ class Migration(migrations.Migration):
                             ("near_fall", "near fall"),
                             ("fall", "fall"),
                             ("fall_severity", "hurt by the fall"),
-                            ("fall_withdrawn", "it was no fall"),
+                            ("fall_withdrawn", "it was not a fall"),
                             ("fall_acknowledged", "fall seen by a therapist"),
                             ("stop_acknowledged", "robot’s stop seen by a therapist"),
                             ("verbal_cue", "verbal cue"),
@@ -3867,7 +4056,7 @@ class Migration(migrations.Migration):
                     "close",
                     models.BooleanField(
                         db_default=False,
-                        help_text="Too uncertain to count as hit or miss.",
+                        help_text="Too uncertain to count as a hit or a miss.",
                         verbose_name="close",
                     ),
                 ),
@@ -3875,7 +4064,7 @@ class Migration(migrations.Migration):
                     "late",
                     models.BooleanField(
                         db_default=False,
-                        help_text="It came too late to be shown as live.",
+                        help_text="It arrived too late to be shown live.",
                         verbose_name="late",
                     ),
                 ),
@@ -4355,6 +4544,12 @@ class Migration(migrations.Migration):
                 ),
                 name="measure_bounds_in_order",
                 violation_error_message="Each smallest value must lie below the largest; goals lie above 0.",
+            ),
+        ),
+        migrations.AddIndex(
+            model_name="outboxmessage",
+            index=models.Index(
+                condition=models.Q(("state", "waiting")), fields=["due_at"], name="waiting_message"
             ),
         ),
         migrations.AddConstraint(
