@@ -1,5 +1,7 @@
 """Walks of other people in files of other labs: one command each, to A2."""
 
+from typing import Any
+
 import pytest
 
 from tests.gait.corpus import open_corpus, vary
@@ -7,7 +9,7 @@ from tests.gait.strangers import FILES, from_zero, judge
 
 pytestmark = pytest.mark.bench
 
-PEOPLE = {
+PEOPLE: dict[str, tuple[str, dict[str, Any], float | None]] = {
     "moore2013": ("moore2013", {}, 100),
     "gaitalytics": ("gaitalytics treadmill", {}, None),
     "BTK motion3, overground": ("BTK motion3", {}, None),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -170,9 +171,9 @@ def write_qualisys(folder: Path, walk: CorpusWalk, *, point: str = ".") -> list[
         above += f"FORCE_PLATE_NAME\tForce-plate {number}\n"
         path = folder / f"walk_f_{number}.tsv"
         paths.append(write_table(path, [names], rows, comma="\t", point=point, above=above))
-    names = both("{side} Ankle {part}_X", "", "Moment", "Angles", sides=("Left", "Right"),
-                 factors=(1, 1, -TO_DEGREES), per_kg=True)  # fmt: skip
-    columns = {n: v for n, v in names.label(walk).items() if "  " not in n and n.strip()}
+    ankles = both("{side} Ankle {part}_X", "", "Moment", "Angles", sides=("Left", "Right"),
+                  factors=(1, 1, -TO_DEGREES), per_kg=True)  # fmt: skip
+    columns = {n: v for n, v in ankles.label(walk).items() if "  " not in n and n.strip()}
     columns = {n: v for n, v in columns.items() if "Moment" in n or "Angles" in n}
     path = folder / "walk_model.txt"
     heads = [["Time", *columns]]
@@ -204,8 +205,7 @@ def write_opensim(folder: Path, walk: CorpusWalk, force: str, angle: str, flag: 
 
 OPENSIM = "ankle_angle_{}"
 FILES: Mapping[str, Callable[[Path, CorpusWalk], list[Path]]] = {
-    **{name: (lambda folder, walk, n=names: write_named(folder, walk, n))
-       for name, names in NAMES.items()},
+    **{name: partial(write_named, names=names) for name, names in NAMES.items()},
     "decimal commas": lambda f, w: write_named(f, w, NAMES["German"], comma=";", point=","),
     "two heads": lambda f, w: write_two_heads(f, w, units=False),
     "two heads, units": write_two_heads,
@@ -214,8 +214,7 @@ FILES: Mapping[str, Callable[[Path, CorpusWalk], list[Path]]] = {
     "Visual3D": write_visual3d,
     "Qualisys": write_qualisys,
     "Qualisys, decimal commas": lambda f, w: write_qualisys(f, w, point=","),
-    **{f"OpenSim, {force}, {flag}": (lambda f, w, force=force, angle=angle, flag=flag:
-                                     write_opensim(f, w, force, angle, flag))
+    **{f"OpenSim, {force}, {flag}": partial(write_opensim, force=force, angle=angle, flag=flag)
        for force, angle, flag in (
            ("ground_force_{letter}_v{axis}", OPENSIM, "yes"),
            ("ground_force_calcn_{letter}_v{axis}", OPENSIM, "no"),

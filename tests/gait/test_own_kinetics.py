@@ -10,6 +10,7 @@ from rehab.gait import LegSamples, measure_strides
 from rehab.gait.recordings import c3d_plates
 from rehab.gait.recordings.ankle import JOINT_AHEAD_M, compute_ankle
 from rehab.gait.recordings.columns import MARKED, find_layout, find_required, read_column_map
+from rehab.gait.recordings.markers import PLACES
 from rehab.gait.recordings.readers import read_any_table
 from rehab.gait.setup.check import check_setup
 from tests.gait.corpus import find_clean, open_corpus, read_lab_file
@@ -86,7 +87,7 @@ def test_against_the_files_own_moment_and_power(name, by, rms, slow_rms, by_powe
     if by != "joints":
         monkeypatch.setattr(c3d_plates, "CENTERS", {})
     if by == "lateral":
-        outer = {place: (names, ()) for place, (names, _) in c3d_plates.PLACES.items()}
+        outer = {place: (names, ()) for place, (names, _) in PLACES.items()}
         monkeypatch.setattr(c3d_plates, "PLACES", outer)
     found = compare(name)
     print(
@@ -176,9 +177,9 @@ def write_type(file, kind):
         corners = [(fz + a * across + b * along) / 4 for a, b in signs]
         added = np.array([[fx / 2, fx / 2, fy / 2, fy / 2, *corners]])
         file["data"]["analogs"] = np.concatenate([file["data"]["analogs"], added], axis=1)
-        for name, value in (("LABELS", "k"), ("UNITS", "N"), ("DESCRIPTIONS", "")):
-            values = file["parameters"]["ANALOG"][name]["value"]
-            values += [f"{value}{plate}{n}" if name == "LABELS" else value for n in range(8)]
+        for name, text in (("LABELS", "k"), ("UNITS", "N"), ("DESCRIPTIONS", "")):
+            texts = file["parameters"]["ANALOG"][name]["value"]
+            texts += [f"{text}{plate}{n}" if name == "LABELS" else text for n in range(8)]
         for name, value in (("SCALE", 1.0), ("OFFSET", 0), ("GAIN", 1)):
             values = file["parameters"]["ANALOG"][name]
             values["value"] = np.append(values["value"], [value] * 8)

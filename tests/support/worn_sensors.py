@@ -48,7 +48,7 @@ class Walk:
         """Return the walk of a sensor that is mounted turned."""
         return self.changed(self.t_s, self.rate @ matrix.T, self.acceleration @ matrix.T)
 
-    def picked(self, chosen: NDArray[Any]) -> Walk:
+    def picked(self, chosen: NDArray[Any] | slice) -> Walk:
         """Return the walk with only some of its samples."""
         return self.changed(self.t_s[chosen], self.rate[chosen], self.acceleration[chosen])
 
