@@ -127,7 +127,7 @@ function tick() {
 function drawCheck() {
   const hasWalked = count >= STRIDES_CHECKED;
   const isDone = { still: still_s >= STILL_S, lift: hasLifted, walk: hasWalked };
-  const next = Object.keys(isDone).find((name) => !isDone[name]);
+  const next = hasWalked ? null : Object.keys(isDone).find((name) => !isDone[name]);
   for (const item of document.querySelectorAll("[data-check]")) {
     item.classList.toggle("done", isDone[item.dataset.check]);
     item.classList.toggle("now", item.dataset.check === next);
