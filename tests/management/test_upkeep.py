@@ -13,8 +13,10 @@ from django.utils import timezone
 
 from rehab.exports.encryption import generate_key
 from rehab.management.commands import upkeep
+from rehab.people.audit.seals import seal_at_once
 from rehab.people.chores import Chore, record_chore
 from rehab.people.server_keys import Purpose, store_first
+from rehab.sessions.seals import seal_sessions
 from rehab.stations.https.authority import OwnAuthority
 from tests.support.walks import HIT, MISS, walk
 
@@ -79,6 +81,9 @@ def test_backups_past_their_time_go_once_a_new_one_is_there(folder, settings, wo
 @pytest.mark.postgres
 def test_the_weekly_restore_is_red_where_a_backup_is_damaged(folder, world):
     walk(world.patient, "positive", [HIT, MISS] * 20)
+    for clinic in (world.clinic.pk, None):  # as the server does: the scratch one has a real clock
+        seal_at_once(clinic, timezone.now())
+    seal_sessions(timezone.now())
     do("backup")
     told = do("weekly")
     assert "steps are restored" in told
