@@ -18,7 +18,18 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = (".ci", "deploy", "docs", "garry_site", "rehab", "robot", "static", "templates", "tests")
+FOLDERS = (
+    ".ci",
+    "deploy",
+    "docs",
+    "examples",
+    "garry_site",
+    "rehab",
+    "robot",
+    "static",
+    "templates",
+    "tests",
+)
 TEXTS = {".py", ".js", ".css", ".html", ".txt", ".svg", ".urdf", ".ino", ".md", ".toml", ".cfg"}
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 REFERENCE = "docs/reference/"

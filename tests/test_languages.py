@@ -32,7 +32,7 @@ PLURALS = {  # as Django's own catalogs have them
 # Words that are the same in English and in another language.
 ALIKE = (
     "and android ipad iphone linux mac timed windows borg django garry min quattrocchi neurol "
-    "neurosurg psychiatry paul medrxiv"
+    "neurosurg psychiatry paul medrxiv standard webhook webhooks"
 )
 ALIKE_IN = {
     "es": "factor robot sensor extra normal plan total",

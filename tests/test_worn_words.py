@@ -8,14 +8,17 @@ from pathlib import Path
 import pytest
 from django.utils import translation
 
+from rehab.feedback.clinic_valences import default_valence
 from rehab.training.measures import WORN_MEASURES
+from rehab.training.valences import VALENCES
 
 ROOT = Path(__file__).parents[1]
 CLAIM = re.compile(
-    r"\b(a2|powers?|forces?|propulsi\w*|leistung\w*|kraft|kräfte|antrieb\w*|vortrieb\w*|potencia\w*|"
+    r"\b(a2|powers?|forces?|puissant\w*|propulsi\w*|leistung\w*|kraft|kräfte|antrieb\w*|vortrieb\w*|potencia\w*|"
     r"fuerzas?|puissances?|poussée)\b",
     re.IGNORECASE,
 )
+PUSH = re.compile(r"\b(push|power|abst[oö]ß|stoß|drück|empuj|impuls|pouss)", re.IGNORECASE)
 DENIAL = re.compile(
     r"\b(no|none|not|never|nothing|without|instead of|cannot|refuses?)\b", re.IGNORECASE
 )
@@ -47,6 +50,15 @@ def test_no_measure_is_called_so(language):
         for measure in WORN_MEASURES:
             assert not CLAIM.search(translation.gettext(measure.name)), measure.slug
             assert not CLAIM.search(measure.slug + " " + measure.channel.replace("_", " "))
+
+
+@pytest.mark.parametrize("language", ["en", "de", "es", "fr"])
+@pytest.mark.parametrize("slug", VALENCES)
+def test_no_phrase_praises_a_push(slug, language):
+    """A patient reads the same phrases whatever is measured."""
+    for band in default_valence(slug, language).bands:
+        assert not CLAIM.search(band.words), band.words
+        assert not PUSH.search(band.words), band.words
 
 
 def test_no_code_and_no_page_calls_it_so():

@@ -74,7 +74,7 @@ NEAR = join(
     gettext_noop("Not far now."),
     gettext_noop("Near the goal."),
     gettext_noop("Almost."),
-    gettext_noop("A bit more push."),
+    gettext_noop("Only a bit more."),
     gettext_noop("Only a little short."),
     gettext_noop("Just a touch more."),
 )
@@ -87,7 +87,7 @@ REACHED = join(
     gettext_noop("Goal reached!"),
     gettext_noop("That is the goal!"),
     gettext_noop("Well done!"),
-    gettext_noop("Good push!"),
+    gettext_noop("Nicely done!"),
     gettext_noop("A good step!"),
     gettext_noop("Yes!"),
     gettext_noop("You made it!"),
@@ -95,32 +95,32 @@ REACHED = join(
 )
 
 STRONG = join(
-    gettext_noop("Strong push!"),
+    gettext_noop("Well above!"),
     gettext_noop("Above the goal!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
     gettext_noop("More than the goal!"),
-    gettext_noop("Powerful!"),
+    gettext_noop("Splendid!"),
     gettext_noop("A strong one!"),
-    gettext_noop("Great push!"),
+    gettext_noop("Great going!"),
     gettext_noop("Very strong!"),
     gettext_noop("Great step!"),
     gettext_noop("Over the goal!"),
-    gettext_noop("Nicely pushed!"),
+    gettext_noop("So good!"),
 )
 
 STRONGEST = join(
-    gettext_noop("What a push!"),
+    gettext_noop("Outstanding!"),
     gettext_noop("Excellent!"),
     gettext_noop("Superb!"),
     gettext_noop("Fantastic!"),
     gettext_noop("Marvelous!"),
-    gettext_noop("Wonderful push!"),
+    gettext_noop("Wonderful!"),
     gettext_noop("Far above the goal!"),
     gettext_noop("Brilliant!"),
     gettext_noop("What a step!"),
-    gettext_noop("Amazing push!"),
-    gettext_noop("Great power!"),
+    gettext_noop("Amazing!"),
+    gettext_noop("Glorious!"),
     gettext_noop("That was strong!"),
 )
 
@@ -170,16 +170,16 @@ NOTHING_LOST = join(
 )
 
 MEASURED = join(
-    gettext_noop("Your push, this step."),
+    gettext_noop("Your step, measured."),
     gettext_noop("This step."),
     gettext_noop("Measured now."),
     gettext_noop("Your value."),
-    gettext_noop("This push."),
+    gettext_noop("The value now."),
     gettext_noop("This step’s value."),
-    gettext_noop("Push of this step."),
+    gettext_noop("What this step gave."),
     gettext_noop("Now measured."),
-    gettext_noop("The last push."),
+    gettext_noop("The last value."),
     gettext_noop("The last step."),
     gettext_noop("Your last step."),
-    gettext_noop("Your last push."),
+    gettext_noop("Your last value."),
 )

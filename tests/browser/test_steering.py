@@ -117,7 +117,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(tablet.locator("body")).to_have_attribute("data-theme", "binary")
         feet.walk(1.3)
         at_step(tablet, 14)
-        expect(words).to_have_text("What a push!")
+        expect(words).to_have_text("Outstanding!")
         types = "Positive, changed to Negative, Binary"
         expect(monitor.locator("[data-show=types]")).to_have_text(types)
 
@@ -144,7 +144,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
         feet.hear("start")
         feet.walk(1.15)
         at_step(tablet, 1)
-        expect(tablet.locator(".words")).to_have_text("Strong push!")
+        expect(tablet.locator(".words")).to_have_text("Well above!")
 
         expect(admin.locator(".feedback-types tbody tr")).to_have_count(4)
         admin.get_by_role("link", name="Edit Positive").click()
@@ -173,7 +173,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
         expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("as usual")
         feet.walk(1.15)
         at_step(tablet, 3)
-        expect(tablet.locator(".words")).to_have_text("Strong push!")
+        expect(tablet.locator(".words")).to_have_text("Well above!")
 
 
 def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):

@@ -138,7 +138,7 @@ def test_codes_are_guessed_five_times_whatever_the_address(pt, app):
         enter(client)
         answer = prove(client, "000000")
     assert answer.status_code == 429
-    assert "Too many wrong tries. Try again in 15 minutes" in answer.content.decode()
+    assert "Too many wrong attempts. Try again in 15 minutes" in answer.content.decode()
     assert prove(client, app.code()).status_code == 429
     assert not is_in(client)
     SignInAttempts.everywhere.update(locked_until=timezone.now())

@@ -310,8 +310,10 @@ def test_guessing_the_old_password_at_an_open_screen_is_counted(client, pt):
     enter(client)
     for _ in range(5):
         answer = change(client, "wrong", "other words 2027")
-    assert "Too many wrong tries" in answer.content.decode()
-    assert "Too many wrong tries" in change(client, PASSWORD, "other words 2027").content.decode()
+    assert "Too many wrong attempts" in answer.content.decode()
+    assert (
+        "Too many wrong attempts" in change(client, PASSWORD, "other words 2027").content.decode()
+    )
 
 
 @pytest.mark.django_db

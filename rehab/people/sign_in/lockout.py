@@ -105,7 +105,7 @@ def lockout_message(request: HttpRequest) -> str:
     minutes = -(-lockout_s(request) // 60)
     return ngettext(
         "Too many wrong attempts. Try again in a minute, or ask your clinic’s lead to unlock you.",
-        "Too many wrong tries. Try again in %(minutes)d minutes, or ask your clinic’s lead to "
+        "Too many wrong attempts. Try again in %(minutes)d minutes, or ask your clinic’s lead to "
         "unlock you.",
         minutes,
     ) % {"minutes": minutes}

@@ -78,7 +78,7 @@ export function phaseLeft({ phase, phase_s, phase_strides }) {
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
 }
 
-// Return one line for screen readers: "Strong push. Plus 2. 128 points."
+// Return one line for screen readers: "Well above. Plus 2. 128 points."
 export function describeStep(step, session) {
   if (step.kind === "missing") return _("Step not measured.");
   const words = step.words && step.words.replace(/[!.]*$/, ".");
