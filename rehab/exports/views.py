@@ -17,7 +17,7 @@ from rehab.exports.archive import ZipResponse
 from rehab.exports.forms import ResearchExportForm
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.exports.research.package import Package, discard_old
-from rehab.outbox.models import Topic, tell
+from rehab.outbox.models import Topic, notify
 from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -110,7 +110,7 @@ def advance_research(request: HttpRequest) -> HttpResponse:
     for reached in package.advance(SECONDS_OF_A_CALL):  # noqa: B007 - the last one is returned
         pass
     if reached.is_done and not before.is_done and user.clinic_id is not None:
-        tell(user.clinic_id, Topic.EXPORT, {"sessions": reached.total}, timezone.now())
+        notify(user.clinic_id, Topic.EXPORT, {"sessions": reached.total}, timezone.now())
     return JsonResponse({"done": reached.done, "total": reached.total})
 
 

@@ -774,20 +774,20 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
-                    "tells_sessions",
+                    "wants_sessions",
                     models.BooleanField(default=True, verbose_name="a session ended"),
                 ),
-                ("tells_falls", models.BooleanField(default=True, verbose_name="a patient fell")),
+                ("wants_falls", models.BooleanField(default=True, verbose_name="a patient fell")),
                 (
-                    "tells_incidents",
+                    "wants_incidents",
                     models.BooleanField(default=True, verbose_name="a robot stopped by itself"),
                 ),
                 (
-                    "tells_backups",
+                    "wants_backups",
                     models.BooleanField(default=True, verbose_name="a backup failed"),
                 ),
                 (
-                    "tells_exports",
+                    "wants_exports",
                     models.BooleanField(default=True, verbose_name="an export is ready"),
                 ),
                 ("active", models.BooleanField(default=True, verbose_name="active")),

@@ -1,1 +1,1 @@
-"""What other systems are told: stored with what it reports, and sent until it is received."""
+"""What other systems are notified of: stored with what it reports, sent until it is received."""

@@ -37,7 +37,7 @@ class EndpointAdmin(ScopedAdmin):
     list_display = ("name", "kind", "url", "active")
     fields = (
         *("name", "kind", "url", "token", "active"),
-        *("tells_sessions", "tells_falls", "tells_incidents", "tells_backups", "tells_exports"),
+        *("wants_sessions", "wants_falls", "wants_incidents", "wants_backups", "wants_exports"),
     )
     actions = row_actions = ("renew_secrets",)
 

@@ -24,7 +24,7 @@ MAX_ANSWER_CHARS = 500
 
 
 class Topic(models.TextChoices):
-    """What is told."""
+    """What receivers are notified of."""
 
     SESSION = "session.ended", _("a session ended")
     FALL = "patient.fall", _("a patient fell")
@@ -34,7 +34,7 @@ class Topic(models.TextChoices):
 
 
 class Endpoint(ClinicModel):
-    """A program that a clinic tells something, by signed webhooks or FHIR.
+    """A program that a clinic notifies, by signed webhooks or FHIR.
 
     ``secret``: what signs webhooks, or the token that a FHIR server asks for; encrypted.
     """
@@ -57,11 +57,11 @@ class Endpoint(ClinicModel):
         max_length=400,
         help_text=_("https://…; addresses within a network only where the host allows them."),
     )
-    tells_sessions = models.BooleanField(Topic.SESSION.label, default=True)
-    tells_falls = models.BooleanField(Topic.FALL.label, default=True)
-    tells_incidents = models.BooleanField(Topic.INCIDENT.label, default=True)
-    tells_backups = models.BooleanField(Topic.BACKUP.label, default=True)
-    tells_exports = models.BooleanField(Topic.EXPORT.label, default=True)
+    wants_sessions = models.BooleanField(Topic.SESSION.label, default=True)
+    wants_falls = models.BooleanField(Topic.FALL.label, default=True)
+    wants_incidents = models.BooleanField(Topic.INCIDENT.label, default=True)
+    wants_backups = models.BooleanField(Topic.BACKUP.label, default=True)
+    wants_exports = models.BooleanField(Topic.EXPORT.label, default=True)
     active = models.BooleanField(_("active"), default=True)
     secret = models.TextField(editable=False)
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)
@@ -86,11 +86,11 @@ class Endpoint(ClinicModel):
         if "@" in place.netloc:
             raise ValidationError({"url": _("Give the address without a name and password.")})
 
-    def tells(self, topic: Topic) -> bool:
+    def wants(self, topic: Topic) -> bool:
         """Return whether it wants to know something. A FHIR server gets sessions."""
         if self.kind == self.Kind.FHIR:
             return topic is Topic.SESSION
-        return bool(getattr(self, f"tells_{topic.name.lower()}s"))
+        return bool(getattr(self, f"wants_{topic.name.lower()}s"))
 
     def new_secret(self) -> str:
         """Set and return a new secret for signatures."""
@@ -172,7 +172,7 @@ class OutboxMessage(ClinicModel):
         self.save(update_fields=["state", "due_at", "attempts"])
 
 
-def tell(clinic_id: int, topic: Topic, about: Mapping[str, Any], at: datetime) -> None:
+def notify(clinic_id: int, topic: Topic, about: Mapping[str, Any], at: datetime) -> None:
     """Store a message for each receiver that wants to know.
 
     In the transaction of what it reports: both are stored, or neither.
@@ -182,5 +182,5 @@ def tell(clinic_id: int, topic: Topic, about: Mapping[str, Any], at: datetime) -
             clinic_id=clinic_id, endpoint=one, topic=topic, body=dict(about), at=at, due_at=at
         )
         for one in Endpoint.everywhere.filter(clinic=clinic_id, active=True)
-        if one.tells(topic)
+        if one.wants(topic)
     )

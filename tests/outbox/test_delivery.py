@@ -16,7 +16,7 @@ from django.urls import reverse
 from rehab.exports.encryption import generate_key
 from rehab.outbox.delivery import deliver_due, is_due, sign
 from rehab.outbox.http_post import Answer
-from rehab.outbox.models import PAUSES, Endpoint, OutboxMessage, Topic, tell
+from rehab.outbox.models import PAUSES, Endpoint, OutboxMessage, Topic, notify
 from rehab.people.roles import Role
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
 from rehab.sessions.log import Remark
@@ -78,14 +78,14 @@ def test_a_session_and_a_fall_are_told_and_name_no_patient(world, endpoint):
 
 def test_what_is_rolled_back_is_not_told(world, endpoint):
     with transaction.atomic():
-        tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+        notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
         transaction.set_rollback(True)
     assert not is_due(NOW)
 
 
 def test_the_reference_library_verifies_a_signature(world, endpoint):
     standardwebhooks = pytest.importorskip("standardwebhooks")
-    tell(world.clinic.pk, Topic.EXPORT, {"sessions": 3}, NOW)
+    notify(world.clinic.pk, Topic.EXPORT, {"sessions": 3}, NOW)
     receiver = Receiver()
     deliver_due(NOW, receiver)
     ((body, headers),) = receiver.received
@@ -104,7 +104,7 @@ def test_the_example_of_the_specification():
 
 def test_an_hour_away_loses_nothing_and_keeps_the_key(world, endpoint):
     for number in range(3):
-        tell(world.clinic.pk, Topic.EXPORT, {"sessions": number}, NOW)
+        notify(world.clinic.pk, Topic.EXPORT, {"sessions": number}, NOW)
     keys = [one.key for one in messages(endpoint)]
     away, now = Receiver(*[OSError("no route")] * 1000), NOW
     while now < NOW + timedelta(hours=1):
@@ -119,7 +119,7 @@ def test_an_hour_away_loses_nothing_and_keeps_the_key(world, endpoint):
 
 
 def test_a_receiver_that_never_answers_is_given_up_and_can_be_told_again(world, endpoint):
-    tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
     now = NOW
     for _ in range(len(PAUSES) + 1):
         deliver_due(now, Receiver(503))
@@ -134,7 +134,7 @@ def test_a_receiver_that_never_answers_is_given_up_and_can_be_told_again(world, 
 
 @pytest.mark.parametrize(("status", "active"), [(400, True), (404, True), (410, False)])
 def test_a_refusal_is_final_and_shown(world, endpoint, status, active):
-    tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
     deliver_due(NOW, Receiver(status))
     endpoint.refresh_from_db()
     assert messages(endpoint).get().state == "refused"
@@ -144,7 +144,7 @@ def test_a_refusal_is_final_and_shown(world, endpoint, status, active):
 
 
 def test_a_message_is_claimed_by_one_server(world, endpoint):
-    tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
     inner = Receiver()
 
     def meanwhile(*arguments):
@@ -158,7 +158,7 @@ def test_a_message_is_claimed_by_one_server(world, endpoint):
 def test_a_receiver_that_fails_does_not_hold_up_another(world, endpoint):
     add_endpoint(world, name="Second")
     for _ in range(2):
-        tell(world.clinic.pk, Topic.EXPORT, {}, NOW)
+        notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
     assert deliver_due(NOW, Receiver(OSError("away"), 200, 200)) == 2
 
 
@@ -214,7 +214,7 @@ def test_over_a_real_socket_where_the_host_allows_the_network(world, settings):
     with HTTPServer(("127.0.0.1", 0), Hook) as server:
         Thread(target=server.serve_forever, daemon=True).start()
         endpoint = add_endpoint(world, url=f"http://127.0.0.1:{server.server_port}/hook")
-        tell(world.clinic.pk, Topic.EXPORT, {"sessions": 1}, NOW)
+        notify(world.clinic.pk, Topic.EXPORT, {"sessions": 1}, NOW)
         assert deliver_due(NOW) == 0
         assert "GARRY_PRIVATE_RECEIVERS" in messages(endpoint).get().answer
         messages(endpoint).get().send_again(NOW)

@@ -14,7 +14,7 @@ from django.utils import timezone
 from rehab.exports.backup import write_backup
 from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.management.new_file import new_file
-from rehab.outbox.models import Topic, tell
+from rehab.outbox.models import Topic, notify
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
@@ -37,7 +37,7 @@ class Command(BaseCommand):
             counts = _write(file, now)
         except Exception as problem:
             for clinic in Clinic.everywhere.all():
-                tell(clinic.pk, Topic.BACKUP, {"problem": type(problem).__name__}, now)
+                notify(clinic.pk, Topic.BACKUP, {"problem": type(problem).__name__}, now)
             raise
         for clinic in Clinic.everywhere.all():
             audit_log.record(

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import msgspec
 from django.db import connection, transaction
 
-from rehab.outbox.models import Topic, tell
+from rehab.outbox.models import Topic, notify
 from rehab.sessions.alarms import Alarm, alarm_of
 from rehab.sessions.live.session.aggregate import Row, StepRow, Summary
 from rehab.sessions.log import (
@@ -127,7 +127,7 @@ def commit(jobs: Sequence[Job]) -> None:
         if events:
             SessionEvent.everywhere.bulk_create(events)
             _note_robot_orders(events)
-            _tell_receivers(events)
+            _notify_receivers(events)
             # After an end, the log may be sealed to it already. A row that is updated twice would
             # wait for its clinic's (PostgreSQL checks foreign keys again).
             updated = {job.session_id for job in jobs if job.summary is not None}
@@ -155,7 +155,7 @@ def _announce_figures(patients: set[int]) -> None:
         log.exception("Boards miss new figures; they follow within a day.")
 
 
-def _tell_receivers(events: Sequence[SessionEvent]) -> None:
+def _notify_receivers(events: Sequence[SessionEvent]) -> None:
     """Store what receivers are told of these events; no step is lost where that fails."""
     for event in events:
         alarm = alarm_of(event)
@@ -167,7 +167,7 @@ def _tell_receivers(events: Sequence[SessionEvent]) -> None:
         about |= {"how": event.kind} if alarm is None else {"reason": event.data.get("reason", "")}
         try:
             with transaction.atomic():
-                tell(session.clinic_id, topic, about, event.at)
+                notify(session.clinic_id, topic, about, event.at)
         except Exception:
             log.exception("Receivers of clinic %s miss a message", session.clinic_id)
 
