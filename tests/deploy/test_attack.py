@@ -136,8 +136,9 @@ def test_nothing_fails_and_nothing_foreign_is_shown(attacked):
     problems, statuses = attack(attacked, REQUESTS)
     assert not problems, "\n".join(problems)
     assert statuses.total() == REQUESTS
-    for label in ("lead of amber", "pt of birch", "program of a pt of amber", "tablet of amber"):
+    for label in ("lead of amber", "pt of birch", "program of a pt of amber"):
         assert statuses[label, 200] > 5, (label, statuses)
+    assert statuses["tablet of amber", 200] > 1, statuses  # its pages are few
 
 
 def test_the_attack_finds_what_another_clinic_shows(attacked):
