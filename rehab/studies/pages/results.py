@@ -32,6 +32,7 @@ from rehab.studies.results.drawing import (
     write_table,
 )
 from rehab.studies.results.results import Results, may_look, note_look, read_results
+from rehab.studies.results.tables import HEADERS
 
 
 def _open(request: HttpRequest, study_id: int) -> tuple[Study, User]:
@@ -183,7 +184,7 @@ def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
     if kind == "svg":
         response = HttpResponse(FIGURES[name](results), content_type="image/svg+xml")
     else:
-        text = write_table(TABLES[name](results))
+        text = write_table(TABLES[name](results), HEADERS.get(name, ()))
         response = HttpResponse(text, content_type="text/csv; charset=utf-8")
     response["Content-Disposition"] = f'attachment; filename="{study.code}-{name}.{kind}"'
     return response

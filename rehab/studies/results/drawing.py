@@ -194,11 +194,19 @@ def is_shown(results: Results, name: str) -> bool:
     return not results.is_interim or name in INTERIM
 
 
-def write_table(rows: Iterable[dict[str, Any]]) -> str:
-    """Return rows as CSV with a heading; numbers with a point, what is missing empty."""
+def write_table(rows: Iterable[dict[str, Any]], header: Iterable[str] = ()) -> str:
+    """Return rows as CSV with a heading; numbers with a point, what is missing empty.
+
+    Parameters
+    ----------
+    rows, header
+        All with the same keys; the heading where there is none.
+    """
     text = io.StringIO()
     writer, is_first = CsvWriter(text), True
     for row in rows:
         writer.write([list(row), list(row.values())] if is_first else [list(row.values())])
         is_first = False
+    if is_first and (columns := list(header)):
+        writer.write([columns])
     return text.getvalue()

@@ -3,13 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 from rehab.studies.analysis.comparison import CONFIDENCE, Difference
 from rehab.studies.analysis.findings import OutcomeResult, has_departed, observations
 from rehab.studies.analysis.participants import ParticipantVisit
+from rehab.studies.registration.outcome_changes import OutcomeChange
 from rehab.studies.results.results import Results
+
+INTERVAL = "low_95", "high_95"
+PAIR = "outcome", "group", "reference"
+VISIT = "participant", "group", "visit", "attendance"
+STATUS = "status", "since_version", "dropped_in_version"
+# The columns of tables that may have no row; of outcomes and guesses those of every study.
+HEADERS: dict[str, tuple[str, ...]] = {
+    "outcomes": (*VISIT, "outcome", *STATUS, "value", "arm", "period", "baseline", "per_protocol"),
+    "phases": (
+        *(*VISIT, "phase", "kind", "name", "feedback", "strides", "valid", "judged", "hit_rate"),
+        *("change_percent", "shown_percent_of_goal", "shown_quartile_1", "shown_median"),
+        *("shown_quartile_3", "real_percent_of_goal", "cv_percent", "sd_about_trend_percent"),
+        "lag_1",
+    ),
+    "differences": (
+        *("outcome", *STATUS, "group", "reference", "participants", "participants_reference"),
+        *("paired", "difference", *INTERVAL, "hedges_g", "g_low_95", "g_high_95", "p", "p_holm"),
+        *("level", "not_inferior", "per_protocol_difference", "per_protocol_low_95"),
+        *("per_protocol_high_95", "missing_visits", "missing_visits_reference", "tipping_point"),
+    ),
+    "carry_over": (*PAIR, "carry_over", *INTERVAL, "p"),
+    "curves": (
+        *("group", "visit", "phase", "block_of_10", "participants", "percent_of_baseline"),
+        *INTERVAL,
+    ),
+    "looks": ("participants", "planned", "spending", "level"),
+    "changes": tuple(one.name for one in fields(OutcomeChange)),
+    "occurrences": ("participant", "group", "visit", "kind", "what", "value"),
+    "guesses": ("guesser", "group", "do_not_know", "index", "estimate", *INTERVAL),
+    "adverse_events": (
+        *("participant", "arm", "what", "grade", "serious", "relation", "expected"),
+        *("known_on_day", "due_on_day", "reported_on_day"),
+    ),
+}
 
 
 def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
