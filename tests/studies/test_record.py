@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
-from rehab.people.models import User
+from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.studies.agreements import agree, agreed_version, agreement_rows
@@ -19,6 +19,7 @@ from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
 from rehab.studies.record.facts import ASKED
+from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.lifecycle import close, register, revise
 from rehab.studies.results.results import read_results
@@ -57,6 +58,25 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     lacking = [row for row in checklist_rows(study, None) if row["still asked"]]
     assert {row["still asked"] for row in lacking} == {BY_HAND}
     assert {row["list"] for row in lacking} <= {"CONSORT 2025", "TIDieR", "WHO"}
+
+
+def test_a_title_says_what_is_blinded_and_who_is_simulated(world):
+    study = running_study(world)
+    enrolled(study, new_patient(world))
+
+    def title():
+        study.facts = {"scientific_title": "An assessor-blinded trial"}
+        return next(row for row in checklist_rows(study, None) if row["list"] == "CONSORT 2025")
+
+    assert title()["answer"] == f"An assessor-blinded trial. {UNMASKED}"
+    assert "no assessor is marked" in title()["still asked"]
+    Patient.everywhere.update(simulated=True)
+    assert title()["answer"].startswith("Simulated: no participant was enrolled. An")
+    enrolled(study, new_patient(world, 2))
+    give_mark(study, world.people[Role.PT], Task.ASSESSOR, None, NOW)
+    assert title()["answer"].startswith("1 of the participants are simulated. An")
+    assert title()["answer"].endswith("Assessor-blinded: 1 marked.")
+    assert not title()["still asked"]
 
 
 def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):

@@ -12,15 +12,16 @@ from textwrap import fill
 
 from rehab.studies.models import Study
 from rehab.studies.record.facts import ASKED
-from rehab.studies.record.known import know
+from rehab.studies.record.known import UNMASKED, know
 from rehab.studies.results.results import Results
 
 INDENT = "    "
 BY_HAND = "to be written in the report"
+NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 # List; then one line for each item: number | words | what answers it.
 ITEMS = {
     "SPIRIT 2025": """
-        1a | title says it is a protocol, and the design | scientific_title
+        1a | title says it is a protocol, and the design | simulated scientific_title masked
         1b | structured summary | title design arms outcomes
         2 | version and date | version
         3a | who wrote it | contributors
@@ -54,8 +55,8 @@ ITEMS = {
         21b | type of randomization | allocation
         22 | concealment | concealment
         23 | implementation | implementation
-        24a | who is blinded | blinding blinded
-        24b | how | blinding
+        24a | who is blinded | masked blinding
+        24b | how | blinded
         24c | unblinding | unblinding
         25a | collection of data | data
         25b | retention | retention
@@ -74,7 +75,7 @@ ITEMS = {
         33 | confidentiality | confidentiality
         34 | care after the trial | aftercare""",
     "CONSORT 2025": """
-        1a | title says randomized | scientific_title
+        1a | title says randomized | simulated scientific_title masked
         1b | structured summary | -
         2 | registration | registry
         3 | protocol and analysis plan | plan
@@ -98,8 +99,8 @@ ITEMS = {
         17b | type of randomization | allocation
         18 | concealment | concealment
         19 | implementation | implementation
-        20a | who was blinded | blinding blinded unblinded
-        20b | how | blinding
+        20a | who was blinded | masked blinding unblinded
+        20b | how | blinded
         21a | statistical methods | analysis
         21b | who is analyzed | populations
         21c | missing data | missing
@@ -138,8 +139,8 @@ ITEMS = {
         6 | further sponsors | secondary_sponsors
         7 | contact for the public | contact_public
         8 | contact for science | contact_scientific
-        9 | public title | title
-        10 | scientific title | scientific_title
+        9 | public title | simulated title
+        10 | scientific title | simulated scientific_title masked
         11 | countries | countries
         12 | condition | condition
         13 | interventions | arms
@@ -147,7 +148,7 @@ ITEMS = {
         15 | type | design allocation
         16 | first enrollment | dates
         17 | size, planned and reached | participants flow
-        18 | status | status
+        18 | status | status simulated
         19 | primary outcome | outcomes
         20 | secondary outcomes | outcomes
         21 | ethics | ethics
@@ -177,6 +178,8 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
             lacking = [str(ASKED[slug]) for slug in asked]
             if slugs == "-" or not (given or lacking):
                 lacking = [BY_HAND]
+            if "masked" in named and UNMASKED in answers["masked"] and _says_blinded(given):
+                lacking.append(NO_ASSESSOR)
             yield {
                 "list": name,
                 "item": number,
@@ -184,6 +187,10 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "answer": " ".join([*(f"{one.rstrip('.')}." for one in given[:-1]), *given[-1:]]),
                 "still asked": "; ".join(lacking),
             }
+
+
+def _says_blinded(given: Iterable[str]) -> bool:
+    return any("assessor-blind" in one.lower().replace(" ", "-") for one in given)
 
 
 def checklist_text(rows: Iterable[dict[str, str]], name: str) -> str:

@@ -24,6 +24,7 @@ CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
+UNMASKED = "Outcome computed by software, participants and therapists not blinded."
 HARMS = (
     "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
     "themselves and are offered as adverse events, each with severity, relation, expectedness and "
@@ -131,8 +132,20 @@ def _conducted(study: Study) -> dict[str, str]:
         "changes": "; ".join((*changes, *map(str, outcome_changes(study)))) or "None.",
         "dates": ", ".join(f"{name} {at:%Y-%m-%d}" for name, at in dates.items() if at),
         "status": str(study.state),
-        "blinded": f"{assessors} assessors are kept from sessions, arms and boards by GARRY.",
+        "masked": f"Assessor-blinded: {assessors} marked." if assessors else UNMASKED,
+        "blinded": "Who is marked as an assessor is kept from sessions, arms and boards by GARRY.",
+        "simulated": _simulated(study),
     }  # fmt: skip
+
+
+def _simulated(study: Study) -> str:
+    """Return how many participants are no people; "" where all are people."""
+    simulated = study.enrollments.filter(patient__simulated=True).count()
+    if not simulated:
+        return ""
+    if simulated == study.enrollments.count():
+        return "Simulated: no participant was enrolled."
+    return f"{simulated} of the participants are simulated."
 
 
 def _found(study: Study, results: Results) -> dict[str, str]:
