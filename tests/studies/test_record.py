@@ -87,7 +87,8 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     rows = list(checklist_rows(study, read_results(study, NOW)))
     consort = {row["item"]: row["answer"] for row in rows if row["list"] == "CONSORT 2025"}
     assert "1 allocated" in consort["22a"]
-    assert "fall: A 0 in 0" in consort["27"]
+    assert "fall: A 0 events in 0 of 0 participants (0 visits), B" in consort["27"]
+    assert "robot stop: A 0 events" in consort["27"]
     assert "1 arms revealed, 1 of them by one person alone" in consort["20a"]
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 from statistics import mean, stdev
 from typing import Any
 
+from rehab.sessions.log import RobotEntry
 from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
 from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.participants import Attendance
 from rehab.studies.models import Arm, Study, StudyMark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.document import describe
 from rehab.studies.registration.estimands import METHOD, SUMMARY, estimands
 from rehab.studies.registration.outcome_changes import outcome_changes
+from rehab.studies.results.conduct import HARMS, label_of
 from rehab.studies.results.results import Results
 
 METHODS = {
@@ -25,7 +28,7 @@ CONCEALED = (
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
 UNMASKED = "Outcome computed by software, participants and therapists not blinded."
-HARMS = (
+HARMS_FOLLOWED = (
     "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
     "themselves and are offered as adverse events, each with severity, relation, expectedness and "
     "the day by which it has to be reported."
@@ -92,7 +95,7 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "further": "Exploratory outcomes are named so. Carry-over is estimated in crossovers."
         " No subgroups.",
         "looks": f"By alpha spending ({spending.replace('_', ' ')})." if spending else "None.",
-        "harms_defined": HARMS,
+        "harms_defined": HARMS_FOLLOWED,
         "unblinding": "Two people, with a reason, logged; alone in an emergency, which is said.",
         "confidentiality": "Pseudonyms; exports by roles, logged; erasure on demand.",
         "consents": "Each consent to research names its text's version; a new version of the study "
@@ -168,14 +171,40 @@ def _found(study: Study, results: Results) -> dict[str, str]:
         ),
         "baseline": "; ".join(filter(None, (_baseline(results, arm) for arm in study.arms.all()))),
         "estimates": " ".join(_estimates(results, slug) for slug in results.registered),
-        "harms_found": "; ".join(
-            f"{row.what}: "
-            + ", ".join(f"{arm} {n} in {people}" for arm, (n, people) in row.counts.items())
-            for row in results.conduct
-            if row.kind == "harm"
-        ),
+        "harms_found": _harms(results),
         "unblinded": f"{revealed.count()} arms revealed, {alone} of them by one person alone.",
         "ended": f"Closed on {study.closed_at:%Y-%m-%d}." if study.closed_at else "",
+    }
+
+
+def _harms(results: Results) -> str:
+    """Return how often each harm was noted in each arm, also those that never were."""
+    counts = {row.what: row.counts for row in results.conduct}
+    came = {
+        arm: _visits(results, arm) - _visits(results, arm, Attendance.MISSED)
+        for arm in results.arms
+    }
+    return "; ".join(
+        f"{label_of(harm)}: "
+        + ", ".join(
+            f"{arm} {events} events in {people} of {len({code for code, _visit in visits})} "
+            f"participants ({len(visits)} visits)"
+            for arm, visits in came.items()
+            for events, people in [counts.get(harm, {}).get(arm, (0, 0))]
+        )
+        for harm in (*map(str, HARMS), RobotEntry.STOP.value)
+    )
+
+
+def _visits(
+    results: Results, arm: str, attendance: Attendance | None = None
+) -> set[tuple[str, int]]:
+    """Return participant and number of an arm's visits that were due; of one attendance, or all."""
+    return {
+        (one.code, visit.number)
+        for one in results.participants
+        for visit in (one.visits if one.is_analyzed else ())
+        if (visit.arm, visit.is_due) == (arm, True) and attendance in {None, visit.attendance}
     }
 
 
