@@ -190,7 +190,8 @@ def test_the_flow_counts_who_came_who_left_and_who_is_missing():
     )
     mine = sum("A" in one.arms for one in whole)
     of_a = flow([*whole, left], ["A"], "late_change")[0]
-    assert (of_a.allocated, of_a.began, of_a.completed, of_a.left) == (mine + 1, mine, mine, 1)
+    assert (of_a.allocated, of_a.began, of_a.completed, of_a.left) == (mine + 1, mine, mine, 0)
+    assert of_a.never_began == 1
     planned = 2 * mine + 1
     assert (of_a.analyzed, of_a.visits_planned, of_a.visits_walked) == (mine, planned, 2 * mine)
     assert find([*whole, left], ["A"], "late_change", crossover=False).arms[0].missing == 1

@@ -88,6 +88,8 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     consort = {row["item"]: row["answer"] for row in rows if row["list"] == "CONSORT 2025"}
     assert "1 allocated" in consort["22a"]
     assert "fall: A 0 events in 0 of 0 participants (0 visits), B" in consort["27"]
+    assert "one visit (0 of 1), as allocated" in consort["21b"]
+    assert "B: 1 never began, 0 left later, 0 removed; 2 visits missed" in consort["22b"]
     assert "robot stop: A 0 events" in consort["27"]
     assert "1 arms revealed, 1 of them by one person alone" in consort["20a"]
 

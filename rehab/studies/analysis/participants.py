@@ -196,10 +196,14 @@ def curves_by_arm(
 
 @dataclass(frozen=True, slots=True)
 class ArmFlow:
-    """An arm's column of the flow of participants (CONSORT 2025, item 22a)."""
+    """An arm's column of the flow of participants (CONSORT 2025, item 22a).
+
+    Who was allocated began, never began, or had the data removed; ``left``: of those who began.
+    """
 
     arm: str
     allocated: int
+    never_began: int
     began: int
     completed: int
     left: int
@@ -225,15 +229,18 @@ def _flow_of(participants: Sequence[Participant], arm: str, primary: str) -> Arm
     mine = [one for one in participants if arm in one.arms]
     visits = [[visit for visit in one.visits if visit.arm == arm] for one in mine]
     became = Counter(visit.attendance for of_one in visits for visit in of_one)
+    began = [any(visit.is_walked for visit in of_one) for of_one in visits]
+    removed = sum(not one.is_analyzed for one in mine)
     return ArmFlow(
         arm,
         allocated=len(mine),
-        began=sum(any(visit.is_walked for visit in of_one) for of_one in visits),
+        never_began=len(mine) - sum(began) - removed,
+        began=sum(began),
         completed=sum(
             all(visit.attendance is Attendance.FINISHED for visit in of_one) for of_one in visits
         ),
-        left=sum(one.has_left for one in mine),
-        removed=sum(not one.is_analyzed for one in mine),
+        left=sum(one.has_left and walked for one, walked in zip(mine, began, strict=True)),
+        removed=removed,
         analyzed=sum(one.outcome(primary, arm) is not None for one in mine),
         visits_planned=sum(visit.is_due for of_one in visits for visit in of_one),
         visits_walked=sum(visit.is_walked for of_one in visits for visit in of_one),

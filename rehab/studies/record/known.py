@@ -27,6 +27,10 @@ CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
+POPULATIONS = (
+    "Intention to treat: all allocated who walked at least one visit{counted}, as allocated. Per "
+    "protocol: without visits that deviated."
+)
 UNMASKED = "Outcome computed by software, participants and therapists not blinded."
 HARMS_FOLLOWED = (
     "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
@@ -88,8 +92,7 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "concealment": CONCEALED,
         "implementation": "Therapists and leads enroll; GARRY assigns; assessors can do neither.",
         "analysis": f"{SUMMARY[document['design']]} {METHOD}",
-        "populations": "Intention to treat: all visits that were walked, as allocated. Per "
-        "protocol: without visits that deviated.",
+        "populations": POPULATIONS.format(counted=""),
         "missing": "As the model expects (at random); beside it how far missing visits would have "
         "to lie to change the conclusion (tipping point).",
         "further": "Exploratory outcomes are named so. Carry-over is estimated in crossovers."
@@ -156,14 +159,21 @@ def _found(study: Study, results: Results) -> dict[str, str]:
     kinds = StudyEvent.Kind
     revealed = study.events.filter(kind__in=(kinds.UNBLINDED, kinds.EMERGENCY))
     alone = revealed.filter(about="alone").count()
+    walked = sum(any(visit.is_walked for visit in one.visits) for one in results.participants)
     return {
         "flow": f"{assessed.people} assessed, {assessed.turned_away} turned away; "
         + "; ".join(
-            f"{one.arm}: {one.allocated} allocated, {one.began} began, {one.completed} completed, "
-            f"{one.analyzed} analyzed"
+            f"{one.arm}: {one.allocated} allocated, {one.never_began} never began, "
+            f"{one.began} began, {one.completed} completed, {one.analyzed} analyzed"
             for one in flow
         ),
-        "losses": "; ".join(f"{one.arm}: {one.left} left, {one.removed} removed" for one in flow),
+        "populations": POPULATIONS.format(counted=f" ({walked} of {len(results.participants)})"),
+        "losses": "; ".join(
+            f"{one.arm}: {one.never_began} never began, {one.left} left later, {one.removed} "
+            f"removed; {len(_visits(results, one.arm, Attendance.MISSED))} visits missed, "
+            f"{one.visits_excluded} excluded"
+            for one in flow
+        ),
         "delivered": "; ".join(
             f"{one.arm}: {one.visits_walked} of {one.visits_planned} visits walked, "
             f"{one.visits_unfinished} ended early"

@@ -126,12 +126,13 @@ def draw_consort(results: Results) -> str:
             excluded = one.visits_excluded
             words = ngettext("%(count)d session excluded", "%(count)d sessions excluded", excluded)
             left.append(words % {"count": excluded})
+        before = [_n(gettext("never began"), one.never_began)] if one.never_began else []
         if one.removed:
-            left.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
+            before.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
         visits = {"walked": one.visits_walked, "planned": one.visits_planned}
         columns.append(
             [
-                Box(results.arms[one.arm], (_n(gettext("allocated"), one.allocated),)),
+                Box(results.arms[one.arm], (_n(gettext("allocated"), one.allocated), *before)),
                 Box(
                     _n(gettext("began"), one.began),
                     (
