@@ -322,6 +322,9 @@ def test_missing_visits_move_the_difference_by_their_share_and_as_many_imputatio
     assert shifted.value == pytest.approx(np.mean(estimates), abs=0.1)
     assert shifted.error == pytest.approx(total**0.5, rel=0.1)
     tipping = found.missing.tipping_point(0.95)
+    assert found.tipping_point(None, None) == found.tipping_point(found.p, 0.05) == tipping
+    assert found.tipping_point(2 * found.p, 0.05) == found.missing.tipping_point(0.975) < tipping
+    assert found.tipping_point(0.06, None) is None  # by Holm nothing is found
     low, _high = found.missing.shifted(tipping).interval(0.95)
     assert low == pytest.approx(0, abs=1e-9)
     swapped = [replace(one, arm="BA"["AB".index(one.arm)]) for one in observed]

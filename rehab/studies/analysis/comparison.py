@@ -75,6 +75,19 @@ class Difference:
         """Two-sided p of no difference, of this comparison alone."""
         return None if self.estimate is None else self.estimate.p
 
+    def tipping_point(self, adjusted: float | None, level: float | None) -> float | None:
+        """Return the least shift of missing visits at which p by Holm is above a level.
+
+        Parameters
+        ----------
+        adjusted, level
+            p by Holm, None of a comparison alone; below which it is found, None for 5 %.
+        """
+        if self.missing is None or self.p is None:
+            return None
+        share = self.p / adjusted if adjusted else 1.0  # of the level, that Holm leaves it
+        return self.missing.tipping_point(1 - share * (level or 1 - CONFIDENCE))
+
     def is_not_inferior(
         self, margin: float, *, higher_is_better: bool, confidence: float = CONFIDENCE
     ) -> bool | None:

@@ -27,6 +27,7 @@ CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
+UNADJUSTED = "95 % intervals not adjusted for multiplicity."
 POPULATIONS = (
     "Intention to treat: all allocated who walked at least one visit{counted}, as allocated. Per "
     "protocol: without visits that deviated."
@@ -180,7 +181,9 @@ def _found(study: Study, results: Results) -> dict[str, str]:
             for one in flow
         ),
         "baseline": "; ".join(filter(None, (_baseline(results, arm) for arm in study.arms.all()))),
-        "estimates": " ".join(_estimates(results, slug) for slug in results.registered),
+        "estimates": " ".join(
+            (*(_estimates(results, slug) for slug in results.registered), UNADJUSTED)
+        ),
         "harms_found": _harms(results),
         "unblinded": f"{revealed.count()} arms revealed, {alone} of them by one person alone.",
         "ended": f"Closed on {study.closed_at:%Y-%m-%d}." if study.closed_at else "",

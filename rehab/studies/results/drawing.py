@@ -100,7 +100,9 @@ def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
             ForestRow(name_pair(results, one.group, one.reference), one, strong=is_first)
             for one in results.find(slug).differences
         ]
-    return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its interval (95 %)"))
+    return draw_forest(
+        rows, title, gettext("Hedges’ g with 95 % intervals, not adjusted for multiplicity")
+    )
 
 
 def name_pair(results: Results, group: str, reference: str) -> str:

@@ -203,6 +203,17 @@ class Results:
             found |= dict(zip(p, holm(list(p.values())), strict=True))
         return found
 
+    def tipping_point(self, slug: str, one: Difference) -> float | None:
+        """Return how far missing visits would have to lie to change a conclusion, by Holm's p.
+
+        Parameters
+        ----------
+        slug, one
+            The outcome's; a difference of it.
+        """
+        adjusted = self.adjusted_p.get((slug, one.group, one.reference))
+        return one.tipping_point(adjusted, self.level if slug == self.primary else None)
+
     def is_not_inferior(self, slug: str, one: Difference) -> bool | None:
         """Return whether a group is not worse by the margin; None where that is not asked.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
-from rehab.studies.analysis.comparison import CONFIDENCE, Difference
+from rehab.studies.analysis.comparison import Difference
 from rehab.studies.analysis.findings import OutcomeResult, has_departed, observations
 from rehab.studies.analysis.participants import ParticipantVisit
 from rehab.studies.registration.outcome_changes import OutcomeChange
@@ -123,6 +123,7 @@ def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
                 "level": results.level if slug == results.primary else None,
                 "not_inferior": results.is_not_inferior(slug, found),
                 **_sensitivity(outcome, found),
+                "tipping_point": results.tipping_point(slug, found),
             }
 
 
@@ -135,7 +136,6 @@ def _sensitivity(outcome: OutcomeResult, found: Difference) -> dict[str, Any]:
         "per_protocol_high_95": followed and followed.difference.high,
         "missing_visits": missing and missing.visits[0],
         "missing_visits_reference": missing and missing.visits[1],
-        "tipping_point": missing and missing.tipping_point(CONFIDENCE),
     }
 
 
