@@ -48,6 +48,8 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
     assert "non-inferiority by 2" in rows["CONSORT 2025", "9"]["answer"]
     assert "6 months or more since the stroke" in rows["WHO", "14"]["answer"]
+    assert "in percent of the first visit's baseline" in rows["CONSORT 2025", "14"]["answer"]
+    assert rows["WHO", "19"]["answer"] in rows["SPIRIT 2025", "16"]["answer"]
     assert "pocock" in rows["SPIRIT 2025", "28b"]["answer"]
     assert rows["SPIRIT 2025", "30"]["still asked"] == str(ASKED["ethics"])
     assert rows["CONSORT 2025", "30"]["still asked"] == BY_HAND

@@ -22,7 +22,7 @@ NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 ITEMS = {
     "SPIRIT 2025": """
         1a | title says it is a protocol, and the design | simulated scientific_title masked
-        1b | structured summary | title design arms outcomes
+        1b | structured summary | title design arms primary
         2 | version and date | version
         3a | who wrote it | contributors
         3b | sponsor, contact | sponsor
@@ -46,7 +46,7 @@ ITEMS = {
         15b | when they are changed or stopped | adherence
         15c | adherence | adherence
         15d | concomitant care | concomitant
-        16 | outcomes | outcomes
+        16 | outcomes | primary secondary
         17 | harms | harms_defined harms
         18 | timeline | timeline
         19 | sample size | participants size
@@ -91,7 +91,7 @@ ITEMS = {
         12a | eligibility of participants | eligibility
         12b | sites and providers | provider
         13 | interventions | arms phases
-        14 | outcomes | outcomes
+        14 | outcomes | primary secondary
         15 | how harms were assessed | harms_defined harms
         16a | sample size | participants size
         16b | interim analyses, stopping | looks stopping
@@ -149,8 +149,8 @@ ITEMS = {
         16 | first enrollment | dates
         17 | size, planned and reached | participants flow
         18 | status | status simulated
-        19 | primary outcome | outcomes
-        20 | secondary outcomes | outcomes
+        19 | primary outcome | primary
+        20 | secondary outcomes | secondary
         21 | ethics | ethics
         22 | completion | ended
         23 | summary of results | estimates

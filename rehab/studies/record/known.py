@@ -8,7 +8,7 @@ from typing import Any
 from rehab.sessions.log import RobotEntry
 from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
-from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.outcomes import OUTCOMES, scale_of
 from rehab.studies.analysis.participants import Attendance
 from rehab.studies.models import Arm, Study, StudyMark
 from rehab.studies.participants import StudyEvent
@@ -62,8 +62,7 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
     ratio = ":".join(str(group["weight"]) for group in allocation["groups"])
     framework = f"non-inferiority by {plan['margin']:g}" if "margin" in plan else "superiority"
     factors = ", ".join(factor["name"] for factor in allocation["factors"]) or "none"
-    [primary, *_secondary] = list(estimands(document))
-    names = [OUTCOMES.get(slug, (slug, ""))[0] for slug in document["secondary_outcomes"]]
+    [primary, *others] = list(estimands(document))
     spending = plan.get("spending")
     walked: dict[str, str] = {}  # the arms of each sequence of phases
     for arm in arms:
@@ -82,7 +81,8 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "phases": f"Goal: {document['goal_percent_of_baseline']:g} % of the baseline. "
         + "; ".join(f"{codes}: {phases}" for phases, codes in walked.items()),
         "eligibility": primary["population"],
-        "outcomes": f"Primary: {primary['variable']} Secondary: {', '.join(names) or 'none'}.",
+        "primary": f"Primary: {primary['variable']}",
+        "secondary": f"Secondary: {' '.join(one['variable'] for one in others) or 'none.'}",
         "timeline": f"Visits{' in each period' * crossed}: {visits['in_each_period']}, days "
         f"between them: {visits['days_between']}"
         + f", between periods: {visits['days_between_periods']}" * crossed
@@ -233,7 +233,7 @@ def _baseline(results: Results, arm: Arm) -> str:
 
 def _estimates(results: Results, slug: str) -> str:
     """Return an outcome's numbers, means and differences, with 95 % intervals."""
-    found, (label, unit) = results.find(slug), OUTCOMES[slug]
+    found, label, unit = results.find(slug), OUTCOMES[slug][0], scale_of(slug)
     means = (f"{one.arm} {one.participants} people, {_text(one.mean)}" for one in found.arms)
     apart = (
         f"{one.group} - {one.reference} {_text(one.difference)}" + _p(results, slug, one)

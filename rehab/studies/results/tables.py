@@ -8,6 +8,7 @@ from typing import Any
 
 from rehab.studies.analysis.comparison import Difference
 from rehab.studies.analysis.findings import OutcomeResult, has_departed, observations
+from rehab.studies.analysis.outcomes import scale_of
 from rehab.studies.analysis.participants import ParticipantVisit
 from rehab.studies.registration.outcome_changes import OutcomeChange
 from rehab.studies.results.results import Results
@@ -15,7 +16,7 @@ from rehab.studies.results.results import Results
 INTERVAL = "low_95", "high_95"
 PAIR = "outcome", "group", "reference"
 VISIT = "participant", "group", "visit", "attendance"
-STATUS = "status", "since_version", "dropped_in_version"
+STATUS = "unit", "status", "since_version", "dropped_in_version"
 # The columns of tables that may have no row; of outcomes and guesses those of every study.
 HEADERS: dict[str, tuple[str, ...]] = {
     "outcomes": (*VISIT, "outcome", *STATUS, "value", "arm", "period", "baseline", "per_protocol"),
@@ -84,9 +85,10 @@ def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
 
 
 def _status(results: Results, slug: str) -> dict[str, Any]:
-    """Return the columns that say as what an outcome was registered, and in which versions."""
+    """Return an outcome's unit, as what it was registered, and in which versions."""
     one = results.registered.get(slug)
     return {
+        "unit": scale_of(slug),
         "status": "exploratory" if one is None else one.status,
         "since_version": one and one.since,
         "dropped_in_version": one and one.dropped_in,
