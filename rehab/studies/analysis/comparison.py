@@ -37,6 +37,13 @@ class Interval:
         low, high = (None if end is None else factor * end for end in (self.low, self.high))
         return Interval(factor * self.estimate, low, high)
 
+    def within(self, least: float, most: float) -> Interval:
+        """Return the same cut at the bounds that a value can have."""
+        ends = (
+            None if end is None else min(max(end, least), most) for end in (self.low, self.high)
+        )
+        return Interval(self.estimate, *ends)
+
 
 @dataclass(frozen=True, slots=True)
 class Difference:

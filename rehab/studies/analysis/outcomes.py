@@ -195,6 +195,7 @@ MEANINGS = {
 LOWER_IS_BETTER = frozenset(
     {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"}
 )
+BOUNDS = {"hit_rate": (0.0, 1.0), "invalid_strides": (0.0, 100.0)}  # where intervals are cut
 # Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
     slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from statistics import mean, stdev
 from typing import Any
 
@@ -27,7 +28,10 @@ CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
-UNADJUSTED = "95 % intervals not adjusted for multiplicity."
+UNADJUSTED = (
+    "95 % intervals not adjusted for multiplicity; of shares cut at none and all. Means and "
+    "differences by the model."
+)
 POPULATIONS = (
     "Intention to treat: all allocated who walked at least one visit{counted}, as allocated. Per "
     "protocol: without visits that deviated."
@@ -234,13 +238,24 @@ def _baseline(results: Results, arm: Arm) -> str:
 def _estimates(results: Results, slug: str) -> str:
     """Return an outcome's numbers, means and differences, with 95 % intervals."""
     found, label, unit = results.find(slug), OUTCOMES[slug][0], scale_of(slug)
-    means = (f"{one.arm} {one.participants} people, {_text(one.mean)}" for one in found.arms)
+    means = (
+        f"{one.arm} {one.participants} people ({_by_visit(results, slug, one.arm)}), adjusted mean "
+        f"{_text(one.mean)}"
+        for one in found.arms
+    )
     apart = (
         f"{one.group} - {one.reference} {_text(one.difference)}" + _p(results, slug, one)
         for one in found.differences
     )
     status = results.registered[slug].status
     return f"{label}{unit and f' [{unit}]'} ({status}): {'; '.join((*means, *apart))}."
+
+
+def _by_visit(results: Results, slug: str, arm: str) -> str:
+    """Return how many have an outcome at each visit in an arm."""
+    visits = [visit for one in results.participants for visit in one.visits if visit.arm == arm]
+    counts = Counter(visit.number for visit in visits if slug in visit.outcomes)
+    return ", ".join(f"visit {number}: {counts[number]}" for number in sorted(counts))
 
 
 def _p(results: Results, slug: str, one: Difference) -> str:
