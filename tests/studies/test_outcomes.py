@@ -15,6 +15,7 @@ from rehab.studies.analysis.outcomes import OF_STRIDES, OUTCOMES
 from rehab.studies.analysis.participants import (
     ParticipantVisit,
     curves_by_arm,
+    distinct,
     flow,
     make_participant,
 )
@@ -195,6 +196,12 @@ def test_the_flow_counts_who_came_who_left_and_who_is_missing():
     planned = 2 * mine + 1
     assert (of_a.analyzed, of_a.visits_planned, of_a.visits_walked) == (mine, planned, 2 * mine)
     assert find([*whole, left], ["A"], "late_change", crossover=False).arms[0].missing == 1
+
+
+def test_one_variable_is_listed_once():
+    slugs = ["improvement_over_baseline", "late_change", "mean_performance", "percent_of_goal"]
+    assert distinct(people(), slugs) == slugs[:2]
+    assert distinct([], slugs) == slugs
 
 
 def test_figures_are_well_formed_and_name_every_arm_once_escaped():

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
-from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import compute_outcomes
 from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
 from rehab.studies.analysis.walk_figures import History
@@ -180,6 +182,24 @@ def by_arm(
         }
         for arm in arms
     }
+
+
+def distinct(participants: Sequence[Participant], slugs: Sequence[str]) -> list[str]:
+    """Return the outcomes that are no earlier one in another unit or from another origin.
+
+    Where the goal follows the baseline, the mean of value / goal is the improvement over it.
+    """
+    shapes: dict[object, str] = {}
+    for slug in slugs:
+        visits = [(one.code, visit) for one in participants for visit in one.visits]
+        have_it = [(code, visit) for code, visit in visits if slug in visit.outcomes]
+        values = np.array([visit.outcomes[slug] for _code, visit in have_it])
+        shape: object = slug
+        if len(values) >= MIN_PARTICIPANTS and values.std() > 0:
+            places = tuple((code, visit.number) for code, visit in have_it)
+            shape = places, tuple(((values - values.mean()) / values.std()).round(6))
+        shapes.setdefault(shape, slug)
+    return list(shapes.values())
 
 
 def curves_by_arm(

@@ -23,6 +23,7 @@ from rehab.studies.analysis.participants import (
     ArmFlow,
     Participant,
     by_arm,
+    distinct,
     flow,
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
@@ -127,12 +128,14 @@ class Results:
 
     @cached_property
     def exploratory(self) -> tuple[str, ...]:
-        """Slugs of all other outcomes that anybody has."""
+        """Slugs of all other outcomes that anybody has, one variable once."""
         if self.is_interim:
             return ()
         found = {slug for one in self.participants for v in one.visits for slug in v.outcomes}
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
-        return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
+        rest += sorted(slug for slug in found if slug.startswith(CHANNEL))
+        known = distinct(self.participants, [*self.registered, *rest])
+        return tuple(slug for slug in rest if slug in known)
 
     def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
