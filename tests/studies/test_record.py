@@ -59,6 +59,12 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     study.facts = dict.fromkeys(ASKED, "Zq")
     lacking = [row for row in checklist_rows(study, None) if row["still asked"]]
     assert {row["still asked"] for row in lacking} == {BY_HAND}
+    rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
+    assert rows["WHO", "2"]["answer"] == "See item 1."
+    assert rows["SPIRIT 2025", "15b"]["answer"] == rows["SPIRIT 2025", "28a"]["answer"] == "Zq"
+    assert "arms" in rows["SPIRIT 2025", "12"]["answer"]  # though the summary has said it
+    texts = [row["answer"] for row in rows.values()]
+    assert not [text for text in texts if "Carry-over" in text or "strata" in text]
     assert {row["list"] for row in lacking} <= {"CONSORT 2025", "TIDieR", "WHO"}
 
 

@@ -16,6 +16,7 @@ from rehab.studies.record.known import UNMASKED, know
 from rehab.studies.results.results import Results
 
 INDENT = "    "
+SUMMARY, REPEATED = "1b", {"masked", "simulated"}  # other things are said once in a list
 BY_HAND = "to be written in the report"
 NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 # List; then one line for each item: number | words | what answers it.
@@ -43,7 +44,7 @@ ITEMS = {
         14a | eligibility of participants | eligibility
         14b | eligibility of sites and providers | provider
         15a | interventions | arms phases
-        15b | when they are changed or stopped | adherence
+        15b | when they are changed or stopped | discontinuing
         15c | adherence | adherence
         15d | concomitant care | concomitant
         16 | outcomes | primary secondary
@@ -58,14 +59,14 @@ ITEMS = {
         24a | who is blinded | masked blinding
         24b | how | blinded
         24c | unblinding | unblinding
-        25a | collection of data | data
+        25a | collection of data | collected
         25b | retention | retention
         26 | management of data | data
         27a | statistical methods | analysis
         27b | who is analyzed | populations
         27c | missing data | missing
         27d | further analyses | further
-        28a | data monitoring committee | committees
+        28a | data monitoring committee | data_monitoring
         28b | interim analyses, stopping | looks stopping
         29 | monitoring of the conduct | monitoring
         30 | ethics approval | ethics
@@ -170,10 +171,14 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
     """
     answers = know(study, results) | study.facts
     for name, items in ITEMS.items():
+        said: dict[str, str] = {}  # at which item
         for line in items.strip().splitlines():
             number, words, slugs = (part.strip() for part in line.split("|"))
             named = slugs.split()
-            given = [answers[slug] for slug in named if answers.get(slug)]
+            known = [slug for slug in named if answers.get(slug)]
+            given = [f"See item {said[s]}." if s in said else answers[s] for s in known]
+            if number != SUMMARY:
+                said |= {s: said.get(s, number) for s in known if s not in REPEATED}
             asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
             lacking = [str(ASKED[slug]) for slug in asked]
             if slugs == "-" or not (given or lacking):

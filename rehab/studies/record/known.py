@@ -14,7 +14,7 @@ from rehab.studies.analysis.participants import Attendance
 from rehab.studies.models import Arm, Study, StudyMark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.document import describe
-from rehab.studies.registration.estimands import METHOD, SUMMARY, estimands
+from rehab.studies.registration.estimands import METHOD, estimands, summary
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.results.conduct import HARMS, label_of
 from rehab.studies.results.results import Results
@@ -96,12 +96,14 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "sequence": "GARRY draws it from a seed of 128 random bits; the rule is in the protocol.",
         "concealment": CONCEALED,
         "implementation": "Therapists and leads enroll; GARRY assigns; assessors can do neither.",
-        "analysis": f"{SUMMARY[document['design']]} {METHOD}",
+        "analysis": f"{summary(document)} {METHOD}",
         "populations": POPULATIONS.format(counted=""),
         "missing": "As the model expects (at random); beside it how far missing visits would have "
-        "to lie to change the conclusion (tipping point).",
-        "further": "Exploratory outcomes are named so. Carry-over is estimated in crossovers."
-        " No subgroups.",
+        "to lie to change the conclusion by Holm's p (tipping point).",
+        "further": "Exploratory outcomes are named so. "
+        + "Carry-over is estimated. " * crossed
+        + "No subgroups.",
+        "collected": "Each stride is stored as it is walked; the software computes outcomes.",
         "looks": f"By alpha spending ({spending.replace('_', ' ')})." if spending else "None.",
         "harms_defined": HARMS_FOLLOWED,
         "unblinding": "Two people, with a reason, logged; alone in an emergency, which is said.",
