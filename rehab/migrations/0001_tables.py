@@ -3259,7 +3259,11 @@ class Migration(migrations.Migration):
                             ("after_effect", "After-effect (first 20 strides)"),
                             ("baseline_change", "Change of the baseline since the first visit"),
                             ("follow_up_change", "Change at the follow-up"),
-                            ("between_visits", "From the last visit’s end to this one’s beginning"),
+                            (
+                                "between_visits",
+                                "Early training of this visit less late training of the visit "
+                                "before",
+                            ),
                             ("strides_to_success", "Strides until 80 % are hits"),
                             ("savings", "Strides saved since the last visit"),
                             ("percent_of_goal", "Real value of the goal"),

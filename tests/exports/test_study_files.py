@@ -125,7 +125,7 @@ def test_everybody_who_was_allocated_has_a_row_and_every_version_is_there(world,
         row["outcome"]: row["meaning"] for row in rows_of(files["studies/VAL/definitions.csv"])
     }
     assert "last 50" in defined["late_change"]
-    assert "first baseline" in defined["washout_change"]
+    assert "first visit's baseline" in defined["washout_change"]
     assert sum(int(row["allocated"]) for row in rows_of(files["studies/VAL/flow.csv"])) == 5
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy import optimize, stats
 
 from rehab.studies.analysis import designs
-from rehab.studies.analysis.comparison import Comparison, carry_over, compare, holm
+from rehab.studies.analysis.comparison import Comparison, Interval, carry_over, compare, holm
 from rehab.studies.analysis.designs import Observation
 
 SEED = 38
@@ -322,12 +322,20 @@ def test_missing_visits_move_the_difference_by_their_share_and_as_many_imputatio
     assert shifted.value == pytest.approx(np.mean(estimates), abs=0.1)
     assert shifted.error == pytest.approx(total**0.5, rel=0.1)
     tipping = found.missing.tipping_point(0.95)
+    assert found.tipping_point(None, None) == found.tipping_point(found.p, 0.05) == tipping
+    assert found.tipping_point(2 * found.p, 0.05) == found.missing.tipping_point(0.975) < tipping
+    assert found.tipping_point(0.06, None) is None  # by Holm nothing is found
     low, _high = found.missing.shifted(tipping).interval(0.95)
     assert low == pytest.approx(0, abs=1e-9)
     swapped = [replace(one, arm="BA"["AB".index(one.arm)]) for one in observed]
     other = one_difference(compare(swapped, ["A", "B"], crossover=False)).missing
     assert other.tipping_point(0.95) == pytest.approx(tipping)
     assert other.shifted(tipping).interval(0.95)[1] == pytest.approx(0, abs=1e-9)
+
+
+def test_an_interval_of_a_share_ends_where_shares_end():
+    assert Interval(0.8, 0.5, 1.1).within(0, 1) == Interval(0.8, 0.5, 1)
+    assert Interval(0.8).within(0, 1) == Interval(0.8)
 
 
 def test_nothing_is_missing_or_nothing_can_tip():

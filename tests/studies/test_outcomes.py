@@ -15,6 +15,7 @@ from rehab.studies.analysis.outcomes import OF_STRIDES, OUTCOMES
 from rehab.studies.analysis.participants import (
     ParticipantVisit,
     curves_by_arm,
+    distinct,
     flow,
     make_participant,
 )
@@ -190,10 +191,17 @@ def test_the_flow_counts_who_came_who_left_and_who_is_missing():
     )
     mine = sum("A" in one.arms for one in whole)
     of_a = flow([*whole, left], ["A"], "late_change")[0]
-    assert (of_a.allocated, of_a.began, of_a.completed, of_a.left) == (mine + 1, mine, mine, 1)
+    assert (of_a.allocated, of_a.began, of_a.completed, of_a.left) == (mine + 1, mine, mine, 0)
+    assert of_a.never_began == 1
     planned = 2 * mine + 1
     assert (of_a.analyzed, of_a.visits_planned, of_a.visits_walked) == (mine, planned, 2 * mine)
     assert find([*whole, left], ["A"], "late_change", crossover=False).arms[0].missing == 1
+
+
+def test_one_variable_is_listed_once():
+    slugs = ["improvement_over_baseline", "late_change", "mean_performance", "percent_of_goal"]
+    assert distinct(people(), slugs) == slugs[:2]
+    assert distinct([], slugs) == slugs
 
 
 def test_figures_are_well_formed_and_name_every_arm_once_escaped():

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
-from rehab.people.models import User
+from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.studies.agreements import agree, agreed_version, agreement_rows
@@ -19,6 +19,7 @@ from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
 from rehab.studies.record.facts import ASKED
+from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.lifecycle import close, register, revise
 from rehab.studies.results.results import read_results
@@ -47,6 +48,8 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
     assert "non-inferiority by 2" in rows["CONSORT 2025", "9"]["answer"]
     assert "6 months or more since the stroke" in rows["WHO", "14"]["answer"]
+    assert "in percent of the first visit's baseline" in rows["CONSORT 2025", "14"]["answer"]
+    assert rows["WHO", "19"]["answer"] in rows["SPIRIT 2025", "16"]["answer"]
     assert "pocock" in rows["SPIRIT 2025", "28b"]["answer"]
     assert rows["SPIRIT 2025", "30"]["still asked"] == str(ASKED["ethics"])
     assert rows["CONSORT 2025", "30"]["still asked"] == BY_HAND
@@ -56,7 +59,32 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     study.facts = dict.fromkeys(ASKED, "Zq")
     lacking = [row for row in checklist_rows(study, None) if row["still asked"]]
     assert {row["still asked"] for row in lacking} == {BY_HAND}
+    rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
+    assert rows["WHO", "2"]["answer"] == "See item 1."
+    assert rows["SPIRIT 2025", "15b"]["answer"] == rows["SPIRIT 2025", "28a"]["answer"] == "Zq"
+    assert "arms" in rows["SPIRIT 2025", "12"]["answer"]  # though the summary has said it
+    texts = [row["answer"] for row in rows.values()]
+    assert not [text for text in texts if "Carry-over" in text or "strata" in text]
     assert {row["list"] for row in lacking} <= {"CONSORT 2025", "TIDieR", "WHO"}
+
+
+def test_a_title_says_what_is_blinded_and_who_is_simulated(world):
+    study = running_study(world)
+    enrolled(study, new_patient(world))
+
+    def title():
+        study.facts = {"scientific_title": "An assessor-blinded trial"}
+        return next(row for row in checklist_rows(study, None) if row["list"] == "CONSORT 2025")
+
+    assert title()["answer"] == f"An assessor-blinded trial. {UNMASKED}"
+    assert "no assessor is marked" in title()["still asked"]
+    Patient.everywhere.update(simulated=True)
+    assert title()["answer"].startswith("Simulated: no participant was enrolled. An")
+    enrolled(study, new_patient(world, 2))
+    give_mark(study, world.people[Role.PT], Task.ASSESSOR, None, NOW)
+    assert title()["answer"].startswith("1 of the participants are simulated. An")
+    assert title()["answer"].endswith("Assessor-blinded: 1 marked.")
+    assert not title()["still asked"]
 
 
 def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
@@ -67,7 +95,10 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     rows = list(checklist_rows(study, read_results(study, NOW)))
     consort = {row["item"]: row["answer"] for row in rows if row["list"] == "CONSORT 2025"}
     assert "1 allocated" in consort["22a"]
-    assert "fall: A 0 in 0" in consort["27"]
+    assert "fall: A 0 events in 0 of 0 participants (0 visits), B" in consort["27"]
+    assert "one visit (0 of 1), as allocated" in consort["21b"]
+    assert "B: 1 never began, 0 left later, 0 removed; 2 visits missed" in consort["22b"]
+    assert "robot stop: A 0 events" in consort["27"]
     assert "1 arms revealed, 1 of them by one person alone" in consort["20a"]
 
 

@@ -29,6 +29,7 @@ from rehab.studies.registration.lifecycle import close, register, start
 from rehab.studies.registration.sealing import seal
 from rehab.studies.results.drawing import FIGURES, TABLES, write_table
 from rehab.studies.results.results import label_arms, read_results
+from rehab.studies.results.tables import HEADERS
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.study import find_or_plan
 from rehab.studies.simulation.study import walk_study as study_walks
@@ -151,6 +152,15 @@ def test_a_session_that_ended_early_counts_as_far_as_it_was_walked(world):
 def test_a_name_of_an_arm_is_no_formula_in_a_table():
     told = write_table([{"arm": "A: =1+1", "why": "x;=1+1"}, {"arm": "\r＝1", "why": None}])
     assert told == "arm,why\r\nA: =1+1,x;'=1+1\r\n\"'\r'＝1\",\r\n"
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_table_without_rows_has_the_heading_of_one_with_rows():
+    results = walk_study(example_trial(4), 7)
+    for name, header in HEADERS.items():
+        rows = list(TABLES[name](results)) if name in TABLES else []
+        assert write_table(rows, header).startswith(",".join(list(rows[0]) if rows else header))
+        assert not rows or set(rows[0]) == set(header), name
 
 
 # --- who may look ---------------------------------------------------------------------------------

@@ -18,7 +18,6 @@ from rehab.studies.analysis.comparison import Difference, carry_over, compare, h
 from rehab.studies.analysis.designs import Observation
 from rehab.studies.analysis.sequential import ALPHA, levels
 
-CONFIDENCE = 0.95
 CLOSE = 1e-9  # relative difference to the tables that rounding explains
 LOWER_IS_BETTER = {
     *("strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"),
@@ -94,6 +93,9 @@ class Trial:
             for one in differences:
                 yield self._row(slug, one) | {
                     "p_holm": adjusted.get((slug, one)),
+                    "tipping_point": one.tipping_point(
+                        adjusted.get((slug, one)), self.level if slug == self.primary else None
+                    ),
                     **_per_protocol(of_protocol.get((one.group, one.reference))),
                 }
 
@@ -121,7 +123,6 @@ class Trial:
             "not_inferior": answer,
             "missing_visits": missing and missing.visits[0],
             "missing_visits_reference": missing and missing.visits[1],
-            "tipping_point": missing and missing.tipping_point(CONFIDENCE),
         }
 
     def carry_over(self) -> Iterator[dict[str, Any]]:

@@ -29,6 +29,7 @@ from rehab.studies.record.checklists import checklist_rows
 from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.results.drawing import TABLES, write_table
 from rehab.studies.results.results import read_results
+from rehab.studies.results.tables import HEADERS
 
 PARTICIPANTS = (
     *("number", "participant", "pseudonym", "levels", "group", "version"),
@@ -71,13 +72,17 @@ def study_files(
         yield f"{folder}/verify_allocation.py", [VERIFIER.read_text("utf-8")]
         for name, text in analysis_files():
             yield f"{folder}/{name}", [text]
-        yield f"{folder}/adverse_events.csv", [write_table(listing_rows(study, by_arm=True))]
+        yield (
+            f"{folder}/adverse_events.csv",
+            [write_table(listing_rows(study, by_arm=True), HEADERS["adverse_events"])],
+        )
         yield f"{folder}/agreements.csv", [write_table(agreement_rows(study))]
         for name, table in TABLES.items():
-            cells = table(results)
+            cells, header = table(results), HEADERS.get(name, ())
             if shift_dates:
                 cells = ({key: row[key] for key in row if key != "at"} for row in cells)
-            yield f"{folder}/{name}.csv", [write_table(cells)]
+                header = tuple(key for key in header if key != "at")
+            yield f"{folder}/{name}.csv", [write_table(cells, header)]
     with override("en"):
         lists = list(checklist_rows(study, results))
     if shift_dates:  # dates of the study tell those of people

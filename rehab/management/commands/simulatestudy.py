@@ -29,6 +29,7 @@ from rehab.studies.models import Study
 from rehab.studies.record.checklists import ITEMS, checklist_rows, checklist_text
 from rehab.studies.results.drawing import FIGURES, TABLES, name_pair, write_table
 from rehab.studies.results.results import Results
+from rehab.studies.results.tables import HEADERS
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.study import find_or_plan, finish_study, walk_study
 from rehab.studies.simulation.walkers import Population
@@ -116,7 +117,10 @@ class Command(BaseCommand):
 
 def write_files(results: Results, folder: Path) -> str:
     """Write tables, figures and checklists; return the digest of the tables and figures."""
-    files = {f"{name}.csv": write_table(rows(results)) for name, rows in TABLES.items()}
+    files = {
+        f"{name}.csv": write_table(rows(results), HEADERS.get(name, ()))
+        for name, rows in TABLES.items()
+    }
     files |= {f"{name}.svg": draw(results) for name, draw in FIGURES.items()}
     folder.mkdir(parents=True, exist_ok=True)
     digest = sha256()

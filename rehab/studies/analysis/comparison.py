@@ -37,6 +37,13 @@ class Interval:
         low, high = (None if end is None else factor * end for end in (self.low, self.high))
         return Interval(factor * self.estimate, low, high)
 
+    def within(self, least: float, most: float) -> Interval:
+        """Return the same cut at the bounds that a value can have."""
+        ends = (
+            None if end is None else min(max(end, least), most) for end in (self.low, self.high)
+        )
+        return Interval(self.estimate, *ends)
+
 
 @dataclass(frozen=True, slots=True)
 class Difference:
@@ -74,6 +81,19 @@ class Difference:
     def p(self) -> float | None:
         """Two-sided p of no difference, of this comparison alone."""
         return None if self.estimate is None else self.estimate.p
+
+    def tipping_point(self, adjusted: float | None, level: float | None) -> float | None:
+        """Return the least shift of missing visits at which p by Holm is above a level.
+
+        Parameters
+        ----------
+        adjusted, level
+            p by Holm, None of a comparison alone; below which it is found, None for 5 %.
+        """
+        if self.missing is None or self.p is None:
+            return None
+        share = self.p / adjusted if adjusted else 1.0  # of the level, that Holm leaves it
+        return self.missing.tipping_point(1 - share * (level or 1 - CONFIDENCE))
 
     def is_not_inferior(
         self, margin: float, *, higher_is_better: bool, confidence: float = CONFIDENCE

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 from rehab.studies.analysis.comparison import Difference, Interval, carry_over, compare
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
+from rehab.studies.analysis.outcomes import BOUNDS
 from rehab.studies.analysis.participants import Participant
 
 # Who departed from the protocol, at which visit; None: as a whole.
@@ -15,7 +17,7 @@ Departure = tuple[str, int | None]
 
 @dataclass(frozen=True, slots=True)
 class ArmFigure:
-    """An outcome in one arm: how many have it and how many lack it, and the model's mean."""
+    """An outcome in one arm: how many have and lack it, and the model's mean, cut at `BOUNDS`."""
 
     arm: str
     participants: int
@@ -88,6 +90,7 @@ def find(
         meant = sum(one.is_analyzed and arm in one.arms for one in participants)
         have_it = {one.participant for one in observed if one.arm == arm and one.value is not None}
         mean = compared.means.get(arm)
+        mean = mean and mean.within(*BOUNDS.get(slug, (-inf, inf)))
         figures.append(ArmFigure(arm, len(have_it), meant - len(have_it), mean))
     followed = [one for one in observed if not has_departed(one, departures)]
     per_protocol = (

@@ -38,7 +38,7 @@ class Outcome:
     compute: Callable[[Walk, History], float | None]
 
 
-FIRST = "in percent of the participant's first baseline"
+OWN, FIRST = "this visit's own baseline", "in percent of the first visit's baseline"
 # What the strides themselves show; with what every session stores of itself, all of `OUTCOMES`.
 OF_STRIDES: dict[str, Outcome] = {
     outcome.slug: outcome
@@ -108,9 +108,9 @@ OF_STRIDES: dict[str, Outcome] = {
         ),
         Outcome(
             "between_visits",
-            gettext_noop("From the last visit’s end to this one’s beginning"),
+            gettext_noop("Early training of this visit less late training of the visit before"),
             "%",
-            f"Early change less the late change of the visit before, {FIRST}.",
+            f"Early change less the late change of the visit before, both with feedback, {FIRST}.",
             figures.visit_loss,
         ),
         Outcome(
@@ -153,7 +153,7 @@ OF_STRIDES: dict[str, Outcome] = {
             gettext_noop("Variation about the trend"),
             "%",
             "Standard deviation of the strides with feedback about their straight line, in percent "
-            "of the visit's baseline.",
+            f"of {OWN}.",
             figures.steadiness,
         ),
         Outcome(
@@ -188,13 +188,14 @@ MEANINGS = {
     "best_streak": "Most hits in a row.",
     "points_per_100_steps": "100 x score / judged strides.",
     "improvement_over_baseline": "Mean of the valid strides with feedback less the mean of the "
-    "visit's own baseline, in percent of the latter.",
+    f"baseline, in percent of {OWN}.",
     "steps": "Judged strides with feedback.",
     "active_minutes": "Time that was walked.",
 }
 LOWER_IS_BETTER = frozenset(
     {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"}
 )
+BOUNDS = {"hit_rate": (0.0, 1.0), "invalid_strides": (0.0, 100.0)}  # where intervals are cut
 # Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
     slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()
@@ -208,6 +209,15 @@ def define_outcomes() -> list[dict[str, str]]:
         {"outcome": slug, "label": label, "unit": unit, "meaning": meanings[slug]}
         for slug, (label, unit) in OUTCOMES.items()
     ]
+
+
+def scale_of(slug: str) -> str:
+    """Return the unit of an outcome or a further channel with what it is a percentage of."""
+    if slug not in OUTCOMES:
+        return f"% of {OWN}"
+    meaning = MEANINGS[slug] if slug in MEANINGS else OF_STRIDES[slug].meaning
+    of = (OWN in meaning and OWN) or (FIRST in meaning and FIRST.removeprefix("in percent of "))
+    return f"% of {of}" if of else OUTCOMES[slug][1]
 
 
 def compute_outcomes(walk: Walk, history: History, metrics: dict[str, float]) -> dict[str, float]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
-from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import compute_outcomes
 from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
 from rehab.studies.analysis.walk_figures import History
@@ -182,6 +184,24 @@ def by_arm(
     }
 
 
+def distinct(participants: Sequence[Participant], slugs: Sequence[str]) -> list[str]:
+    """Return the outcomes that are no earlier one in another unit or from another origin.
+
+    Where the goal follows the baseline, the mean of value / goal is the improvement over it.
+    """
+    shapes: dict[object, str] = {}
+    for slug in slugs:
+        visits = [(one.code, visit) for one in participants for visit in one.visits]
+        have_it = [(code, visit) for code, visit in visits if slug in visit.outcomes]
+        values = np.array([visit.outcomes[slug] for _code, visit in have_it])
+        shape: object = slug
+        if len(values) >= MIN_PARTICIPANTS and values.std() > 0:
+            places = tuple((code, visit.number) for code, visit in have_it)
+            shape = places, tuple(((values - values.mean()) / values.std()).round(6))
+        shapes.setdefault(shape, slug)
+    return list(shapes.values())
+
+
 def curves_by_arm(
     participants: Sequence[Participant], arms: Sequence[str]
 ) -> dict[str, list[Point]]:
@@ -196,10 +216,14 @@ def curves_by_arm(
 
 @dataclass(frozen=True, slots=True)
 class ArmFlow:
-    """An arm's column of the flow of participants (CONSORT 2025, item 22a)."""
+    """An arm's column of the flow of participants (CONSORT 2025, item 22a).
+
+    Who was allocated began, never began, or had the data removed; ``left``: of those who began.
+    """
 
     arm: str
     allocated: int
+    never_began: int
     began: int
     completed: int
     left: int
@@ -225,15 +249,18 @@ def _flow_of(participants: Sequence[Participant], arm: str, primary: str) -> Arm
     mine = [one for one in participants if arm in one.arms]
     visits = [[visit for visit in one.visits if visit.arm == arm] for one in mine]
     became = Counter(visit.attendance for of_one in visits for visit in of_one)
+    began = [any(visit.is_walked for visit in of_one) for of_one in visits]
+    removed = sum(not one.is_analyzed for one in mine)
     return ArmFlow(
         arm,
         allocated=len(mine),
-        began=sum(any(visit.is_walked for visit in of_one) for of_one in visits),
+        never_began=len(mine) - sum(began) - removed,
+        began=sum(began),
         completed=sum(
             all(visit.attendance is Attendance.FINISHED for visit in of_one) for of_one in visits
         ),
-        left=sum(one.has_left for one in mine),
-        removed=sum(not one.is_analyzed for one in mine),
+        left=sum(one.has_left and walked for one, walked in zip(mine, began, strict=True)),
+        removed=removed,
         analyzed=sum(one.outcome(primary, arm) is not None for one in mine),
         visits_planned=sum(visit.is_due for of_one in visits for visit in of_one),
         visits_walked=sum(visit.is_walked for of_one in visits for visit in of_one),

@@ -17,7 +17,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import format_number
-from rehab.studies.analysis.comparison import CONFIDENCE, Difference, Interval
+from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.findings import OutcomeResult
 from rehab.studies.guesses import GUESSERS, Guesser, group_labels, guess_rows
 from rehab.studies.models import Study
@@ -32,6 +32,7 @@ from rehab.studies.results.drawing import (
     write_table,
 )
 from rehab.studies.results.results import Results, may_look, note_look, read_results
+from rehab.studies.results.tables import HEADERS
 
 
 def _open(request: HttpRequest, study_id: int) -> tuple[Study, User]:
@@ -117,7 +118,7 @@ def _describe(results: Results, slug: str) -> dict[str, Any]:
                 "p_holm": _format_p(results.adjusted_p.get((slug, one.group, one.reference))),
                 "per_protocol": _of_protocol(found, one, unit),
                 "missing": one.missing and sum(one.missing.visits),
-                "tipping_point": _tipping_point(one, unit),
+                "tipping_point": _tipping_point(results.tipping_point(slug, one), unit),
                 "not_inferior": results.is_not_inferior(slug, one),
             }
             for one in found.differences
@@ -150,8 +151,7 @@ def _of_protocol(found: OutcomeResult, one: Difference, unit: str) -> dict[str, 
     return None if followed is None else _format_interval(followed.difference, unit)
 
 
-def _tipping_point(one: Difference, unit: str) -> str:
-    point = one.missing and one.missing.tipping_point(CONFIDENCE)
+def _tipping_point(point: float | None, unit: str) -> str:
     return f"{format_number(point, 1 if unit else 2)} {unit}".strip() if point else ""
 
 
@@ -183,7 +183,7 @@ def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
     if kind == "svg":
         response = HttpResponse(FIGURES[name](results), content_type="image/svg+xml")
     else:
-        text = write_table(TABLES[name](results))
+        text = write_table(TABLES[name](results), HEADERS.get(name, ()))
         response = HttpResponse(text, content_type="text/csv; charset=utf-8")
     response["Content-Disposition"] = f'attachment; filename="{study.code}-{name}.{kind}"'
     return response

@@ -12,16 +12,18 @@ from textwrap import fill
 
 from rehab.studies.models import Study
 from rehab.studies.record.facts import ASKED
-from rehab.studies.record.known import know
+from rehab.studies.record.known import UNMASKED, know
 from rehab.studies.results.results import Results
 
 INDENT = "    "
+SUMMARY, REPEATED = "1b", {"masked", "simulated"}  # other things are said once in a list
 BY_HAND = "to be written in the report"
+NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 # List; then one line for each item: number | words | what answers it.
 ITEMS = {
     "SPIRIT 2025": """
-        1a | title says it is a protocol, and the design | scientific_title
-        1b | structured summary | title design arms outcomes
+        1a | title says it is a protocol, and the design | simulated scientific_title masked
+        1b | structured summary | title design arms primary
         2 | version and date | version
         3a | who wrote it | contributors
         3b | sponsor, contact | sponsor
@@ -42,10 +44,10 @@ ITEMS = {
         14a | eligibility of participants | eligibility
         14b | eligibility of sites and providers | provider
         15a | interventions | arms phases
-        15b | when they are changed or stopped | adherence
+        15b | when they are changed or stopped | discontinuing
         15c | adherence | adherence
         15d | concomitant care | concomitant
-        16 | outcomes | outcomes
+        16 | outcomes | primary secondary
         17 | harms | harms_defined harms
         18 | timeline | timeline
         19 | sample size | participants size
@@ -54,17 +56,17 @@ ITEMS = {
         21b | type of randomization | allocation
         22 | concealment | concealment
         23 | implementation | implementation
-        24a | who is blinded | blinding blinded
-        24b | how | blinding
+        24a | who is blinded | masked blinding
+        24b | how | blinded
         24c | unblinding | unblinding
-        25a | collection of data | data
+        25a | collection of data | collected
         25b | retention | retention
         26 | management of data | data
         27a | statistical methods | analysis
         27b | who is analyzed | populations
         27c | missing data | missing
         27d | further analyses | further
-        28a | data monitoring committee | committees
+        28a | data monitoring committee | data_monitoring
         28b | interim analyses, stopping | looks stopping
         29 | monitoring of the conduct | monitoring
         30 | ethics approval | ethics
@@ -74,7 +76,7 @@ ITEMS = {
         33 | confidentiality | confidentiality
         34 | care after the trial | aftercare""",
     "CONSORT 2025": """
-        1a | title says randomized | scientific_title
+        1a | title says randomized | simulated scientific_title masked
         1b | structured summary | -
         2 | registration | registry
         3 | protocol and analysis plan | plan
@@ -90,7 +92,7 @@ ITEMS = {
         12a | eligibility of participants | eligibility
         12b | sites and providers | provider
         13 | interventions | arms phases
-        14 | outcomes | outcomes
+        14 | outcomes | primary secondary
         15 | how harms were assessed | harms_defined harms
         16a | sample size | participants size
         16b | interim analyses, stopping | looks stopping
@@ -98,8 +100,8 @@ ITEMS = {
         17b | type of randomization | allocation
         18 | concealment | concealment
         19 | implementation | implementation
-        20a | who was blinded | blinding blinded unblinded
-        20b | how | blinding
+        20a | who was blinded | masked blinding unblinded
+        20b | how | blinded
         21a | statistical methods | analysis
         21b | who is analyzed | populations
         21c | missing data | missing
@@ -138,8 +140,8 @@ ITEMS = {
         6 | further sponsors | secondary_sponsors
         7 | contact for the public | contact_public
         8 | contact for science | contact_scientific
-        9 | public title | title
-        10 | scientific title | scientific_title
+        9 | public title | simulated title
+        10 | scientific title | simulated scientific_title masked
         11 | countries | countries
         12 | condition | condition
         13 | interventions | arms
@@ -147,9 +149,9 @@ ITEMS = {
         15 | type | design allocation
         16 | first enrollment | dates
         17 | size, planned and reached | participants flow
-        18 | status | status
-        19 | primary outcome | outcomes
-        20 | secondary outcomes | outcomes
+        18 | status | status simulated
+        19 | primary outcome | primary
+        20 | secondary outcomes | secondary
         21 | ethics | ethics
         22 | completion | ended
         23 | summary of results | estimates
@@ -169,14 +171,20 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
     """
     answers = know(study, results) | study.facts
     for name, items in ITEMS.items():
+        said: dict[str, str] = {}  # at which item
         for line in items.strip().splitlines():
             number, words, slugs = (part.strip() for part in line.split("|"))
             named = slugs.split()
-            given = [answers[slug] for slug in named if answers.get(slug)]
+            known = [slug for slug in named if answers.get(slug)]
+            given = [f"See item {said[s]}." if s in said else answers[s] for s in known]
+            if number != SUMMARY:
+                said |= {s: said.get(s, number) for s in known if s not in REPEATED}
             asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
             lacking = [str(ASKED[slug]) for slug in asked]
             if slugs == "-" or not (given or lacking):
                 lacking = [BY_HAND]
+            if "masked" in named and UNMASKED in answers["masked"] and _says_blinded(given):
+                lacking.append(NO_ASSESSOR)
             yield {
                 "list": name,
                 "item": number,
@@ -184,6 +192,10 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "answer": " ".join([*(f"{one.rstrip('.')}." for one in given[:-1]), *given[-1:]]),
                 "still asked": "; ".join(lacking),
             }
+
+
+def _says_blinded(given: Iterable[str]) -> bool:
+    return any("assessor-blind" in one.lower().replace(" ", "-") for one in given)
 
 
 def checklist_text(rows: Iterable[dict[str, str]], name: str) -> str:

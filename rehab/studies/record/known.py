@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from statistics import mean, stdev
 from typing import Any
 
+from rehab.sessions.log import RobotEntry
 from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
-from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.outcomes import OUTCOMES, scale_of
+from rehab.studies.analysis.participants import Attendance
 from rehab.studies.models import Arm, Study, StudyMark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.document import describe
-from rehab.studies.registration.estimands import METHOD, SUMMARY, estimands
+from rehab.studies.registration.estimands import METHOD, estimands, summary
 from rehab.studies.registration.outcome_changes import outcome_changes
+from rehab.studies.results.conduct import HARMS, label_of
 from rehab.studies.results.results import Results
 
 METHODS = {
@@ -24,7 +28,16 @@ CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
-HARMS = (
+UNADJUSTED = (
+    "95 % intervals not adjusted for multiplicity; of shares cut at none and all. Means and "
+    "differences by the model."
+)
+POPULATIONS = (
+    "Intention to treat: all allocated who walked at least one visit{counted}, as allocated. Per "
+    "protocol: without visits that deviated."
+)
+UNMASKED = "Outcome computed by software, participants and therapists not blinded."
+HARMS_FOLLOWED = (
     "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
     "themselves and are offered as adverse events, each with severity, relation, expectedness and "
     "the day by which it has to be reported."
@@ -53,8 +66,7 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
     ratio = ":".join(str(group["weight"]) for group in allocation["groups"])
     framework = f"non-inferiority by {plan['margin']:g}" if "margin" in plan else "superiority"
     factors = ", ".join(factor["name"] for factor in allocation["factors"]) or "none"
-    [primary, *_secondary] = list(estimands(document))
-    names = [OUTCOMES.get(slug, (slug, ""))[0] for slug in document["secondary_outcomes"]]
+    [primary, *others] = list(estimands(document))
     spending = plan.get("spending")
     walked: dict[str, str] = {}  # the arms of each sequence of phases
     for arm in arms:
@@ -73,7 +85,8 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "phases": f"Goal: {document['goal_percent_of_baseline']:g} % of the baseline. "
         + "; ".join(f"{codes}: {phases}" for phases, codes in walked.items()),
         "eligibility": primary["population"],
-        "outcomes": f"Primary: {primary['variable']} Secondary: {', '.join(names) or 'none'}.",
+        "primary": f"Primary: {primary['variable']}",
+        "secondary": f"Secondary: {' '.join(one['variable'] for one in others) or 'none.'}",
         "timeline": f"Visits{' in each period' * crossed}: {visits['in_each_period']}, days "
         f"between them: {visits['days_between']}"
         + f", between periods: {visits['days_between_periods']}" * crossed
@@ -83,15 +96,16 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "sequence": "GARRY draws it from a seed of 128 random bits; the rule is in the protocol.",
         "concealment": CONCEALED,
         "implementation": "Therapists and leads enroll; GARRY assigns; assessors can do neither.",
-        "analysis": f"{SUMMARY[document['design']]} {METHOD}",
-        "populations": "Intention to treat: all visits that were walked, as allocated. Per "
-        "protocol: without visits that deviated.",
+        "analysis": f"{summary(document)} {METHOD}",
+        "populations": POPULATIONS.format(counted=""),
         "missing": "As the model expects (at random); beside it how far missing visits would have "
-        "to lie to change the conclusion (tipping point).",
-        "further": "Exploratory outcomes are named so. Carry-over is estimated in crossovers."
-        " No subgroups.",
+        "to lie to change the conclusion by Holm's p (tipping point).",
+        "further": "Exploratory outcomes are named so. "
+        + "Carry-over is estimated. " * crossed
+        + "No subgroups.",
+        "collected": "Each stride is stored as it is walked; the software computes outcomes.",
         "looks": f"By alpha spending ({spending.replace('_', ' ')})." if spending else "None.",
-        "harms_defined": HARMS,
+        "harms_defined": HARMS_FOLLOWED,
         "unblinding": "Two people, with a reason, logged; alone in an emergency, which is said.",
         "confidentiality": "Pseudonyms; exports by roles, logged; erasure on demand.",
         "consents": "Each consent to research names its text's version; a new version of the study "
@@ -131,8 +145,20 @@ def _conducted(study: Study) -> dict[str, str]:
         "changes": "; ".join((*changes, *map(str, outcome_changes(study)))) or "None.",
         "dates": ", ".join(f"{name} {at:%Y-%m-%d}" for name, at in dates.items() if at),
         "status": str(study.state),
-        "blinded": f"{assessors} assessors are kept from sessions, arms and boards by GARRY.",
+        "masked": f"Assessor-blinded: {assessors} marked." if assessors else UNMASKED,
+        "blinded": "Who is marked as an assessor is kept from sessions, arms and boards by GARRY.",
+        "simulated": _simulated(study),
     }  # fmt: skip
+
+
+def _simulated(study: Study) -> str:
+    """Return how many participants are no people; "" where all are people."""
+    simulated = study.enrollments.filter(patient__simulated=True).count()
+    if not simulated:
+        return ""
+    if simulated == study.enrollments.count():
+        return "Simulated: no participant was enrolled."
+    return f"{simulated} of the participants are simulated."
 
 
 def _found(study: Study, results: Results) -> dict[str, str]:
@@ -140,29 +166,64 @@ def _found(study: Study, results: Results) -> dict[str, str]:
     kinds = StudyEvent.Kind
     revealed = study.events.filter(kind__in=(kinds.UNBLINDED, kinds.EMERGENCY))
     alone = revealed.filter(about="alone").count()
+    walked = sum(any(visit.is_walked for visit in one.visits) for one in results.participants)
     return {
         "flow": f"{assessed.people} assessed, {assessed.turned_away} turned away; "
         + "; ".join(
-            f"{one.arm}: {one.allocated} allocated, {one.began} began, {one.completed} completed, "
-            f"{one.analyzed} analyzed"
+            f"{one.arm}: {one.allocated} allocated, {one.never_began} never began, "
+            f"{one.began} began, {one.completed} completed, {one.analyzed} analyzed"
             for one in flow
         ),
-        "losses": "; ".join(f"{one.arm}: {one.left} left, {one.removed} removed" for one in flow),
+        "populations": POPULATIONS.format(counted=f" ({walked} of {len(results.participants)})"),
+        "losses": "; ".join(
+            f"{one.arm}: {one.never_began} never began, {one.left} left later, {one.removed} "
+            f"removed; {len(_visits(results, one.arm, Attendance.MISSED))} visits missed, "
+            f"{one.visits_excluded} excluded"
+            for one in flow
+        ),
         "delivered": "; ".join(
             f"{one.arm}: {one.visits_walked} of {one.visits_planned} visits walked, "
             f"{one.visits_unfinished} ended early"
             for one in flow
         ),
         "baseline": "; ".join(filter(None, (_baseline(results, arm) for arm in study.arms.all()))),
-        "estimates": " ".join(_estimates(results, slug) for slug in results.registered),
-        "harms_found": "; ".join(
-            f"{row.what}: "
-            + ", ".join(f"{arm} {n} in {people}" for arm, (n, people) in row.counts.items())
-            for row in results.conduct
-            if row.kind == "harm"
+        "estimates": " ".join(
+            (*(_estimates(results, slug) for slug in results.registered), UNADJUSTED)
         ),
+        "harms_found": _harms(results),
         "unblinded": f"{revealed.count()} arms revealed, {alone} of them by one person alone.",
         "ended": f"Closed on {study.closed_at:%Y-%m-%d}." if study.closed_at else "",
+    }
+
+
+def _harms(results: Results) -> str:
+    """Return how often each harm was noted in each arm, also those that never were."""
+    counts = {row.what: row.counts for row in results.conduct}
+    came = {
+        arm: _visits(results, arm) - _visits(results, arm, Attendance.MISSED)
+        for arm in results.arms
+    }
+    return "; ".join(
+        f"{label_of(harm)}: "
+        + ", ".join(
+            f"{arm} {events} events in {people} of {len({code for code, _visit in visits})} "
+            f"participants ({len(visits)} visits)"
+            for arm, visits in came.items()
+            for events, people in [counts.get(harm, {}).get(arm, (0, 0))]
+        )
+        for harm in (*map(str, HARMS), RobotEntry.STOP.value)
+    )
+
+
+def _visits(
+    results: Results, arm: str, attendance: Attendance | None = None
+) -> set[tuple[str, int]]:
+    """Return participant and number of an arm's visits that were due; of one attendance, or all."""
+    return {
+        (one.code, visit.number)
+        for one in results.participants
+        for visit in (one.visits if one.is_analyzed else ())
+        if (visit.arm, visit.is_due) == (arm, True) and attendance in {None, visit.attendance}
     }
 
 
@@ -178,14 +239,25 @@ def _baseline(results: Results, arm: Arm) -> str:
 
 def _estimates(results: Results, slug: str) -> str:
     """Return an outcome's numbers, means and differences, with 95 % intervals."""
-    found, (label, unit) = results.find(slug), OUTCOMES[slug]
-    means = (f"{one.arm} {one.participants} people, {_text(one.mean)}" for one in found.arms)
+    found, label, unit = results.find(slug), OUTCOMES[slug][0], scale_of(slug)
+    means = (
+        f"{one.arm} {one.participants} people ({_by_visit(results, slug, one.arm)}), adjusted mean "
+        f"{_text(one.mean)}"
+        for one in found.arms
+    )
     apart = (
         f"{one.group} - {one.reference} {_text(one.difference)}" + _p(results, slug, one)
         for one in found.differences
     )
     status = results.registered[slug].status
     return f"{label}{unit and f' [{unit}]'} ({status}): {'; '.join((*means, *apart))}."
+
+
+def _by_visit(results: Results, slug: str, arm: str) -> str:
+    """Return how many have an outcome at each visit in an arm."""
+    visits = [visit for one in results.participants for visit in one.visits if visit.arm == arm]
+    counts = Counter(visit.number for visit in visits if slug in visit.outcomes)
+    return ", ".join(f"visit {number}: {counts[number]}" for number in sorted(counts))
 
 
 def _p(results: Results, slug: str, one: Difference) -> str:

@@ -9,7 +9,7 @@ from rehab.studies.analysis.outcomes import OUTCOMES, define_outcomes
 
 SUMMARY = {
     "parallel": "Difference of the arms' means over the visits that all arms have, adjusted for "
-    "visit, first baseline and strata of the allocation.",
+    "visit and first baseline.",
     "crossover": "Difference within people between the arms, adjusted for visit and with it the "
     "period.",
 }
@@ -26,6 +26,14 @@ METHOD = (
     "Secondary outcomes, and pairs of several arms, by Holm. Per protocol: without visits that "
     "deviated."
 )
+
+
+def summary(document: dict[str, Any]) -> str:
+    """Return what is estimated of each outcome. ``document``: of a study's version."""
+    text = SUMMARY[document["design"]]
+    if document["design"] == "parallel" and document["allocation"]["factors"]:
+        return text.replace(" and first baseline", ", first baseline and strata of the allocation")
+    return text
 
 
 def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -47,5 +55,5 @@ def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
             "treatments": [f"{arm['code']}: {arm['name']}" for arm in document["arms"]],
             "variable": f"{OUTCOMES[slug][0]}: {meanings[slug]}" if slug in OUTCOMES else slug,
             "intercurrent_events": dict(EVENTS),
-            "summary": SUMMARY[document["design"]],
+            "summary": summary(document),
         }

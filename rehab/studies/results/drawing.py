@@ -100,7 +100,9 @@ def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
             ForestRow(name_pair(results, one.group, one.reference), one, strong=is_first)
             for one in results.find(slug).differences
         ]
-    return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its interval (95 %)"))
+    return draw_forest(
+        rows, title, gettext("Hedges’ g with 95 % intervals, not adjusted for multiplicity")
+    )
 
 
 def name_pair(results: Results, group: str, reference: str) -> str:
@@ -126,12 +128,13 @@ def draw_consort(results: Results) -> str:
             excluded = one.visits_excluded
             words = ngettext("%(count)d session excluded", "%(count)d sessions excluded", excluded)
             left.append(words % {"count": excluded})
+        before = [_n(gettext("never began"), one.never_began)] if one.never_began else []
         if one.removed:
-            left.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
+            before.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
         visits = {"walked": one.visits_walked, "planned": one.visits_planned}
         columns.append(
             [
-                Box(results.arms[one.arm], (_n(gettext("allocated"), one.allocated),)),
+                Box(results.arms[one.arm], (_n(gettext("allocated"), one.allocated), *before)),
                 Box(
                     _n(gettext("began"), one.began),
                     (
@@ -194,11 +197,19 @@ def is_shown(results: Results, name: str) -> bool:
     return not results.is_interim or name in INTERIM
 
 
-def write_table(rows: Iterable[dict[str, Any]]) -> str:
-    """Return rows as CSV with a heading; numbers with a point, what is missing empty."""
+def write_table(rows: Iterable[dict[str, Any]], header: Iterable[str] = ()) -> str:
+    """Return rows as CSV with a heading; numbers with a point, what is missing empty.
+
+    Parameters
+    ----------
+    rows, header
+        All with the same keys; the heading where there is none.
+    """
     text = io.StringIO()
     writer, is_first = CsvWriter(text), True
     for row in rows:
         writer.write([list(row), list(row.values())] if is_first else [list(row.values())])
         is_first = False
+    if is_first and (columns := list(header)):
+        writer.write([columns])
     return text.getvalue()

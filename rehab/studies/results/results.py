@@ -23,6 +23,7 @@ from rehab.studies.analysis.participants import (
     ArmFlow,
     Participant,
     by_arm,
+    distinct,
     flow,
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
@@ -127,12 +128,14 @@ class Results:
 
     @cached_property
     def exploratory(self) -> tuple[str, ...]:
-        """Slugs of all other outcomes that anybody has."""
+        """Slugs of all other outcomes that anybody has, one variable once."""
         if self.is_interim:
             return ()
         found = {slug for one in self.participants for v in one.visits for slug in v.outcomes}
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
-        return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
+        rest += sorted(slug for slug in found if slug.startswith(CHANNEL))
+        known = distinct(self.participants, [*self.registered, *rest])
+        return tuple(slug for slug in rest if slug in known)
 
     def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
@@ -202,6 +205,17 @@ class Results:
             }
             found |= dict(zip(p, holm(list(p.values())), strict=True))
         return found
+
+    def tipping_point(self, slug: str, one: Difference) -> float | None:
+        """Return how far missing visits would have to lie to change a conclusion, by Holm's p.
+
+        Parameters
+        ----------
+        slug, one
+            The outcome's; a difference of it.
+        """
+        adjusted = self.adjusted_p.get((slug, one.group, one.reference))
+        return one.tipping_point(adjusted, self.level if slug == self.primary else None)
 
     def is_not_inferior(self, slug: str, one: Difference) -> bool | None:
         """Return whether a group is not worse by the margin; None where that is not asked.

@@ -3,13 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
-from rehab.studies.analysis.comparison import CONFIDENCE, Difference
+from rehab.studies.analysis.comparison import Difference
 from rehab.studies.analysis.findings import OutcomeResult, has_departed, observations
+from rehab.studies.analysis.outcomes import scale_of
 from rehab.studies.analysis.participants import ParticipantVisit
+from rehab.studies.registration.outcome_changes import OutcomeChange
 from rehab.studies.results.results import Results
+
+INTERVAL = "low_95", "high_95"
+PAIR = "outcome", "group", "reference"
+VISIT = "participant", "group", "visit", "attendance"
+STATUS = "unit", "status", "since_version", "dropped_in_version"
+# The columns of tables that may have no row; of outcomes and guesses those of every study.
+HEADERS: dict[str, tuple[str, ...]] = {
+    "outcomes": (*VISIT, "outcome", *STATUS, "value", "arm", "period", "baseline", "per_protocol"),
+    "phases": (
+        *(*VISIT, "phase", "kind", "name", "feedback", "strides", "valid", "judged", "hit_rate"),
+        *("change_percent", "shown_percent_of_goal", "shown_quartile_1", "shown_median"),
+        *("shown_quartile_3", "real_percent_of_goal", "cv_percent", "sd_about_trend_percent"),
+        "lag_1",
+    ),
+    "differences": (
+        *("outcome", *STATUS, "group", "reference", "participants", "participants_reference"),
+        *("paired", "difference", *INTERVAL, "hedges_g", "g_low_95", "g_high_95", "p", "p_holm"),
+        *("level", "not_inferior", "per_protocol_difference", "per_protocol_low_95"),
+        *("per_protocol_high_95", "missing_visits", "missing_visits_reference", "tipping_point"),
+    ),
+    "carry_over": (*PAIR, "carry_over", *INTERVAL, "p"),
+    "curves": (
+        *("group", "visit", "phase", "block_of_10", "participants", "percent_of_baseline"),
+        *INTERVAL,
+    ),
+    "looks": ("participants", "planned", "spending", "level"),
+    "changes": tuple(one.name for one in fields(OutcomeChange)),
+    "occurrences": ("participant", "group", "visit", "kind", "what", "value"),
+    "guesses": ("guesser", "group", "do_not_know", "index", "estimate", *INTERVAL),
+    "adverse_events": (
+        *("participant", "arm", "what", "grade", "serious", "relation", "expected"),
+        *("known_on_day", "due_on_day", "reported_on_day"),
+    ),
+}
 
 
 def _visits(results: Results) -> Iterator[tuple[ParticipantVisit, dict[str, Any]]]:
@@ -49,9 +85,10 @@ def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
 
 
 def _status(results: Results, slug: str) -> dict[str, Any]:
-    """Return the columns that say as what an outcome was registered, and in which versions."""
+    """Return an outcome's unit, as what it was registered, and in which versions."""
     one = results.registered.get(slug)
     return {
+        "unit": scale_of(slug),
         "status": "exploratory" if one is None else one.status,
         "since_version": one and one.since,
         "dropped_in_version": one and one.dropped_in,
@@ -88,6 +125,7 @@ def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
                 "level": results.level if slug == results.primary else None,
                 "not_inferior": results.is_not_inferior(slug, found),
                 **_sensitivity(outcome, found),
+                "tipping_point": results.tipping_point(slug, found),
             }
 
 
@@ -100,7 +138,6 @@ def _sensitivity(outcome: OutcomeResult, found: Difference) -> dict[str, Any]:
         "per_protocol_high_95": followed and followed.difference.high,
         "missing_visits": missing and missing.visits[0],
         "missing_visits_reference": missing and missing.visits[1],
-        "tipping_point": missing and missing.tipping_point(CONFIDENCE),
     }
 
 
