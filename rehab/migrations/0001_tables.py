@@ -2381,7 +2381,7 @@ class Migration(migrations.Migration):
                             django.core.validators.MinValueValidator(1),
                             django.core.validators.MaxValueValidator(100),
                         ],
-                        verbose_name="wanted hits, % of the steps",
+                        verbose_name="target hit rate, % of steps",
                     ),
                 ),
                 (

@@ -34,7 +34,7 @@ class Flag(StrEnum):
 
 
 FLAGS: dict[str, str | Promise] = {
-    Flag.DUE: _("due"),
+    Flag.DUE: _("overdue"),
     Flag.STUCK: _("stuck"),
     Flag.IMPROVING: _("improving"),
     Flag.NEW: _("new"),

@@ -88,8 +88,8 @@ class GoalAdaptation:
         rate = DEFAULT_HIT_RATE if wanted is None else wanted
         if self.mode is AdaptationMode.AUTOMATIC and not LEAST_HIT_RATE <= rate <= MOST_HIT_RATE:
             raise InvalidSetting(
-                "Automatic goals need wanted hits of {least:g} to {most:g} % of the steps. "
-                "Give such a share, or let goals be suggested only.",
+                "Automatic goals need a target hit rate of {least:g} to {most:g} % of the steps. "
+                "Give such a rate, or let goals be suggested only.",
                 least=100 * LEAST_HIT_RATE,
                 most=100 * MOST_HIT_RATE,
             )

@@ -92,7 +92,7 @@ class Target:
     def __post_init__(self) -> None:
         if self.hit_rate is not None and not 0 < self.hit_rate <= 1:
             raise InvalidSetting(
-                "Wanted hits are more than 0 and up to 100 % of the steps (0.6 for 60 %)."
+                "The target hit rate is more than 0 and up to 100 % of steps (0.6 for 60 %)."
             )
         if self.duration_s is not None and not (
             math.isfinite(self.duration_s) and self.duration_s > 0

@@ -46,9 +46,11 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert "Iris" not in seen(pt, but=session.pk)
     assert "Iris" not in seen(pt, station=world.session.station_id or 0)  # it was at none
     assert "Iris" not in seen(client_of(build_world("oak")))
+    assert "fell" in seen(pt, "start")
     answer = pt.post(reverse("acknowledge-alarms", args=[session.pk]))
     assert (answer.status_code, answer.content) == (204, b"")
     assert "Iris" not in seen(pt)
+    assert "fell" not in seen(pt, "start")
     row = SessionEvent.everywhere.get(session=session, kind="fall_acknowledged")
     assert row.by == world.people[Role.PT]
 

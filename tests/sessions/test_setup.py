@@ -177,7 +177,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
         ("robot_answers", "dances", "not one of the available choices"),
         ("schedule", "summary", "A summary is about at least 2 steps."),
         ("schedule_band", "80", "Give 1 to 50 %"),
-        ("goal_follows", "automatic", "wanted hits of 30 to 90 %"),
+        ("goal_follows", "automatic", "a target hit rate of 30 to 90 %"),
     ],
 )
 def test_what_cannot_be_walked_is_refused_in_words(pt, patient, station, field, value, words):

@@ -113,6 +113,18 @@ def test_first_steps_compares_as_well(world, station):
     assert devices(station).exists()
 
 
+def test_a_tablet_that_was_seen_reaches_the_server(world, station, settings):
+    asked, unreached = "/first-steps/?step=tablet", "Only this computer can open GARRY"
+    Device.everywhere.update(last_seen_at=None)
+    pt, code = world.pt, shown_code(Client())
+    pt.post(asked, {"station": station.pk, "code": code, "compared": "yes"})
+    pt.defaults["HTTP_HOST"] = settings.HOST = "localhost"
+    settings.ALLOWED_HOSTS = ["localhost"]
+    assert unreached in pt.get(asked).content.decode()
+    devices(station).update(last_seen_at=timezone.now())
+    assert unreached not in pt.get(asked).content.decode()
+
+
 def test_no_link_fills_a_code_in(world, pt):
     tablet = Client()
     code = shown_code(tablet)

@@ -21,6 +21,7 @@ from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.consent.services import current_text
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.alarms import Alarm, open_alarms
 from rehab.sessions.feedback_text_updates import change_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.forms.initial import initial_choices
@@ -55,9 +56,9 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
 
 
 def start_context(user: User, query: str = "") -> dict[str, Any]:
-    """Return the context of the start page: who is expected today, and all patients."""
+    """Return the context of the start page: who is expected today, who fell, and all patients."""
     now = clinic_time(timezone.now(), clinic_of(user))
-    patients = patients_by_last_visit(user)
+    patients, alarms = patients_by_last_visit(user), open_alarms(user, now)
     if query:
         patients = patients.filter(Q(nickname__icontains=query) | Q(code__icontains=query))
     else:  # patients whose program has ended are found by name or code only
@@ -69,6 +70,7 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
         "patients": shown[:MAX_PATIENTS],
         "more": len(shown) > MAX_PATIENTS,
         "open": open_sessions(user),
+        "fallen": {one.session.patient_id for one in alarms if one.kind == Alarm.FALL},
     }
 
 

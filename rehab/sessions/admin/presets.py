@@ -105,7 +105,7 @@ class PresetAdmin(ScopedAdmin):
         """Its feedback type, goal and duration."""
         return preset.summary
 
-    @admin.display(description=_("wanted hits, % of the steps"))
+    @admin.display(description=_("target hit rate, % of steps"))
     def wanted_hits(self, preset: Preset) -> int | None:
         """The wanted share of hits."""
         return preset.values["wanted_hits"]  # type: ignore[no-any-return]

@@ -94,7 +94,7 @@ MAIN_OPTIONS = (
     ),
     Option(
         name="wanted_hits",
-        label=capfirst(_("wanted hits, % of the steps")),
+        label=capfirst(_("target hit rate, % of steps")),
         help="Percent of the steps.",
         kind=int,
         nullable=True,

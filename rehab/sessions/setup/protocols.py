@@ -128,7 +128,7 @@ class Protocol(ClinicModel):
     name = models.CharField(_("name"), max_length=64)
     description = models.TextField(_("description"), blank=True)
     wanted_hits = models.PositiveSmallIntegerField(
-        _("wanted hits, % of the steps"),
+        _("target hit rate, % of steps"),
         null=True,
         blank=True,
         validators=between(1, 100, "%"),

@@ -25,7 +25,7 @@ from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import NotTrusted
 from rehab.stations.https.certificate import secure_host
-from rehab.stations.models import Station
+from rehab.stations.models import Device, Station
 from rehab.stations.pairing import PairingRefused, approve_pairing, find_by_code
 from rehab.stations.pins import PinRefused, check_pin
 from rehab.stations.tablets import COOKIE
@@ -77,11 +77,15 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
 
 
 def tablet_address(request: HttpRequest) -> dict[str, Any]:
-    """Return the address that a tablet opens, and its drawing to scan; empty without one."""
+    """Return the address that a tablet opens, and its drawing to scan.
+
+    Without an address: whether a tablet reached the server all the same.
+    """
     secure = secure_host()
     host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
     if host is None:
-        return {"address": "", "qr": ""}
+        tablets = Device.objects.visible_to(user_of(request)).filter(kind=Device.Kind.TABLET)
+        return {"is_reached": tablets.exclude(last_seen_at=None).exists()}
     address = f"{'https' if secure else request.scheme}://{host}{reverse('tablet')}"
     drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
     own_certificate = bool(secure) and not settings.CERTIFICATE

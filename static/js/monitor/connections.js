@@ -12,6 +12,8 @@ function ago(seconds) {
   return fill(_("%(count)s min ago"), { count: Math.round(seconds / 60) });
 }
 
+const describeSilence = (silent_s) => ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];
+
 // What a worn sensor says of itself; its strides are invalid meanwhile.
 const TROUBLES = {
   hidden: _("the phone is showing another page"),
@@ -56,18 +58,18 @@ function describeSource(isThere, strides, silent_s, isRunning, trouble) {
   }
   if (trouble) return ["!", TROUBLES[trouble]];
   if (!strides.length || silent_s === null) return ["✓", _("connected, no stride yet")];
+  if (isRunning && silent_s > SILENT_S.stride) return describeSilence(silent_s);
   const valid = strides.filter((stride) => stride.valid).length;
   const count = strides.length;
   const words = fill(_("%(valid)s of %(count)s valid, last %(ago)s"), { valid, count, ago: ago(silent_s) });
-  if (isRunning && silent_s > SILENT_S.stride) return ["!", fill(_("silent: %(words)s"), { words })];
   return [valid < ENOUGH * count ? "!" : "✓", words];
 }
 
 function describeTablets(count, silent_s, isHeard) {
-  if (!count) return ["–", _("none: only this mirror shows the page")];
+  if (!count) return ["–", _("none: the page is shown only here")];
   const what = count > 1 ? fill(_("%(count)s connected"), { count }) : _("connected");
   if (silent_s === null) return ["✓", what];
-  if (!isHeard) return ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];
+  if (!isHeard) return describeSilence(silent_s);
   return ["✓", fill(_("%(what)s, heard %(ago)s"), { what, ago: ago(silent_s) })];
 }
 

@@ -110,7 +110,7 @@ export const describeState = (state) => STATES[state] ?? state;
 
 // What a window came to and what followed; `breakReason`: why the gesture after it did not end as it should.
 export function describeDecision(decision, breakReason) {
-  if (!decision) return _("It responds to every five seconds of walking.");
+  if (!decision) return _("While the patient walks, it responds every five seconds.");
   const { mean, threshold, gesture, intensity, pool, reason } = decision;
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });

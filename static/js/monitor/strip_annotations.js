@@ -44,8 +44,9 @@ export function drawAnnotations(shown, annotations, { width, floor, dx, x }) {
     const found = taken.findIndex((until) => until < middle - half);
     const line = found < 0 ? taken.length : found;
     taken[line] = middle + half + LETTER;
-    const place = { x: middle, y: floor - 14 - LINE * line };
-    return path("remark", `M${at} ${floor - 2}l-6 -9h12z`) + text(words, { class: "remark-words", ...place });
+    const red = remark.kind === "fall" ? " red" : "";
+    const place = { class: `remark-words${red}`, x: middle, y: floor - 14 - LINE * line };
+    return path(`remark${red}`, `M${at} ${floor - 2}l-6 -9h12z`) + text(words, place);
   }
 
   return annotations.map((annotation) => {

@@ -27,7 +27,7 @@ const PLACES = { foot: _("foot"), shank: _("shin") };
 const SIDES = { left: _("left"), right: _("right") };
 const STRAPS = {
   foot: _("On the shoe’s instep, under the laces, flat. Only a light sensor, never a phone."),
-  shank: _("On the inner front of the shin, a hand below the knee, screen outward. Tight, never over a wound."),
+  shank: _("On the inner front of the shin, a hand’s width below the knee, screen outward. Tight, never over a wound."),
 };
 const LINKS = {
   connected: _("connected"),

@@ -34,4 +34,8 @@ place.addEventListener("submit", async (event) => {
   button.disabled = false;
 });
 
+// The page begins below them, however many there are.
+new ResizeObserver(() => {
+  document.documentElement.style.setProperty("--band", `${place.getBoundingClientRect().height}px`);
+}).observe(place);
 look();
