@@ -101,7 +101,7 @@ def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
             for one in results.find(slug).differences
         ]
     return draw_forest(
-        rows, title, gettext("Hedges’ g with 95 % intervals, not adjusted for multiplicity")
+        rows, title, gettext("Hedges’ g with intervals of 95 %, not adjusted for multiplicity")
     )
 
 
