@@ -132,6 +132,7 @@ def world(world: World) -> World:
     Patient.everywhere.update(language="es", boards="clinic")
     again = TrainingSession.everywhere.get(pk=world.session.pk)
     again.pk, again.state = None, State.READY.value
+    again.plan["language"] = "es"
     again.save()
     return world
 

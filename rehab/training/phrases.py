@@ -176,7 +176,7 @@ MEASURED = join(
     gettext_noop("Your value."),
     gettext_noop("The value now."),
     gettext_noop("This step’s value."),
-    gettext_noop("What this step gave."),
+    gettext_noop("This step, measured."),
     gettext_noop("Now measured."),
     gettext_noop("The last value."),
     gettext_noop("The last step."),

@@ -167,4 +167,4 @@ def test_a_killed_rotation_goes_on_where_it_was(tmp_path):
     assert f"authenticators: {600 - (len(half) - 1)} encrypted again" in told
     # One key of each purpose: the rotation that was killed left none beside.
     opened = run_python(tmp_path, "manage.py", "shell", "-v0", "-c", OPENED)
-    assert opened.split() == ["{b'JBSWY3DP'}", "4"]
+    assert opened.split() == ["{b'JBSWY3DP'}", "5"]

@@ -76,6 +76,7 @@ SILENT = {
     "study-power",
     *("api:api-root", "api:openapi-json", "api:openapi-view", "api:show_me"),
     *("api:list_protocols", "api:list_stations", "api:list_boards", "api:list_measures"),
+    *("api:show_capabilities",),
     *("admin:login", "admin:logout", "admin:jsi18n"),
     *("admin:password_change", "admin:password_change_done", "admin:auth_user_password_change"),
 }
@@ -94,6 +95,8 @@ def is_silent(name: str) -> bool:
             "measuredefinition",
             "protocol",
             "composedgesture",
+            "endpoint",
+            "outboxmessage",
         ),
         *("feedbacktype", "preset", "questionnaire"),
     }

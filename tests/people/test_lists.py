@@ -29,8 +29,8 @@ def list_of(model: type) -> str:
     return reverse(f"admin:rehab_{model.__name__.lower()}_changelist")
 
 
-def is_refused(client: Client, url: str, **asked: str) -> bool:
-    answer = client.get(url, asked)
+def is_refused(client: Client, where: str, /, **asked: str) -> bool:
+    answer = client.get(where, asked)
     return answer.status_code == 400 or answer.headers.get("Location", "").endswith("?e=1")
 
 

@@ -251,7 +251,7 @@ def test_an_old_page_starts_no_visit_but_the_one_that_it_shows(world):
     assert "still has an open session" in text_of(press_start(pt, enrollment, old))
     first = TrainingSession.everywhere.filter(study_visit__enrollment=enrollment)
     first.update(state="finished")
-    assert "Somebody else" in text_of(press_start(pt, enrollment, old))
+    assert "Someone else" in text_of(press_start(pt, enrollment, old))
     assert first.count() == 1
 
 

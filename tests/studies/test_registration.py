@@ -201,7 +201,7 @@ def test_a_measure_corrected_in_code_changes_neither_what_is_registered_nor_what
     start(study, lead, NOW)
     walked = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
     corrected = replace(MEASURES[slug], value_max=7.0, goal_max=6.0)
-    monkeypatch.setitem(MEASURES, slug, corrected)
+    monkeypatch.setitem(MEASURES._own, slug, corrected)
     install_defaults()
     row = MeasureDefinition.everywhere.get(clinic=None, slug=slug)
 

@@ -23,7 +23,7 @@ from rehab.people.audit import guards
 from rehab.people.consent import models as consents
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
-from rehab.people.models import Patient, User
+from rehab.people.models import Patient, ServerUserManager, User
 from rehab.people.roles import Role
 from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.browser_sessions import digest_of
@@ -35,7 +35,6 @@ from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
-from rehab.stations import device_trust
 from rehab.stations.models import Station
 from rehab.stations.tablets import COOKIE
 from rehab.stations.tokens import find_device
@@ -72,9 +71,9 @@ YESTERDAY = SimpleNamespace(now=lambda: datetime.now(UTC) - timedelta(days=1))
 # Rules of blinding: where each stands, what leaves it out, and who then sees the arm.
 LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
     "an assessor lets no device in": (
-        device_trust,
+        ServerUserManager,
         "assessors",
-        User.everywhere.none,
+        lambda manager: manager.none(),
         TABLETS | PHONES,
     ),
     "an assessor sees no sessions": (

@@ -39,7 +39,7 @@ from rehab.exports.clinic.sealed_file import (
     read_parts,
 )
 from rehab.exports.clinic.shared_rows import place_shared
-from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables
+from rehab.exports.clinic.tables import STAYS, Table, clinic_paths, moving_tables
 from rehab.people.aliases import draw_alias
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -187,6 +187,8 @@ class Arrival:
     def _new_key(self, model: type[Any], key: int) -> int:
         """Return a row's key here: one of those that are reserved. Raises CannotMove for others."""
         label = model._meta.label_lower
+        if label in STAYS:  # its history alone came along, and names it as it was
+            return key
         if not 0 <= key <= self._content.header["last_keys"].get(label, 0):
             raise CannotMove(
                 f"The file has a key beyond its own ({label} {key}). Export the clinic again."

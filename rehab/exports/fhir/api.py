@@ -251,11 +251,11 @@ def _all(user: User, kind: str, before: datetime) -> Iterator[Resource]:
     if kind == "Device":
         yield _with_id(*make_device(NAMES))
     elif kind == "Patient":
-        for patient in _patients(user).filter(created_at__lt=before).iterator():
+        for patient in _patients(user).filter(created_at__lte=before).iterator():
             if is_care_allowed(patient):
                 yield _with_id(*NAMES.patient(patient))
     else:
-        for session in _sessions(user).filter(ended_at__lt=before).iterator():
+        for session in _sessions(user).filter(ended_at__lte=before).iterator():
             yield from _of_session(user, session, kind)
 
 

@@ -124,8 +124,12 @@ def leads_to_patients(model: type[Model]) -> bool:
 
 def find_patient_id(match: ResolverMatch, clinic_id: int | None) -> int | None:
     """Return the key of the patient of this clinic that a page shows; None for several or none."""
-    for name, value in match.kwargs.items():
-        if name in SUBJECTS:
+    for given, named in match.kwargs.items():
+        name, value = given, named
+        if name == "fhir_id":  # patient-1, or the session that the rest begins with: figure-2-score
+            noun, value, *_rest = [*str(value).split("-"), ""]
+            name = "patient_id" if noun == "patient" else "session_id"
+        if name in SUBJECTS and (name == given or value.isdecimal()):
             model_name, by, path = SUBJECTS[name]
             return _find_key(apps.get_model("rehab", model_name), path, clinic_id, **{by: value})
     model, row = _model_of(match), str(match.kwargs.get("object_id", ""))

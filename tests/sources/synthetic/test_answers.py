@@ -16,6 +16,11 @@ from rehab.training.phases import make_phase
 from rehab.training.steps import Side, select_value
 from tests.sources.synthetic.protocols import usable
 
+OPTIONS = dict.fromkeys(("side", "strides", "treadmill", "heart_rate")) | {
+    "seed": 3,
+    "profile": "good",
+}
+
 OF_A_WALKER = {"seed": 3, "profile": "good", "side": None, "strides": None, "treadmill": False}
 
 
@@ -34,9 +39,7 @@ def find_plateau(gain, seed=1, goal_w_kg=None, profile=GOOD):
 @pytest.mark.parametrize("valence", ["positive", "explicit"])
 def test_a_live_walker_answers_as_a_headless_one(valence):
     """By the goal and the feedback type that the server sends."""
-    options = Namespace(
-        seed=3, profile="good", side=None, signals=False, strides=None, treadmill=False
-    )
+    options = Namespace(**OPTIONS, signals=False)
     live = SyntheticSource(options, print).open_walk(Side.LEFT)
     headless = SyntheticWalker(GOOD, 3, Side.LEFT, valence)
     headless.goal_w_kg = 4.4
@@ -48,9 +51,7 @@ def test_a_live_walker_answers_as_a_headless_one(valence):
 @pytest.mark.parametrize("measure", MEASURES.values(), ids=lambda one: one.slug)
 def test_every_measure_is_walked_and_answers_its_goal(measure):
     """Begun at a healthy walk's value; trained in the measure's better direction."""
-    options = Namespace(
-        seed=3, profile="good", side=None, signals=False, strides=None, treadmill=False
-    )
+    options = Namespace(**OPTIONS, signals=False)
     live = SyntheticSource(options, print).open_walk(Side.LEFT)
     baseline = make_phase("baseline")
     goal = measure.offered_goal
@@ -74,8 +75,8 @@ def test_every_measure_is_walked_and_answers_its_goal(measure):
 
 def test_signals_of_another_measure_say_that_they_do_not_answer_its_goal():
     said: list[str] = []
-    settings = {"mass": 75.0, "rate": 100.0, "look_ahead": 0.05, "keep": None, "treadmill": False}
-    options = Namespace(seed=3, profile="good", side=None, signals=True, strides=None, **settings)
+    settings = {"mass": 75.0, "rate": 100.0, "look_ahead": 0.05, "keep": None}
+    options = Namespace(**OPTIONS, signals=True, **settings)
     live = SyntheticSource(options, said.append).open_walk(Side.LEFT)
     for slug in ("a2", "step_length", "step_length"):
         live(Display(make_phase("training"), 0.5, "positive", slug))
