@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from datetime import datetime
 from functools import cache
+from itertools import starmap
 from typing import Any
 
 from django.apps import apps
@@ -122,14 +123,21 @@ def leads_to_patients(model: type[Model]) -> bool:
     return any(leads_to_patients(other) for other in related)
 
 
+def _read_parameter(name: str, value: Any) -> tuple[str, Any]:
+    """Return a URL parameter; of a FHIR id (figure-2-score) the patient or session that it names."""
+    if name != "fhir_id":
+        return name, value
+    noun, _between, rest = str(value).partition("-")
+    key = rest.partition("-")[0]
+    if not key.isdecimal():  # the device: nobody's
+        return "", ""
+    return "patient_id" if noun == "patient" else "session_id", key
+
+
 def find_patient_id(match: ResolverMatch, clinic_id: int | None) -> int | None:
     """Return the key of the patient of this clinic that a page shows; None for several or none."""
-    for given, named in match.kwargs.items():
-        name, value = given, named
-        if name == "fhir_id":  # patient-1, or the session that the rest begins with: figure-2-score
-            noun, value, *_rest = [*str(value).split("-"), ""]
-            name = "patient_id" if noun == "patient" else "session_id"
-        if name in SUBJECTS and (name == given or value.isdecimal()):
+    for name, value in starmap(_read_parameter, match.kwargs.items()):
+        if name in SUBJECTS:
             model_name, by, path = SUBJECTS[name]
             return _find_key(apps.get_model("rehab", model_name), path, clinic_id, **{by: value})
     model, row = _model_of(match), str(match.kwargs.get("object_id", ""))

@@ -44,11 +44,8 @@ UNTRACKED_FIELDS = {
     "token_expires_at",
     "copy_seen_at",
 }
-SECRET_FIELDS = {
-    "password",
-    "pin_hash",
-    "secret",
-}  # that they changed is recorded, never their values
+# That they changed is recorded, never their values.
+SECRET_FIELDS = {"password", "pin_hash", "secret"}
 MASK = "•••"
 ROW_BEFORE = "_row_before_save"
 M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # index of the keys in [old, new]
