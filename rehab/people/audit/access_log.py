@@ -124,7 +124,7 @@ def leads_to_patients(model: type[Model]) -> bool:
 
 
 def _read_parameter(name: str, value: Any) -> tuple[str, Any]:
-    """Return a URL parameter; of a FHIR id (figure-2-score) the patient or session that it names."""
+    """Return a URL parameter; of a FHIR id (figure-2-score) the patient or session it names."""
     if name != "fhir_id":
         return name, value
     noun, _between, rest = str(value).partition("-")
