@@ -107,7 +107,7 @@ class Player:
         after_s
             How long it stands still first [s].
         pace
-            Share of each waypoint's own pace to go at, above 0 and up to 1; its time grows with it.
+            Share of the limits to go at, at most, above 0 and up to 1; its time grows with it.
         """
         if self.gesture is not None:
             raise RuntimeError(f"{self.gesture.name} is being played.")
@@ -264,7 +264,7 @@ class Player:
 
     def _share(self, waypoint: Waypoint) -> float:
         """Return the share of the limits for a waypoint."""
-        return max(MIN_PACE, waypoint.pace * self._pace * (LATE_PACE if self._is_late else 1.0))
+        return max(MIN_PACE, min(waypoint.pace, self._pace) * (LATE_PACE if self._is_late else 1.0))
 
     def _end(self, outcome: str) -> None:
         self.gesture, self._waypoint = None, None
