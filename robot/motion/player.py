@@ -146,7 +146,8 @@ class Player:
             self._in_flight.add(STILL, time_s)
             return STILL
         self._meter.add(self.twist, pose, time_s)
-        self._in_flight.delay_s = self._meter.delay_s or self._in_flight.delay_s
+        if self._meter.delay_s is not None:
+            self._in_flight.delay_s = self._meter.delay_s
         limits, wanted = self._wanted_twist(time_s, self._in_flight.predict(pose, time_s))
         self._ramped = limits.approach(self._ramped, wanted, elapsed_s)
         self.twist = self._lift(self._ramped, wanted)
@@ -216,10 +217,10 @@ class Player:
         """
         rest: list[Segment] = []
         left_m = HOME.seen_from(Pose(here.x_m, here.y_m)).x_m
-        if abs(left_m) > NEAR_M and not self._is_corrected:
+        if abs(left_m) > self._near_m and not self._is_corrected:
             self._is_corrected = True
             rest.append(Drive(HOME.x_m, HOME.y_m, heading_rad, left_m))
-        if rest or abs(heading_rad - here.heading_rad) > NEAR_RAD:
+        if rest or abs(heading_rad - here.heading_rad) > self._near_rad:
             rest.append(Turn(heading_rad, 0.0))
         return rest
 

@@ -14,7 +14,7 @@ from tests.support.robot_stage import walk_ten_minutes
 from tests.support.variants import LEVELS, at_level, levels_of
 
 SEED = 36
-SEEN, YIELDED = (0.10, 45), (0.08, 35)  # [m], [°]
+SEEN, YIELDED = (0.10, 45), (0.10, 40)  # [m], [°]
 MOST_S = 4.5
 # Nobody has measured the base: one that answers sooner than assumed stops short of its places.
 AT_ONCE = "answers at once"
