@@ -90,3 +90,9 @@ def test_one_that_plans_from_where_it_is_would_fail(monkeypatch):
     monkeypatch.setattr("robot.motion.player.DelayMeter.delay_s", None)
     played = play_in_a_row(GESTURES["sway"], Imperfections(0.16), times=2, response=AT_ONCE)
     assert played[-1].outcome != "done"
+
+
+def test_one_that_answers_at_once_is_believed():
+    """A measured delay of 0 was taken for none: it stopped short, 5 mm from home (issue 36)."""
+    played = play_in_a_row(GESTURES["nod"], Imperfections(0.0, 0.02), times=4)
+    assert max(one.away_m for one in played) < 0.0025
