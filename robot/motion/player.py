@@ -217,10 +217,10 @@ class Player:
         """
         rest: list[Segment] = []
         left_m = HOME.seen_from(Pose(here.x_m, here.y_m)).x_m
-        if abs(left_m) > self._near_m and not self._is_corrected:
+        if abs(left_m) > NEAR_M and not self._is_corrected:
             self._is_corrected = True
             rest.append(Drive(HOME.x_m, HOME.y_m, heading_rad, left_m))
-        if rest or abs(heading_rad - here.heading_rad) > self._near_rad:
+        if rest or abs(heading_rad - here.heading_rad) > NEAR_RAD:
             rest.append(Turn(heading_rad, 0.0))
         return rest
 

@@ -217,7 +217,7 @@ TABLE: dict[str, Pool] = {
 
 # No variant is performed below 10 cm or 45°, however weak the answer and however quiet the room: a
 # walker 2 m away sees that without looking for it. (Ours.)
-LEAST_M, LEAST_RAD = 0.105, math.radians(46.5)  # a player stops a little before each place
+LEAST_M, LEAST_RAD = 0.105, math.radians(47)  # a player stops a little before each place
 # Of what does not fit into 4.5 s on a late base at a gentle pace, gentle answers have none [s].
 MOST_S = 4.2
 # Beside the time that it needs, for each waypoint; at home a late base may turn once more.
