@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.port.setpoint import Setpoint
+from robot.port.fresh_order import FreshOrder
 from tests.support.extent import examples
 
 STOP, GO, OTHER = b"\xaa\x55stop", b"\xaa\x55go", b"\xaa\x55other"
@@ -19,7 +19,7 @@ def order(number, frame=GO, sent_s=10.0, **more):
 
 @pytest.fixture
 def setpoint():
-    setpoint = Setpoint(STOP)
+    setpoint = FreshOrder(STOP)
     assert setpoint.frame(10.0) == STOP
     setpoint.store(order(1, STOP), 10.0)
     return setpoint
@@ -113,7 +113,7 @@ def test_what_is_no_order_is_counted(setpoint, bad):
     )
 )
 def test_it_never_sends_what_is_not_the_freshest_order(told):
-    setpoint, now_s, newest, fresh = Setpoint(STOP), 10.0, -1, (STOP, -math.inf)
+    setpoint, now_s, newest, fresh = FreshOrder(STOP), 10.0, -1, (STOP, -math.inf)
     for frame, number, age_s, pause_s in told:
         sent_s = now_s + age_s
         setpoint.store(order(number, frame, sent_s), now_s)
