@@ -198,7 +198,8 @@ class Trial:
         """Return the addresses of what the participants walked, and of their stations' tablets."""
         keys = "|".join(str(session.pk) for session in self.sessions)
         found = [route.url for route in all_routes((self.world,))]
-        own = [url for url in found if re.search(rf"(sessions|trainingsession)/({keys})/", url)]
+        named = re.compile(rf"(sessions/|trainingsession/|fhir/\w+/\w+-)({keys})(/|-|$)")
+        own = [url for url in found if named.search(url)]
         lists = ("api:list_sessions", "tablet-state", "waiting-board", "start")
         return [*dict.fromkeys(own), *(reverse(name) for name in lists)]
 

@@ -22,8 +22,10 @@ from rehab.exports.fhir.resources import (
     session_resources,
 )
 from rehab.people.access import for_roles
+from rehab.people.audit.audit_log import Act, record
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
+from rehab.people.networks import client_address
 from rehab.people.roles import PATIENT_EXPORTERS
 from rehab.people.web.api_base import AwareDatetime, TextLine, caller, responses
 from rehab.sessions.models import TrainingSession
@@ -204,7 +206,7 @@ def show_capabilities(request: HttpRequest) -> HttpResponse:
 
 
 @router.get("/fhir/$export", response=responses(dict, code=202))
-@for_roles(*PATIENT_EXPORTERS, exports=True)
+@for_roles(*PATIENT_EXPORTERS, exports=True, patients=False)
 def start_bulk(request: HttpRequest) -> HttpResponse:
     """Begin an export of the whole clinic (Bulk Data); its files are made while they are read."""
     place = request.build_absolute_uri(request.path).removesuffix("$export")
@@ -223,7 +225,7 @@ class Before(Schema):
 
 
 @router.get("/fhir/bulk", response=responses(dict))
-@for_roles(*PATIENT_EXPORTERS, exports=True)
+@for_roles(*PATIENT_EXPORTERS, exports=True, patients=False)
 def show_bulk(request: HttpRequest, wanted: Query[Before]) -> dict[str, Any]:
     """Show the files of an export of the whole clinic."""
     place = request.build_absolute_uri(request.path)
@@ -238,12 +240,14 @@ def show_bulk(request: HttpRequest, wanted: Query[Before]) -> dict[str, Any]:
 
 
 @router.get("/fhir/bulk/{fhir_type}.ndjson", response=responses(dict, 404))
-@for_roles(*PATIENT_EXPORTERS, exports=True)
+@for_roles(*PATIENT_EXPORTERS, exports=True, patients=False)  # audited here, before the first byte
 def read_bulk(request: HttpRequest, fhir_type: Path[str], wanted: Query[Before]) -> HttpResponse:
     """Read all resources of one type, one a line."""
     if fhir_type not in TYPES:
         raise Http404
-    lines = _lines(_all(caller(request), fhir_type, wanted.before))
+    user, now = caller(request), timezone.now()
+    record(Act.EXPORT, user, about=request.path, address=client_address(request), now=now)
+    lines = _lines(_all(user, fhir_type, wanted.before))
     return StreamedResponse(lines, content_type=NDJSON)  # type: ignore[return-value]
 
 
