@@ -2,7 +2,7 @@
 //
 // tests/sensor/test_detector.py feeds both with the same samples: they decide alike, to less than a millisecond.
 
-import { SagittalAxis } from "garry/sensor/axis";
+import { SHARE_SURE, SagittalAxis } from "garry/sensor/axis";
 import { History } from "garry/sensor/history";
 import { Mounting, Standing } from "garry/sensor/mounting";
 import { NOWHERE, Orientation, dot, isNowhere, scale } from "garry/sensor/orientation";
@@ -146,7 +146,8 @@ export class WearableDetector {
     const quiet = known.reduce((best, one) => (one.motion < best.motion ? one : best));
     const other = this.#readings.find((one) => one !== quiet);
     const ahead = this.#axis.leftSign;
-    if (ahead === null ? known.length < 2 : ahead !== quiet.sign) return;
+    const isAxisSure = this.#axis.share >= SHARE_SURE;
+    if (ahead === null ? known.length < 2 || !isAxisSure : ahead !== quiet.sign) return;
     if (!quiet.isPlausible || quiet.motion > other.motion * (ahead === null ? QUIETER_ALONE : QUIETER)) return;
     if (!this.#best) {
       this.#best = quiet;
