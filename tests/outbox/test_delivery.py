@@ -210,6 +210,19 @@ class Hook(BaseHTTPRequestHandler):
         pass
 
 
+def test_a_stored_token_goes_to_no_other_address(world):
+    endpoint = add_endpoint(world, kind=Endpoint.Kind.FHIR)
+    page = reverse("admin:rehab_endpoint_change", args=[endpoint.pk])
+    form = {"name": "Hook", "url": "https://elsewhere.example/in", "active": "on"}
+    assert "give the token again" in world.lead.post(page, form).content.decode()
+    assert world.lead.post(page, form | {"url": endpoint.url, "name": "EHR"}).status_code == 302
+    kept = Endpoint.everywhere.get(pk=endpoint.pk)
+    assert (kept.name, kept.open_secret()) == ("EHR", endpoint.open_secret())
+    assert world.lead.post(page, form | {"token": "its-own"}).status_code == 302
+    moved = Endpoint.everywhere.get(pk=endpoint.pk)
+    assert (moved.url, moved.open_secret()) == (form["url"], "its-own")
+
+
 def test_over_a_real_socket_where_the_host_allows_the_network(world, settings):
     with HTTPServer(("127.0.0.1", 0), Hook) as server:
         Thread(target=server.serve_forever, daemon=True).start()
