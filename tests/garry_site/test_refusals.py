@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import logging
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from django.conf import settings
@@ -24,8 +25,9 @@ class Log:
         self._stream = io.StringIO()
         self.handler = logging.StreamHandler(self._stream)
         self.handler.setFormatter(LineFormatter("%(levelname)s %(name)s: %(message)s"))
-        for name in settings.LOGGING["handlers"]["stderr"]["filters"]:
-            make = import_string(settings.LOGGING["filters"][name]["()"])
+        served: Any = settings.LOGGING
+        for name in served["handlers"]["stderr"]["filters"]:
+            make = import_string(served["filters"][name]["()"])
             self.handler.addFilter(make(lambda: self.now_s))
 
     def lines(self) -> list[str]:
