@@ -212,7 +212,8 @@ class WearableDetector:
         strides = []
         while self._best.strides:
             stride, rest = self._best.strides.popleft()
-            has_moved = rest != NOWHERE and self._mounting.add(rest, self._axis.axis)
+            axis = self._axis.axis if self._axis.share >= SHARE_SURE else NOWHERE
+            has_moved = rest != NOWHERE and self._mounting.add(rest, axis)
             if has_moved or self._moved:
                 stride = replace(stride, reasons=(*stride.reasons, Doubt.SENSOR_MOVED))
             strides.append(stride)

@@ -131,7 +131,8 @@ export class WearableDetector {
     const strides = [];
     while (this.#best?.strides.length) {
       const [stride, rest] = this.#best.strides.shift();
-      const hasMoved = !isNowhere(rest) && this.#mounting.add(rest, this.#axis.axis);
+      const axis = this.#axis.share >= SHARE_SURE ? this.#axis.axis : NOWHERE;
+      const hasMoved = !isNowhere(rest) && this.#mounting.add(rest, axis);
       if (hasMoved || this.#moved) stride.reasons.push("sensor_moved");
       strides.push(stride);
       this.#moved = hasMoved ? STRIDES_MOVED : Math.max(0, this.#moved - 1);
