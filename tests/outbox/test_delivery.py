@@ -15,7 +15,7 @@ from django.urls import reverse
 
 from rehab.exports.encryption import generate_key
 from rehab.outbox.delivery import deliver_due, is_due, sign
-from rehab.outbox.http_post import Answer
+from rehab.outbox.http_post import Answer, Refused
 from rehab.outbox.models import PAUSES, Endpoint, OutboxMessage, Topic, notify
 from rehab.people.roles import Role
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
@@ -141,6 +141,26 @@ def test_a_refusal_is_final_and_shown(world, endpoint, status, active):
     assert endpoint.active == active
     page = world.lead.get(reverse("admin:rehab_outboxmessage_changelist")).content.decode()
     assert f"{status} no more" in page
+
+
+@pytest.mark.parametrize("cause", ["address", "key"])
+def test_what_never_can_be_sent_is_refused_at_once(world, endpoint, cause):
+    for _ in range(2):
+        notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    if cause == "key":
+        Endpoint.everywhere.filter(pk=endpoint.pk).update(secret="of another key")
+    assert deliver_due(NOW, Receiver(Refused("A private address."))) == 0
+    assert [one.state for one in messages(endpoint)] == ["refused", "waiting"]  # one each call
+    words = {"address": "A private address.", "key": "Give the receiver a new secret."}[cause]
+    assert words in messages(endpoint)[0].answer
+
+
+def test_a_new_secret_signs_from_then_on(world, endpoint):
+    old, address = endpoint.open_secret(), reverse("admin:rehab_endpoint_changelist")
+    page = world.lead.post(address, {"action": "renew_secrets", "_selected_action": [endpoint.pk]})
+    endpoint.refresh_from_db()
+    assert endpoint.open_secret() != old
+    assert endpoint.open_secret() in page.content.decode()
 
 
 def test_a_message_is_claimed_by_one_server(world, endpoint):

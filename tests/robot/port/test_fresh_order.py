@@ -32,6 +32,14 @@ def test_an_order_holds_for_a_quarter_of_a_second(setpoint):
     assert setpoint.counters["lapsed"] == 1
 
 
+@pytest.mark.parametrize(("sent_s", "frame"), [(0.05, GO), (0.0501, STOP)])
+def test_a_clock_may_be_ahead_by_a_twentieth_of_a_second(sent_s, frame):
+    setpoint = FreshOrder(STOP)
+    setpoint.store(order(1, STOP, sent_s=0.0), 0.0)
+    setpoint.store(order(2, sent_s=sent_s), 0.0)
+    assert setpoint.frame(0.0) == frame
+
+
 def test_the_last_order_wins(setpoint):
     setpoint.store(order(2), 10.0)
     setpoint.store(order(3, OTHER), 10.0)
