@@ -44,7 +44,7 @@ class BesideAnswers:
         """
         is_driven = not self._body.manual_drive.twist(now_s).is_still  # somebody stands beside it
         busy = self._body.player.is_busy or is_driven
-        choice = None if busy else self._variety.take(moment)
+        choice = None if busy else self._variety.take(moment, cue.pace)
         if choice is not None and self._start(choice, cue, now_s):
             self._variety.mark_started(choice)
 
@@ -69,7 +69,7 @@ class BesideAnswers:
         if self._body.player.is_busy:
             self._idle.disturb(now_s)
             return
-        gesture = self._idle.next(now_s, free_s, is_quiet=cue.is_quiet)
+        gesture = self._idle.next(now_s, free_s, cue.pace)
         if gesture is not None:
             self._start(Choice(gesture, "idle", self._seed), cue, now_s)
 

@@ -23,8 +23,8 @@ from robot.wire.frames import BadFrame, read_number, read_whole
 from robot.wire.limits import MAX_CUE_GESTURES, MAX_NAME_CHARS
 
 MIN_INTENSITY = 0.1
-# A cue of this intensity or less is performed quietly: without sounds, and at this share of every
-# speed and acceleration, so that half as far takes as long (our choice).
+# A cue of this intensity or less is performed quietly: without sounds, and at this share of the
+# limits at most, so that half as far takes as long (our choice).
 QUIET = 0.5
 QUIET_PACE = 0.5
 
@@ -112,6 +112,11 @@ class Cue:
     def is_quiet(self) -> bool:
         """Whether it is to be performed without sounds, and slowly."""
         return self.intensity <= QUIET
+
+    @property
+    def pace(self) -> float:
+        """The share of the limits at which it is performed at most."""
+        return QUIET_PACE if self.is_quiet else 1.0
 
     @property
     def moves(self) -> bool:

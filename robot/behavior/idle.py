@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import random
 
-from robot.behavior.cue import QUIET_PACE
 from robot.behavior.safety import ANNOUNCE_S
-from robot.motion.gesture import Gesture, stages
-from robot.motion.limits import DEFAULT_LIMITS
+from robot.motion.gesture import Gesture
 from robot.motion.pools import IDLE
 
 # All ours: from one to the next at least this [s] and up to so much more; so long after anything
@@ -25,12 +23,7 @@ LATE_S = 0.8
 
 def needed_s(gesture: Gesture, pace: float) -> float:
     """Return how long a motion is to be free of answers [s], its announcement included."""
-    limits = DEFAULT_LIMITS.scaled(pace)
-    moving_s = sum(
-        hold_s + sum(segment.min_duration_s(its) for segment in segments)
-        for segments, its, hold_s in stages(gesture.waypoints, limits)
-    )
-    return ANNOUNCE_S + moving_s + LATE_S
+    return ANNOUNCE_S + gesture.min_duration_s(pace) + LATE_S
 
 
 class IdleLife:
@@ -56,7 +49,7 @@ class IdleLife:
         """Drop what was due: after a stop and an arming, too, the least time passes first."""
         self._due_s = None
 
-    def next(self, now_s: float, free_s: float, *, is_quiet: bool) -> Gesture | None:
+    def next(self, now_s: float, free_s: float, pace: float) -> Gesture | None:
         """Return the motion that begins now; None for none.
 
         Parameters
@@ -65,15 +58,14 @@ class IdleLife:
             The time [s].
         free_s
             How long no answer can be due [s].
-        is_quiet
-            Whether it would move at ``QUIET_PACE``.
+        pace
+            The share of the limits at which it would move at most.
         """
         if self._due_s is None:
             others = [one for one in IDLE if one is not self._gesture]
             self._gesture = others[int(self._chance.random() * len(others))]
             self._due_s = now_s + LEAST_S + SPREAD_S * self._chance.random()
         was_disturbed = self._disturbed_s is not None and now_s - self._disturbed_s < PAUSE_S
-        pace = QUIET_PACE if is_quiet else 1.0
         if now_s < self._due_s or was_disturbed or free_s < needed_s(self._gesture, pace):
             return None
         self._due_s = None

@@ -268,7 +268,7 @@ class Performer:
         reason = self.decider.blocking_reason(decision, performing=self.body.player.is_busy)
         gesture = choice = None
         if not reason and name is not None:
-            choice = self.variety.choose(name, decision)
+            choice = self.variety.choose(name, decision, cue.pace)
             gesture, reason = (choice.gesture, "") if choice else self.gestures.find(name)
         if gesture is not None:
             reason = self.body.refusal_reason(gesture, state)

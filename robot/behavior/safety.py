@@ -229,7 +229,7 @@ class Safety:
 
     def rejection_reason(self, gesture: Gesture) -> str:
         """Return why the base cannot perform a gesture safely; empty where it can."""
-        is_long = not self._abilities.closed_loop and gesture.min_duration_s > OPEN_LOOP_MAX_S
+        is_long = not self._abilities.closed_loop and gesture.min_duration_s() > OPEN_LOOP_MAX_S
         return OPEN_LOOP if is_long else ""
 
     @staticmethod

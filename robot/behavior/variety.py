@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from robot.behavior.window_decider import Decision
 from robot.motion.gesture import Gesture
-from robot.motion.pools import POOLS
+from robot.motion.pools import POOLS, variants
 from robot.wire.cue_limits import VARIED
 
 APART = 4  # of so many answers in a row no two are the same variant
@@ -74,7 +74,7 @@ class Variety:
         )
         self._last_below = None if decision.above else decision.mean
 
-    def choose(self, name: str, decision: Decision) -> Choice | None:
+    def choose(self, name: str, decision: Decision, pace: float) -> Choice | None:
         """Return the variant for the decision that was observed last.
 
         Parameters
@@ -83,19 +83,21 @@ class Variety:
             A pool, or ``VARIED``.
         decision
             What is answered.
+        pace
+            The share of the limits at which it is performed at most.
 
         Returns
         -------
         Choice or None
             None where there is no such pool.
         """
-        return self.take(self._pools[decision.above] if name == VARIED else name)
+        return self.take(self._pools[decision.above] if name == VARIED else name, pace)
 
-    def take(self, pool: str) -> Choice | None:
-        """Return the next variant of a pool; None where there is no such pool."""
+    def take(self, pool: str, pace: float) -> Choice | None:
+        """Return the next variant of a pool at a pace; None where there is no such pool."""
         if pool not in POOLS:
             return None
-        gesture = pick(POOLS[pool], self.seed, self._number, tuple(self._recent))
+        gesture = pick(variants(pool, pace), self.seed, self._number, tuple(self._recent))
         return Choice(gesture, pool, self.seed)
 
     def mark_started(self, choice: Choice) -> None:

@@ -45,7 +45,7 @@ def dry_run(gesture: Gesture, limits: Limits = DEFAULT_LIMITS, pace: float = 1.0
     limits
         Speeds and accelerations.
     pace
-        Share of each waypoint's own pace, above 0 and up to 1.
+        Share of the limits to go at, at most, above 0 and up to 1.
     """
     player, pose, time_s, poses = Player(limits), HOME, 0.0, [HOME]
     player.start(gesture, time_s, pose, pace=pace)

@@ -138,12 +138,11 @@ class Gesture:
         drives = [segment for segment in segments if isinstance(segment, Drive)]
         return all(abs(drive.heading_rad) < 1e-9 for drive in drives)
 
-    @property
-    def min_duration_s(self) -> float:
-        """The shortest time that it can take within the default limits [s]."""
+    def min_duration_s(self, pace: float = 1.0) -> float:
+        """Return the shortest time that it can take at a share of the default limits [s]."""
         return sum(
             hold_s + sum(segment.min_duration_s(limits) for segment in segments)
-            for segments, limits, hold_s in stages(self.waypoints, DEFAULT_LIMITS)
+            for segments, limits, hold_s in stages(self.waypoints, DEFAULT_LIMITS, pace)
         )
 
 
@@ -261,11 +260,14 @@ def _check_ways_back(waypoints: Sequence[Waypoint]) -> None:
 
 
 def stages(
-    waypoints: Sequence[Waypoint], limits: Limits
+    waypoints: Sequence[Waypoint], limits: Limits, pace: float = 1.0
 ) -> list[tuple[tuple[Segment, ...], Limits, float]]:
-    """Return each waypoint's segments from the one before, their limits, and its hold [s]."""
+    """Return each waypoint's segments from the one before, their limits, and its hold [s].
+
+    None goes faster than at ``pace``, a share of the limits.
+    """
     starts = (HOME, *(waypoint.pose for waypoint in waypoints[:-1]))
     return [
-        (plan_path(start, waypoint.pose), limits.scaled(waypoint.pace), waypoint.hold_s)
+        (plan_path(start, waypoint.pose), limits.scaled(min(waypoint.pace, pace)), waypoint.hold_s)
         for start, waypoint in zip(starts, waypoints, strict=True)
     ]

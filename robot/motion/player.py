@@ -107,7 +107,7 @@ class Player:
         after_s
             How long it stands still first [s].
         pace
-            Share of each waypoint's own pace to go at, above 0 and up to 1; its time grows with it.
+            Share of the limits to go at, at most, above 0 and up to 1; its time grows with it.
         """
         if self.gesture is not None:
             raise RuntimeError(f"{self.gesture.name} is being played.")
@@ -146,7 +146,8 @@ class Player:
             self._in_flight.add(STILL, time_s)
             return STILL
         self._meter.add(self.twist, pose, time_s)
-        self._in_flight.delay_s = self._meter.delay_s or self._in_flight.delay_s
+        if self._meter.delay_s is not None:
+            self._in_flight.delay_s = self._meter.delay_s
         limits, wanted = self._wanted_twist(time_s, self._in_flight.predict(pose, time_s))
         self._ramped = limits.approach(self._ramped, wanted, elapsed_s)
         self.twist = self._lift(self._ramped, wanted)
@@ -264,7 +265,7 @@ class Player:
 
     def _share(self, waypoint: Waypoint) -> float:
         """Return the share of the limits for a waypoint."""
-        return max(MIN_PACE, waypoint.pace * self._pace * (LATE_PACE if self._is_late else 1.0))
+        return max(MIN_PACE, min(waypoint.pace, self._pace) * (LATE_PACE if self._is_late else 1.0))
 
     def _end(self, outcome: str) -> None:
         self.gesture, self._waypoint = None, None

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple
 
 from robot.marking import gettext_noop
@@ -29,8 +30,8 @@ from robot.motion.score import (
     Score,
 )
 
-# Shares of a row's size to drive ahead and to turn; then home. Direct paths go there at once,
-# indirect ones in parts. (Swings past home and back end in a short turn, where a late base errs.)
+# Shares of a row's way ahead and of its turn; then home. By this a base without a face is read:
+# joy turns to both sides, fast; disappointment to one, slowly; a greeting comes near.
 PATHS: dict[str, tuple[tuple[float, float], ...]] = {
     "dash": ((1, 0),),
     "climb": ((0.45, 0), (1, 0)),
@@ -38,6 +39,12 @@ PATHS: dict[str, tuple[tuple[float, float], ...]] = {
     "look": ((0, 1),),
     "peek": ((0, 0.5), (0, 1)),
     "linger": ((0, 1), (0, 0.5)),
+    "wag": ((0, 1), (0, -1)),
+    "swing": ((0, 0.6), (0, -1)),
+    "fling": ((0, 1), (0, -0.5)),
+    "waggle": ((0, 1), (0, -1), (0, 1)),
+    "swell": ((0, 0.5), (0, -0.75), (0, 1)),
+    "hello": ((1, 0), (1, 1), (1, -1)),
 }
 
 
@@ -48,8 +55,8 @@ class Effort(NamedTuple):
     ----------
     path
         A key of ``PATHS``.
-    size
-        How far it drives [m], or turns [°] where the path only turns.
+    ahead_m, turn_deg
+        How far it drives [m] and turns [°].
     out, back
         Speed on the way out and on the way home, as shares of the limits. Out faster than back is
         sudden, the other way round is sustained.
@@ -60,16 +67,17 @@ class Effort(NamedTuple):
     """
 
     path: str
-    size: float
+    ahead_m: float
+    turn_deg: float
     out: float
     back: float
     hold_s: float
     score: Score
 
     @property
-    def turns(self) -> bool:
-        """Whether it turns on the spot, and so exists to both sides."""
-        return all(ahead == 0 for ahead, _turn in PATHS[self.path])
+    def sides(self) -> tuple[int, ...]:
+        """To which sides it exists: the left (1) and the right (-1) where it turns."""
+        return (1, -1) if self.turn_deg else (1,)
 
 
 class Pool(NamedTuple):
@@ -84,145 +92,145 @@ TABLE: dict[str, Pool] = {
     "joy": Pool(
         gettext_noop("Joy"),
         (
-            Effort("dash", 0.15, 1.0, 1.0, 0.0, RISING),
-            Effort("look", 70, 1.0, 1.0, 0.0, RISING_HIGH),
-            Effort("climb", 0.14, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("peek", 60, 1.0, 1.0, 0.0, RISING),
-            Effort("look", 64, 1.0, 0.75, 0.0, RISING_HIGH),
-            Effort("ebb", 0.14, 1.0, 1.0, 0.0, RISING_HIGH),
-            Effort("dash", 0.12, 1.0, 1.0, 0.4, RISING_LONG),
-            Effort("look", 60, 1.0, 1.0, 0.3, RISING_LONG),
-            Effort("linger", 60, 1.0, 1.0, 0.0, RISING),
+            Effort("waggle", 0, 23.5, 1.0, 1.0, 0.0, RISING),
+            Effort("wag", 0, 32, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("swell", 0, 29, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("swing", 0, 35, 1.0, 1.0, 0.0, RISING),
+            Effort("fling", 0, 38, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("wag", 0, 28, 1.0, 1.0, 0.3, RISING_LONG),
         ),
     ),
     "streak_3": Pool(
         gettext_noop("Three in a row"),
         (
-            Effort("dash", 0.17, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("look", 75, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("climb", 0.15, 1.0, 1.0, 0.0, RISING_HIGH),
-            Effort("ebb", 0.15, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("peek", 66, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("linger", 66, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("wag", 0, 35, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("swell", 0, 30, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("swing", 0, 38, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("fling", 0, 42, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("waggle", 0, 23.5, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("wag", 0, 32, 1.0, 1.0, 0.3, RISING_HIGH),
         ),
     ),
     "streak_5": Pool(
         gettext_noop("Five in a row"),
         (
-            Effort("dash", 0.18, 1.0, 1.0, 0.0, RISING_HIGH),
-            Effort("look", 82, 1.0, 1.0, 0.0, RISING_HIGH),
-            Effort("peek", 68, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("climb", 0.16, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("ebb", 0.16, 1.0, 1.0, 0.0, RISING_HIGH),
-            Effort("linger", 68, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("wag", 0, 38, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("waggle", 0, 23.5, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("swing", 0, 42, 1.0, 1.0, 0.0, RISING_HIGH),
+            Effort("fling", 0, 46, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("swell", 0, 31, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("wag", 0, 35, 1.0, 1.0, 0.3, RISING_LONG),
         ),
     ),
     "streak_10": Pool(
         gettext_noop("Ten in a row"),
         (
-            Effort("dash", 0.20, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("look", 90, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("peek", 70, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("climb", 0.17, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("ebb", 0.17, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("linger", 72, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("wag", 0, 41, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("swing", 0, 46, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("swell", 0, 32, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("fling", 0, 50, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("waggle", 0, 24, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("wag", 0, 38, 1.0, 1.0, 0.3, RISING_LONG),
         ),
     ),
     "comeback": Pool(
         gettext_noop("Comeback"),
         (
-            Effort("dash", 0.14, 0.75, 1.0, 0.2, RISING_LONG),
-            Effort("look", 62, 0.75, 1.0, 0.0, RISING),
-            Effort("climb", 0.13, 0.85, 1.0, 0.0, RISING),
-            Effort("linger", 58, 1.0, 1.0, 0.0, RISING_LONG),
-            Effort("peek", 58, 0.85, 1.0, 0.0, RISING),
-            Effort("ebb", 0.13, 0.85, 1.0, 0.0, RISING_LONG),
+            Effort("swing", 0, 34, 0.9, 1.0, 0.0, RISING_LONG),
+            Effort("wag", 0, 28, 0.9, 1.0, 0.0, RISING),
+            Effort("swell", 0, 28, 1.0, 1.0, 0.0, RISING_LONG),
+            Effort("fling", 0, 36, 0.9, 1.0, 0.0, RISING_LONG),
+            Effort("wag", 0, 26, 1.0, 1.0, 0.3, RISING),
         ),
     ),
     "disappointment": Pool(
         gettext_noop("Disappointment"),
         (
-            Effort("look", 58, 0.75, 0.75, 0.0, FALLING),
-            Effort("dash", 0.12, 0.75, 0.75, 0.0, LOW_FALLING),
-            Effort("linger", 52, 0.8, 0.75, 0.0, SIGHING),
-            Effort("peek", 52, 0.75, 0.8, 0.0, LOW_FALLING),
-            Effort("look", 50, 0.85, 0.75, 0.4, SIGHING),
-            Effort("ebb", 0.115, 0.8, 0.75, 0.0, FALLING),
-            Effort("dash", 0.11, 0.8, 0.75, 0.4, SIGHING),
-            Effort("look", 56, 0.9, 0.65, 0.0, LOW_FALLING),
+            Effort("look", 0, 62, 0.45, 0.7, 0.3, FALLING),
+            Effort("look", 0, 66, 0.5, 0.7, 0.3, LOW_FALLING),
+            Effort("linger", 0, 60, 0.55, 0.6, 0.0, SIGHING),
+            Effort("peek", 0, 60, 0.55, 0.6, 0.0, LOW_FALLING),
+            Effort("look", 0, 58, 0.5, 0.6, 0.4, SIGHING),
         ),
     ),
     "near_miss": Pool(
         gettext_noop("Near miss"),
         (
-            Effort("look", 60, 1.0, 0.75, 0.0, ASKING),
-            Effort("dash", 0.12, 1.0, 0.75, 0.2, ASKING),
-            Effort("climb", 0.12, 1.0, 0.85, 0.0, ASKING),
-            Effort("ebb", 0.12, 1.0, 0.8, 0.0, ASKING),
-            Effort("peek", 52, 1.0, 0.8, 0.0, ASKING),
-            Effort("linger", 54, 1.0, 0.85, 0.0, ASKING),
+            Effort("look", 0, 60, 1.0, 0.75, 0.0, ASKING),
+            Effort("dash", 0.12, 0, 1.0, 0.75, 0.2, ASKING),
+            Effort("climb", 0.12, 0, 1.0, 0.85, 0.0, ASKING),
+            Effort("ebb", 0.12, 0, 1.0, 0.8, 0.0, ASKING),
+            Effort("peek", 0, 52, 1.0, 0.8, 0.0, ASKING),
+            Effort("linger", 0, 54, 1.0, 0.85, 0.0, ASKING),
         ),
     ),
     "effort": Pool(
         gettext_noop("Effort"),
         (
-            Effort("dash", 0.13, 0.75, 0.9, 0.0, ASKING),
-            Effort("climb", 0.12, 0.85, 0.9, 0.0, ASKING),
-            Effort("look", 58, 0.75, 0.9, 0.0, ASKING),
-            Effort("peek", 54, 0.8, 1.0, 0.0, ASKING),
-            Effort("ebb", 0.12, 0.85, 0.9, 0.0, ASKING),
-            Effort("linger", 54, 0.85, 0.9, 0.0, ASKING),
+            Effort("dash", 0.13, 0, 0.75, 0.9, 0.0, ASKING),
+            Effort("climb", 0.12, 0, 0.85, 0.9, 0.0, ASKING),
+            Effort("look", 0, 58, 0.75, 0.9, 0.0, ASKING),
+            Effort("peek", 0, 54, 0.8, 1.0, 0.0, ASKING),
+            Effort("ebb", 0.12, 0, 0.85, 0.9, 0.0, ASKING),
+            Effort("linger", 0, 54, 0.85, 0.9, 0.0, ASKING),
         ),
     ),
     "greeting": Pool(
         gettext_noop("Greeting"),
         (
-            Effort("dash", 0.14, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("peek", 54, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("look", 60, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("dash", 0.12, 0.9, 0.9, 0.4, NEUTRAL),
-            Effort("linger", 56, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("climb", 0.12, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("dash", 0.15, 0, 0.7, 0.7, 0.5, NEUTRAL),
+            Effort("climb", 0.14, 0, 0.8, 0.7, 0.3, NEUTRAL),
+            Effort("dash", 0.13, 0, 0.6, 0.6, 0.6, NEUTRAL),
+            Effort("ebb", 0.14, 0, 0.7, 0.8, 0.3, NEUTRAL),
+            Effort("dash", 0.16, 0, 0.8, 0.6, 0.2, NEUTRAL),
+            Effort("climb", 0.12, 0, 0.7, 0.8, 0.4, NEUTRAL),
+            Effort("ebb", 0.12, 0, 0.8, 0.7, 0.4, NEUTRAL),
+            Effort("dash", 0.14, 0, 0.6, 0.8, 0.4, NEUTRAL),
+            Effort("hello", 0.11, 12, 1.0, 1.0, 0.0, NEUTRAL),
         ),
     ),
     "rest": Pool(
         gettext_noop("Rest"),
         (
-            Effort("look", 50, 0.75, 0.75, 0.2, NEUTRAL),
-            Effort("dash", 0.11, 0.75, 0.75, 0.2, NEUTRAL),
-            Effort("linger", 50, 0.8, 0.8, 0.0, NEUTRAL),
-            Effort("peek", 50, 0.8, 0.8, 0.0, NEUTRAL),
-            Effort("ebb", 0.11, 0.8, 0.75, 0.0, NEUTRAL),
+            Effort("dash", 0.11, 0, 0.5, 0.5, 0.2, NEUTRAL),
+            Effort("climb", 0.11, 0, 0.5, 0.5, 0.0, NEUTRAL),
+            Effort("ebb", 0.11, 0, 0.5, 0.5, 0.0, NEUTRAL),
+            Effort("dash", 0.12, 0, 0.5, 0.6, 0.0, NEUTRAL),
+            Effort("climb", 0.115, 0, 0.6, 0.5, 0.0, NEUTRAL),
+            Effort("ebb", 0.115, 0, 0.6, 0.5, 0.0, NEUTRAL),
+            Effort("dash", 0.11, 0, 0.6, 0.5, 0.3, NEUTRAL),
+            Effort("climb", 0.11, 0, 0.55, 0.6, 0.2, NEUTRAL),
         ),
     ),
     "farewell": Pool(
         gettext_noop("Farewell"),
         (
-            Effort("linger", 54, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("ebb", 0.13, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("dash", 0.12, 1.0, 0.75, 0.3, NEUTRAL),
-            Effort("look", 64, 0.9, 0.8, 0.0, NEUTRAL),
-            Effort("climb", 0.12, 0.9, 0.9, 0.0, NEUTRAL),
-            Effort("peek", 54, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("linger", 0, 54, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("ebb", 0.13, 0, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("dash", 0.12, 0, 1.0, 0.75, 0.3, NEUTRAL),
+            Effort("look", 0, 64, 0.9, 0.8, 0.0, NEUTRAL),
+            Effort("climb", 0.12, 0, 0.9, 0.9, 0.0, NEUTRAL),
+            Effort("peek", 0, 54, 0.9, 0.9, 0.0, NEUTRAL),
         ),
     ),
 }
 
 # No variant is performed below 10 cm or 45°, however weak the answer and however quiet the room: a
 # walker 2 m away sees that without looking for it. (Ours.)
-LEAST_M, LEAST_RAD = 0.105, math.radians(46.5)  # a player stops a little before each place
+LEAST_M, LEAST_RAD = 0.105, math.radians(47)  # a player stops a little before each place
+# Of what does not fit into 4.5 s on a late base at a gentle pace, gentle answers have none [s].
+MOST_S = 4.2
 # Beside the time that it needs, for each waypoint; at home a late base may turn once more.
 ROOM_S, HOME_ROOM_S = 0.5, 1.2
 
 
 def _compose(name: str, label: str, row: Effort, side: int) -> Gesture:
     """Return the variant of a row that turns to the left (1) or to the right (-1)."""
-    path = PATHS[row.path]
-    size_m, turn_rad = (0.0, math.radians(row.size)) if row.turns else (row.size, 0.0)
-    end = max(range(len(path)), key=lambda at: max(path[at]))  # of the way out
+    path, turn_rad = PATHS[row.path], math.radians(row.turn_deg)
+    end = max(range(len(path)), key=lambda at: (path[at][0] + abs(path[at][1]), at))  # way out's
     places = [
         Waypoint(
-            size_m * ahead,
+            row.ahead_m * ahead,
             0.0,
             side * turn_rad * turn,
             within_s=GESTURE_MAX_S,
@@ -240,13 +248,15 @@ def _compose(name: str, label: str, row: Effort, side: int) -> Gesture:
             strict=True,
         )
     )
-    least = LEAST_RAD / turn_rad if row.turns else LEAST_M / size_m
+    turns = [0.0, *(turn for _ahead, turn in path)]
+    swept_rad = turn_rad * (max(turns) - min(turns))
+    least = LEAST_M / row.ahead_m if row.ahead_m else LEAST_RAD / swept_rad
     return Gesture(name, label, waypoints, row.score, least=min(least, 1.0))
 
 
 def _spread(pool: str, label: str, rows: Sequence[Effort]) -> Iterator[Gesture]:
-    """Yield the variants of a pool: one of each row, or two where it turns on the spot."""
-    sides = [(row, side) for row in rows for side in ((1, -1) if row.turns else (1,))]
+    """Yield the variants of a pool: one of each row and side."""
+    sides = [(row, side) for row in rows for side in row.sides]
     for number, one in enumerate(sides, start=1):
         yield _compose(f"{pool}_{number}", f"{label} {number}", *one)
 
@@ -254,14 +264,20 @@ def _spread(pool: str, label: str, rows: Sequence[Effort]) -> Iterator[Gesture]:
 # Idle life between answers: smaller and slower than any answer, lights alone. No cue names it.
 IDLE_SCORE = Score((Light(0.0, Color.ORANGE, Color.OFF),))
 IDLE_ROWS = (
-    Effort("dash", 0.04, 0.5, 0.5, 0.0, IDLE_SCORE),  # a breath
-    Effort("look", 16, 0.5, 0.5, 0.0, IDLE_SCORE),  # a small gaze
-    Effort("dash", 0.05, 0.4, 0.4, 0.3, IDLE_SCORE),
-    Effort("look", 12, 0.5, 0.4, 0.5, IDLE_SCORE),
-    Effort("look", 20, 0.5, 0.5, 0.0, IDLE_SCORE),
+    Effort("dash", 0.025, 0, 0.5, 0.5, 0.0, IDLE_SCORE),  # a breath
+    Effort("look", 0, 8, 0.5, 0.5, 0.0, IDLE_SCORE),  # a small gaze
+    Effort("dash", 0.03, 0, 0.4, 0.4, 0.3, IDLE_SCORE),
+    Effort("look", 0, 7, 0.5, 0.4, 0.5, IDLE_SCORE),
+    Effort("look", 0, 10, 0.5, 0.5, 0.0, IDLE_SCORE),
 )
 IDLE = tuple(_spread("idle", gettext_noop("Idle"), IDLE_ROWS))  # in full size: never scaled
 POOLS: dict[str, tuple[Gesture, ...]] = {
     pool: tuple(_spread(pool, label, rows)) for pool, (label, rows) in TABLE.items()
 }
 VARIANTS: dict[str, Gesture] = {one.name: one for pool in POOLS.values() for one in pool}
+
+
+@cache
+def variants(pool: str, pace: float) -> tuple[Gesture, ...]:
+    """Return a pool's variants that are short enough at a share of the limits."""
+    return tuple(one for one in POOLS[pool] if one.scaled(one.least).min_duration_s(pace) <= MOST_S)

@@ -22,7 +22,7 @@ def preview(gesture: Gesture, pace: float = 1.0, *, is_quiet: bool = False) -> d
     gesture
         What to play.
     pace
-        Share of each waypoint's own pace, above 0 and up to 1.
+        Share of the limits to go at, at most, above 0 and up to 1.
     is_quiet
         Whether it is played for a quiet room.
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from PIL import Image, ImageDraw
 
-from robot.bases.twin.renderer import WALKER, Renderer
+from robot.bases.twin.renderer import WALKER, Renderer, View
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import BUILT_IN
@@ -27,16 +27,17 @@ from robot.motion.pools import IDLE, POOLS
 from robot.motion.preview import ANNOUNCED_S
 from robot.wire.cue_limits import VARIED
 from tests.support.robot_stage import walk_ten_minutes
-from tests.support.variants import LEVELS, at_level
+from tests.support.variants import at_level, levels_of
 
 # What a viewer names, and the pools that it is.
 CLASSES = {
     "joy": ("joy", "streak_3", "streak_5", "streak_10", "comeback"),
     "disappointment": ("disappointment",),
     "greeting": ("greeting",),
-    "idle or rest": ("idle", "rest"),
+    "idle": ("idle",),
 }
-FRAMES, ACROSS, LABEL_PX = 10, 5, 22
+FRAMES, EVERY_S, ACROSS, LABEL_PX = 16, 0.3, 4, 22  # as far apart in each strip: speed is seen
+BASE = View((2.0, 0.0, 1.55), (0.06, 0.0, 0.08), 15.0, 360, 270)  # from the same eyes, nearer
 SESSION_ACROSS = 8  # answers in a row of a session's sheet
 
 
@@ -68,8 +69,7 @@ def choose(seed: int, *, each: int | None, has_face: bool) -> list[Strip]:
             Strip(gesture, kind, level, has_face)
             for name in names
             for gesture in pools[name]
-            for level in LEVELS
-            if name != "idle" or level != "least"  # an idle motion answers nothing: never scaled
+            for level in levels_of(gesture.name)
         ]
         chosen += shown if each is None else chance.sample(shown, min(each, len(shown)))
     chance.shuffle(chosen)
@@ -77,19 +77,17 @@ def choose(seed: int, *, each: int | None, has_face: bool) -> list[Strip]:
 
 
 def film(strip: Strip, renderer: Renderer, frames: int) -> list[tuple[float, Image.Image]]:
-    """Return pictures of a gesture, from announcement to end, and when each was taken [s]."""
+    """Return pictures of a gesture from its first motion on, and when each was taken [s]."""
     gesture, pace = at_level(strip.gesture, strip.level)
     if strip.gesture in IDLE:  # never scaled
         gesture = strip.gesture
     played = dry_run(gesture, pace=pace)
-    took_s = ANNOUNCED_S + played.took_s
     _, script = find_act(gesture.name, is_glad=gesture.score.mood == "glad")
     taken = []
     for number in range(frames):
-        at_s = took_s * number / (frames - 1)
-        tick = max(round((at_s - ANNOUNCED_S) / TICK_S), 0)
-        look = look_at(script, at_s) if strip.has_face else REST
-        pose = played.poses[min(tick, len(played.poses) - 1)]
+        at_s = EVERY_S * number
+        look = look_at(script, ANNOUNCED_S + at_s) if strip.has_face else REST
+        pose = played.poses[min(round(at_s / TICK_S), len(played.poses) - 1)]
         taken.append((at_s, renderer.picture(pose, look)))
     return taken
 
@@ -114,7 +112,7 @@ def draw_session(answers: Sequence[str], renderer: Renderer) -> Image.Image:
     for number, name in enumerate(answers):
         x, y = number % SESSION_ACROSS * wide, number // SESSION_ACROSS * high
         for half, (_, picture) in enumerate(
-            film(Strip(BUILT_IN[name], "", "full"), renderer, 7)[1:4:2]
+            film(Strip(BUILT_IN[name], "", "full"), renderer, 5)[2:5:2]
         ):
             sheet.paste(picture.resize((90, 146)), (x + half * 90, y))
     return sheet
@@ -127,10 +125,11 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--key", type=Path, required=True, help="which strip is which (JSON)")
     parser.add_argument("--seed", type=int, default=36, help="of names and order (default: 36)")
     parser.add_argument("--each", type=int, help="strips of each class (default: all variants)")
-    parser.add_argument("--no-face", action="store_true", help="the motion alone: a still face")
+    parser.add_argument("--no-face", action="store_true", help="the base alone, below its mast")
     options = parser.parse_args(arguments)
     options.folder.mkdir(parents=True, exist_ok=True)
-    renderer, key = Renderer(WALKER), list[dict[str, Any]]()
+    renderer = Renderer(BASE if options.no_face else WALKER)
+    key = list[dict[str, Any]]()
     chosen = choose(options.seed, each=options.each, has_face=not options.no_face)
     codes = random.Random(f"{options.seed} codes").sample(range(100, 1000), len(chosen))
     for code, strip in zip(codes, chosen, strict=True):
@@ -144,7 +143,7 @@ def main(arguments: Sequence[str]) -> None:
     for name, (above, below) in zip("XY", sessions, strict=True):
         stage = walk_ten_minutes(options.seed, above=above, below=below)
         seen = [one["gesture"] for one in stage.of("decision") if one["gesture"]]
-        draw_session(seen, renderer).save(options.folder / f"session-{name}.png")
+        draw_session(seen, Renderer(WALKER)).save(options.folder / f"session-{name}.png")
         key.append({"session": name, "above": above, "below": below, "answers": seen})
     options.key.write_text(json.dumps({"seed": options.seed, "strips": key}, indent=1) + "\n")
 

@@ -11,10 +11,10 @@ from robot.behavior.variety import APART
 from robot.motion.pools import POOLS
 from tests.support.gesture_runs import play_seen
 from tests.support.robot_stage import walk_ten_minutes
-from tests.support.variants import LEVELS, at_level
+from tests.support.variants import LEVELS, at_level, levels_of
 
 SEED = 36
-SEEN, YIELDED = (0.10, 45), (0.08, 35)  # [m], [°]
+SEEN, YIELDED = (0.10, 45), (0.10, 40)  # [m], [°]
 MOST_S = 4.5
 # Nobody has measured the base: one that answers sooner than assumed stops short of its places.
 AT_ONCE = "answers at once"
@@ -57,16 +57,16 @@ def test_ten_minutes(slug, intensity):
 
 @pytest.mark.parametrize("floor", FLOORS)
 def test_every_variant_is_seen(floor):
-    print(f"\n{floor}: farthest [cm], turned [°], took [s] at " + ", ".join(LEVELS))
+    print(f"\n{floor}: farthest [cm], swept [°], took [s] at " + ", ".join(LEVELS))
     bad, (least_m, least_deg) = [], YIELDED if floor == AT_ONCE else SEEN
     for pool, variants in POOLS.items():
         for variant in variants:
             line = f"  {variant.name:18}"
-            for level in LEVELS:
+            for level in levels_of(variant.name):
                 gesture, pace = at_level(variant, level)
                 seen = play_seen(gesture, FLOORS[floor], pace)
-                line += f"  {100 * seen.away_m:5.1f} {seen.turned_deg:5.1f} {seen.took_s:4.2f}"
-                is_large = seen.away_m >= least_m or seen.turned_deg >= least_deg
+                line += f"  {100 * seen.away_m:5.1f} {seen.swept_deg:5.1f} {seen.took_s:4.2f}"
+                is_large = seen.away_m >= least_m or seen.swept_deg >= least_deg
                 if seen.outcome != "done" or seen.took_s > MOST_S or not is_large:
                     bad.append((pool, variant.name, level))
                     line += " !"

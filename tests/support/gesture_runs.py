@@ -66,12 +66,12 @@ def play_in_a_row(
 
 
 class Seen(NamedTuple):
-    """How far a gesture went, in truth."""
+    """How far a gesture went, in truth, and through which angle it turned."""
 
     outcome: str
     took_s: float
     away_m: float
-    turned_deg: float
+    swept_deg: float
 
 
 def play_seen(gesture: Gesture, faults: Imperfections, pace: float) -> Seen:
@@ -79,11 +79,12 @@ def play_seen(gesture: Gesture, faults: Imperfections, pace: float) -> Seen:
     clock = VirtualClock()
     base, player = OrdinaryBase(clock.monotonic, faults), Player(DEFAULT_LIMITS, Response())
     player.start(gesture, clock.now_s, base.read().pose, pace=pace)
-    away_m = turned_rad = 0.0
+    away_m, headings_rad = 0.0, [0.0]
     while player.is_busy:
         base.drive(player.step(clock.now_s, base.read().pose))
         clock.sleep(TICK_S)
         there = base.ground_truth().pose
         away_m = max(away_m, there.distance_m(HOME))
-        turned_rad = max(turned_rad, abs(there.heading_rad))
-    return Seen(player.outcome, clock.now_s, away_m, math.degrees(turned_rad))
+        headings_rad.append(there.heading_rad)
+    swept_deg = math.degrees(max(headings_rad) - min(headings_rad))
+    return Seen(player.outcome, clock.now_s, away_m, swept_deg)

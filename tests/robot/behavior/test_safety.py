@@ -302,7 +302,7 @@ def test_an_open_loop_refuses_long_gestures_and_halves_the_others():
     assert (closed.share, opened.share) == (1.0, 0.5)
     for gesture in BUILT_IN.values():
         assert closed.rejection_reason(gesture) == ""
-        is_long = gesture.min_duration_s > 4.0
+        is_long = gesture.min_duration_s() > 4.0
         assert opened.rejection_reason(gesture) == ("open_loop" if is_long else ""), gesture.name
 
 

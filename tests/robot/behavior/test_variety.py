@@ -25,7 +25,7 @@ def answers(seed, walked, name=VARIED):
     variety, chosen = Variety(seed), []
     for mean in walked:
         variety.observe(decision(mean))
-        choice = variety.choose(name, decision(mean))
+        choice = variety.choose(name, decision(mean), 1.0)
         variety.mark_started(choice)
         chosen.append(choice)
     return chosen

@@ -104,3 +104,9 @@ def test_a_response_is_accepted_within_its_bounds_alone(field, least, most):
     for beyond in (math.nextafter(least, -1), math.nextafter(most, 9), math.nan):
         with pytest.raises(ValueError, match=r"0 or more|lies|finite"):
             of_base(**{field: beyond})
+
+
+def test_one_that_answers_at_once_is_believed():
+    """A measured delay of 0 was taken for none: it stopped short, 5 mm from home (issue 36)."""
+    played = play_in_a_row(GESTURES["nod"], Imperfections(0.0, 0.02), times=4)
+    assert max(one.away_m for one in played) < 0.0025

@@ -182,7 +182,7 @@ def test_what_is_admitted_stays_near_and_comes_home_at_any_intensity(moves, inte
         return
     assert validate_gesture(json.loads(json.dumps(data(*moves)))) == gesture
     scaled = gesture.scaled(intensity)
-    assert scaled.min_duration_s <= gesture.min_duration_s + 1e-9
+    assert scaled.min_duration_s() <= gesture.min_duration_s() + 1e-9
     outcome, truth, ordered = perform(scaled, pace)
     assert outcome == DONE
     assert truth.farthest_m <= REACH_M + 0.01 < TETHER_M

@@ -32,7 +32,7 @@ def test_every_cue_names_gestures_that_exist():
 
 @pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda one: one.name)
 def test_each_is_short_near_and_never_goes_out_backwards(gesture):
-    assert gesture.min_duration_s <= 3.3  # its corners are cut: it takes up to 3 s
+    assert gesture.min_duration_s() <= 3.3  # its corners are cut: it takes up to 3 s
     assert max(waypoint.pose.distance_m(HOME) for waypoint in gesture.waypoints) <= REACH_M
     farthest_m, start = 0.0, HOME
     for waypoint in gesture.waypoints:

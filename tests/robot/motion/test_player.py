@@ -114,7 +114,7 @@ def late(gesture, goes):
     [(0.6, False, DONE), (0.45, True, DONE), (0.1, False, OUT_OF_TIME)],
 )
 def test_a_small_miss_is_made_up_for_slowly(goes, is_late, outcome):
-    player, floor = late(VARIANTS["joy_2"], goes)
+    player, floor = late(VARIANTS["near_miss_1"], goes)
     assert (player.outcome, player._is_late) == (outcome, is_late)
     if outcome == DONE:
         assert is_at_home(floor.pose)

@@ -5,13 +5,14 @@ import math
 import pytest
 
 from robot.bases.kinematic import Imperfections
+from robot.behavior.cue import QUIET_PACE
 from robot.motion.dry_run import dry_run
 from robot.motion.limits import REACH_M
 from robot.motion.path import Drive, plan_path
-from robot.motion.pools import POOLS, VARIANTS
+from robot.motion.pools import POOLS, VARIANTS, variants
 from robot.motion.pose import HOME
 from tests.support.gesture_runs import play_in_a_row
-from tests.support.variants import SHOWN
+from tests.support.variants import SHOWN, at_level, levels_of
 
 
 def late_cases():
@@ -38,16 +39,35 @@ def test_it_ends_at_home_on_a_base_that_nobody_has_measured(name, dead_time_s):
 @pytest.mark.parametrize("name", VARIANTS)
 def test_it_is_seen_at_its_least_and_short(name):
     gesture = VARIANTS[name]
-    for pace, most_s, size in (
-        (1, 3.3, gesture.least),
-        (1, 3.3, 1.0),
-        (0.5, 4.5, max(gesture.least, 0.5)),
-    ):
-        played = dry_run(gesture.scaled(size), pace=pace)
-        turned_rad = max(abs(pose.heading_rad) for pose in played.poses)
+    for level in levels_of(name):
+        sized, pace = at_level(gesture, level)
+        played = dry_run(sized, pace=pace)
+        headings_rad = [pose.heading_rad for pose in played.poses]
         assert played.outcome == "done"
-        assert played.took_s <= most_s
-        assert played.farthest_m >= 0.10 or turned_rad >= math.radians(45)
+        assert played.took_s <= 4.2
+        swept_rad = max(headings_rad) - min(headings_rad)
+        assert played.farthest_m >= 0.10 or swept_rad >= math.radians(45)
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_its_motion_tells_what_it_means(name):
+    """Two viewers read no motion before: joy and disappointment both turned aside, once."""
+    pool, gesture = name.rpartition("_")[0], VARIANTS[name]
+    turns = [waypoint.heading_rad for waypoint in gesture.waypoints]
+    paces = [waypoint.pace for waypoint in gesture.waypoints]
+    if pool in {"joy", "streak_3", "streak_5", "streak_10", "comeback"}:
+        assert min(turns) < 0 < max(turns)
+        assert min(paces) >= 0.9
+    elif pool == "disappointment":
+        assert min(turns) == 0 or max(turns) == 0
+        assert max(map(abs, turns)) >= math.radians(58)
+        assert max(paces) <= 0.7
+        assert gesture.reach_m == 0
+    elif pool == "greeting":
+        assert gesture.reach_m >= 0.105
+    elif pool == "rest":
+        assert gesture.turn_rad == 0
+        assert max(paces) <= 0.6
 
 
 def test_no_variant_goes_far_or_out_backwards():
@@ -68,3 +88,4 @@ def test_pools_hold_enough_variants_and_no_two_of_a_pool_move_alike():
             tuple((w.x_m, w.heading_rad, w.pace, w.hold_s) for w in one.waypoints) for one in pool
         }
         assert len(motions) == len(pool) >= 8, name
+        assert len(variants(name, QUIET_PACE)) >= 8, name
