@@ -130,6 +130,32 @@ def test_what_is_wrong_with_a_phone_is_told_and_marks_no_miss(
     assert all(valid) if late is None else not any(valid[before + late :])
 
 
+@pytest.mark.long
+def test_a_phone_that_is_strapped_on_otherwise_is_told(
+    server: Server, browser: Browser, visit: Visit
+):
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    pt = visit(walk.monitor_path, walk, size="laptop")
+    with browser.new_context(base_url=server.url) as pocket:
+        pocket.set_default_timeout(PATIENCE_MS)
+        page = pocket.new_page()
+        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        phone = WornPhone(page, 40)
+        phone.walk(0, 9.5)  # how it stood is known once it is known how a leg swings
+        page.click("[data-lock]")
+        page.reload()
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        phone.walk(0, 9.5, lambda part: slip(part) + np.eye(7)[0] * 20)  # seconds later
+        expect(page.locator("[data-show=verdict]")).to_contain_text("compared with last time")
+        expect(page.locator("[data-show=verdict]")).to_have_attribute("data-sign", "amber")
+        expect(pt.locator("[data-presence=source]")).to_contain_text("differently from last time")
+        page.click("[data-lock]")  # the therapist takes it as it is
+        expect(pt.locator("[data-presence=source]")).not_to_contain_text("differently")
+
+
 @pytest.mark.essential
 def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
     with browser.new_context(base_url=server.url) as pocket:
