@@ -179,16 +179,18 @@ def test_after_a_stroke():
         # Sensors of all legs sit alike: y to the right.
         signs += detector.left is not None and detector.left[1] < -0.5
     shares, ends, alone = {}, [], {}
-    for name, own in found.items():
+    for name, strides in found.items():
         pair = [name.replace("right", "left"), name.replace("left", "right")]
         t_s, cycles = count_cycles(*(walks[one] for one in pair))
-        steady = [one for one in own if one.initial_contact_s >= STARTS_S]
+        steady = [one for one in strides if one.initial_contact_s >= STARTS_S]
         begin, end = np.interp([steady[0].initial_contact_s, steady[-1].end_s], t_s, cycles)
         shares[name] = len(steady) / (end - begin)
         ends += [begin - np.interp(STARTS_S, t_s, cycles), cycles[-1] - end]
-        others, _ = find_contacts(found[next(one for one in pair if one != name)])
-        between = [((others > one.initial_contact_s) & (others < one.end_s)).sum() for one in own]
-        alone[name] = between.count(1) / len(own)
+        opposite, _ = find_contacts(found[next(one for one in pair if one != name)])
+        between = [
+            ((opposite > one.initial_contact_s) & (opposite < one.end_s)).sum() for one in strides
+        ]
+        alone[name] = between.count(1) / len(strides)
     low, high = min(shares.values()), max(shares.values())
     print(f"\n{signs} of {len(walks)} signs right; {low:.1%} … {high:.1%} of the strides found, at "
           f"most {max(ends):.1f} before and after them; {min(alone.values()):.1%} or more have one "
