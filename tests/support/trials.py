@@ -258,11 +258,12 @@ def answers(
     """
     seen = {}
     trial.looked_at = trial.looked_at or timezone.now()
-    exports = [reverse("prepare-research"), reverse("advance-research")]
+    exports = [reverse(f"{step}-research") for step in ("prepare", "advance")]
+    exports = [url for url in exports if url in urls]
     for name, client in actors.items():
         own = [*trial.addresses(), *(trial.family if name == FAMILY else [])]
         with time_machine.travel(trial.looked_at):
-            for url in dict.fromkeys([*own, *urls]):
+            for url in dict.fromkeys([*exports, *own, *urls]):  # files stay: they are made anew
                 seen[name, "get", url] = read(client, "get", url)
                 if url in own or url in exports:
                     seen[name, "post", url] = read(client, "post", url)
