@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 
-def write_atomically(path: Path, data: bytes, *, mode: int = 0o600) -> None:
-    """Write a file under another name beside it, and replace it once the disk has the new one.
+@contextmanager
+def replacing(path: Path, mode: int = 0o600) -> Iterator[BinaryIO]:
+    """Provide a new file; at the end of the block, once the disk has it, it replaces another.
 
     Parameters
     ----------
     path
-        The file; a symbolic link is followed. Its folder exists.
-    data
-        What it holds then.
+        The file; a symbolic link is replaced, never followed. Its folder exists.
     mode
         Who may read and write it.
 
@@ -23,13 +25,12 @@ def write_atomically(path: Path, data: bytes, *, mode: int = 0o600) -> None:
     OSError
         Where it cannot be written; the old file is left as it was, and the new one is removed.
     """
-    path = path.resolve()
     new = path.with_name(f".{path.name}.new")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     new.unlink(missing_ok=True)
     try:
         with os.fdopen(os.open(new, flags, mode), "wb") as file:
-            file.write(data)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         new.replace(path)
@@ -41,3 +42,9 @@ def write_atomically(path: Path, data: bytes, *, mode: int = 0o600) -> None:
             os.fsync(folder)  # the new name as well
         finally:
             os.close(folder)
+
+
+def write_atomically(path: Path, data: bytes, *, mode: int = 0o600) -> None:
+    """Write a file as ``replacing`` does, but through a symbolic link."""
+    with replacing(path.resolve(), mode) as file:
+        file.write(data)

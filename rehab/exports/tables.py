@@ -206,18 +206,9 @@ ASSESSMENTS = Table(
     ),
 )
 # Steps come before events, whose times count from the first step in motion data (research.bids).
-TABLES: tuple[Table, ...] = (
-    *(
-        SESSIONS,
-        STEPS,
-        FEEDBACK,
-        EVENTS,
-        ANSWERS,
-        ASSESSMENTS,
-        CORRECTIONS,
-        INCIDENTS,
-        STUDY_VISITS,
-    ),
+TABLES = (
+    *(SESSIONS, STEPS, FEEDBACK, EVENTS, ANSWERS),
+    *(ASSESSMENTS, CORRECTIONS, INCIDENTS, STUDY_VISITS),
 )
 CODEBOOK = ("file", "column", "unit", "meaning", "type", "rules_version")
 

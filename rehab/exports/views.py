@@ -23,7 +23,7 @@ from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Patient, User
 from rehab.people.networks import client_address
-from rehab.people.roles import Role
+from rehab.people.roles import PATIENT_EXPORTERS, SESSION_EXPORTERS
 from rehab.people.sign_in import step_up
 from rehab.people.web.csv_tables import CsvWriter
 from rehab.sessions.models import TrainingSession
@@ -32,7 +32,7 @@ from rehab.sessions.reports.insight import read_view, to_table
 SECONDS_OF_A_CALL = 1.5  # in which an export goes on; the page asks again and again
 
 
-@for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
+@for_roles(*PATIENT_EXPORTERS, patients=False)  # audited here, before the first byte
 @step_up.required_for_download
 @require_GET
 def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
@@ -44,7 +44,7 @@ def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     return _stream(patient_files(user, patient, now), name)
 
 
-@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
+@for_roles(*SESSION_EXPORTERS, patients=False)
 @step_up.required
 @require_safe
 def show_export(request: HttpRequest) -> HttpResponse:
@@ -65,7 +65,7 @@ def show_export(request: HttpRequest) -> HttpResponse:
     return render(request, "exports/export.html", context)
 
 
-@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first byte
+@for_roles(*SESSION_EXPORTERS, patients=False)  # audited here, before the first byte
 @step_up.required_for_download
 @require_GET
 def download_sessions(request: HttpRequest) -> HttpResponse:
@@ -80,7 +80,7 @@ def research_folder(user: User) -> Path:
     return Path(settings.DATA_DIR) / "exports" / str(user.pk)
 
 
-@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first file
+@for_roles(*SESSION_EXPORTERS, patients=False)  # audited here, before the first file
 @step_up.required
 @require_POST
 def prepare_research(request: HttpRequest) -> HttpResponse:
@@ -98,7 +98,7 @@ def prepare_research(request: HttpRequest) -> HttpResponse:
     return redirect("export")
 
 
-@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
+@for_roles(*SESSION_EXPORTERS, patients=False)
 @require_POST
 def advance_research(request: HttpRequest) -> HttpResponse:
     """Write some more sessions of the export that was begun; return how far it is."""
@@ -114,7 +114,7 @@ def advance_research(request: HttpRequest) -> HttpResponse:
     return JsonResponse({"done": reached.done, "total": reached.total})
 
 
-@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first byte
+@for_roles(*SESSION_EXPORTERS, patients=False)  # audited here, before the first byte
 @step_up.required_for_download
 @require_GET
 def download_research(request: HttpRequest) -> HttpResponse:
@@ -128,7 +128,7 @@ def download_research(request: HttpRequest) -> HttpResponse:
     return _stream(package.files(), name)
 
 
-@for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
+@for_roles(*PATIENT_EXPORTERS, patients=False)  # audited here, before the first byte
 @step_up.required_for_download
 @require_GET
 def download_insight(request: HttpRequest) -> HttpResponse:

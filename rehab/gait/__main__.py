@@ -20,9 +20,9 @@ import numpy as np
 from rehab.gait.offline import measure_strides
 from rehab.gait.recordings.columns import ALL_CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
-from rehab.gait.recordings.limits import limit_resources
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
 from rehab.gait.recordings.readers import read_any_table, read_signals, require_columns
+from rehab.gait.recordings.resource_limits import limit_resources
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.settings import check_mass
 from rehab.gait.setup.check import add_own, check_setup, compare_with_setup

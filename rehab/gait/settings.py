@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
+from rehab.gait.signals.filters import CUTOFF_HZ
 from rehab.gait.strides import GaitInputError
 
 RATE_MIN_HZ, RATE_MAX_HZ = 50.0, 5000.0
 RATE_TOLERANCE = 1.01  # 50 Hz by stamps are 49.9
 MASS_MIN_KG, MASS_MAX_KG = 10.0, 300.0
 LOOK_AHEAD_MAX_S = 0.2
-CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
-RELEASE_N = 20.0
-CUTOFF_HZ = 6.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

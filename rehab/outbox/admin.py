@@ -28,6 +28,19 @@ class EndpointForm(ClinicForm):
         help_text=_("Sent as a Bearer token; empty to leave it as it is."),
     )
 
+    def clean_token(self) -> str:
+        """Return the token; a stored one, which nobody sees, is sent to no other address."""
+        token: str = self.cleaned_data["token"]
+        row = self.instance
+        if (
+            row.kind == Endpoint.Kind.FHIR
+            and row.secret
+            and "url" in self.changed_data
+            and not token
+        ):
+            raise forms.ValidationError(_("For another address give the token again."))
+        return token
+
 
 @admin.register(Endpoint)
 class EndpointAdmin(ScopedAdmin):

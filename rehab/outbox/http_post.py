@@ -10,12 +10,14 @@ from __future__ import annotations
 import socket
 import ssl
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
+from threading import Timer
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-TIMEOUT_S = 10.0
+TIMEOUT_S = 10.0  # to connect, and then for the whole answer: others wait behind a slow one
 MAX_ANSWER_BYTES = 2000
 # Prefixes through which an IPv6 address reaches an IPv4 one.
 TRANSLATED = [ip_network(text) for text in ("64:ff9b::/96", "64:ff9b:1::/48", "2002::/16")]
@@ -115,11 +117,23 @@ def post(
     secure = (context or ssl.create_default_context()) if is_encrypted else None
     connection = _PinnedConnection(place.hostname, port, address, secure)
     path = (place.path or "/") + (f"?{place.query}" if place.query else "")
+    late: Timer | None = None
     try:
+        connection.connect()
+        late = Timer(TIMEOUT_S, _hang_up, [connection.sock])
+        late.start()
         connection.request("POST", path, body, dict(headers))
         answer = connection.getresponse()
         return Answer(answer.status, answer.read(MAX_ANSWER_BYTES).decode(errors="replace"))
     except HTTPException as problem:
         raise OSError(f"{type(problem).__name__}: {problem}") from None
     finally:
+        if late is not None:
+            late.cancel()
         connection.close()
+
+
+def _hang_up(sock: socket.socket) -> None:
+    """End a connection that another thread reads from; it reads the end."""
+    with suppress(OSError):
+        socket.socket.shutdown(sock, socket.SHUT_RDWR)

@@ -108,6 +108,10 @@ def rights_of(role: str, model_name: str) -> Right:
     return RIGHTS.get(model_name, {}).get(Role(role), Right.NONE)
 
 
+# Who may export: a patient's data by name, and all sessions by pseudonyms (rehab/exports).
+PATIENT_EXPORTERS = (Role.LEAD, Role.PT)
+SESSION_EXPORTERS = (Role.LEAD, Role.RESEARCHER)
+
 # Models whose rows are persons.
 PERSONS = frozenset({"Patient", "User"})
 

@@ -137,110 +137,26 @@ A2 = Measure(
 )
 
 # Of sensors on feet and shanks (docs/sources.md). Both contacts depend on where one sits, so each
-# place has its own share of stance. Bounds are what no walking leg passes; first goals are those of
-# healthy walking.
-WORN_MEASURES = (
-    Measure(
-        slug="foot_stance",
-        name=gettext_noop("stance share (sensor on the foot)"),
-        unit="%",
-        value_min=20.0,
-        value_max=98.0,
-        goal_min=0.0,
-        goal_max=95.0,
-        channel="foot_stance_percent",
-        first_goal=62.0,
-    ),
-    Measure(
-        slug="shank_stance",
-        name=gettext_noop("stance share (sensor on the shank)"),
-        unit="%",
-        value_min=20.0,
-        value_max=98.0,
-        goal_min=0.0,
-        goal_max=95.0,
-        channel="shank_stance_percent",
-        first_goal=62.0,
-    ),
-    Measure(
-        slug="foot_swing",
-        name=gettext_noop("swing share (sensor on the foot)"),
-        unit="%",
-        value_min=2.0,
-        value_max=80.0,
-        goal_min=0.0,
-        goal_max=70.0,
-        channel="foot_swing_percent",
-        first_goal=38.0,
-    ),
-    Measure(
-        slug="shank_swing",
-        name=gettext_noop("swing share (sensor on the shank)"),
-        unit="%",
-        value_min=2.0,
-        value_max=80.0,
-        goal_min=0.0,
-        goal_max=70.0,
-        channel="shank_swing_percent",
-        first_goal=38.0,
-    ),
-    Measure(
-        slug="step_asymmetry",
-        name=gettext_noop("difference of step times"),
-        unit="%",
-        value_min=0.0,
-        value_max=100.0,
-        goal_min=0.0,
-        goal_max=80.0,
-        higher_is_better=False,
-        channel="step_asymmetry_percent",
-        first_goal=10.0,
-    ),
-    Measure(
-        slug="cadence",
-        name=gettext_noop("cadence"),
-        unit="1/min",
-        value_min=15.0,
-        value_max=260.0,
-        goal_min=0.0,
-        goal_max=200.0,
-        channel="cadence_min",
-        first_goal=100.0,
-    ),
-    Measure(
-        slug="foot_strike",
-        name=gettext_noop("foot strike angle"),
-        unit="°",
-        value_min=-60.0,
-        value_max=60.0,
-        goal_min=0.0,
-        goal_max=45.0,
-        channel="foot_strike_deg",
-        first_goal=20.0,
-    ),
-    Measure(
-        slug="push_off_speed",
-        name=gettext_noop("push-off speed of the foot"),
-        unit="°/s",
-        value_min=0.0,
-        value_max=1500.0,
-        goal_min=0.0,
-        goal_max=1200.0,
-        channel="push_off_deg_s",
-        first_goal=400.0,
-    ),
-    Measure(
-        slug="shank_lean",
-        name=gettext_noop("shank lean at toe-off"),
-        unit="°",
-        value_min=-30.0,
-        value_max=90.0,
-        goal_min=0.0,
-        goal_max=80.0,
-        channel="shank_lean_deg",
-        first_goal=40.0,
-    ),
-)
+# place has its own share of stance. Bounds are what no walking leg passes. Columns as in `_PLATES`.
+_WORN = (
+    ("foot_stance", gettext_noop("stance share (sensor on the foot)"), "%", "foot_stance_percent",
+     20.0, 98.0, 95.0, 62.0, True),
+    ("shank_stance", gettext_noop("stance share (sensor on the shank)"), "%",
+     "shank_stance_percent", 20.0, 98.0, 95.0, 62.0, True),
+    ("foot_swing", gettext_noop("swing share (sensor on the foot)"), "%", "foot_swing_percent",
+     2.0, 80.0, 70.0, 38.0, True),
+    ("shank_swing", gettext_noop("swing share (sensor on the shank)"), "%", "shank_swing_percent",
+     2.0, 80.0, 70.0, 38.0, True),
+    ("step_asymmetry", gettext_noop("difference of step times"), "%", "step_asymmetry_percent",
+     0.0, 100.0, 80.0, 10.0, False),
+    ("cadence", gettext_noop("cadence"), "1/min", "cadence_min", 15.0, 260.0, 200.0, 100.0, True),
+    ("foot_strike", gettext_noop("foot strike angle"), "°", "foot_strike_deg",
+     -60.0, 60.0, 45.0, 20.0, True),
+    ("push_off_speed", gettext_noop("push-off speed of the foot"), "°/s", "push_off_deg_s",
+     0.0, 1500.0, 1200.0, 400.0, True),
+    ("shank_lean", gettext_noop("shank lean at toe-off"), "°", "shank_lean_deg",
+     -30.0, 90.0, 80.0, 40.0, True),
+)  # fmt: skip
 
 # Of force plates and markers (docs/sources.md#other-measures): slug, name, unit, channel, the
 # smallest and the largest value and the largest goal of walking, the first goal (a healthy
@@ -277,9 +193,12 @@ _PLATES = (
     ("margin", gettext_noop("margin of stability (backward)"), "m", "margin_m",
      -1.0, 1.0, 0.8, 0.08, True, 0.004),
 )  # fmt: skip
-PLATE_MEASURES = tuple(
-    Measure(slug, name, unit, least, most, 0.0, most_goal, is_more, channel, first_goal)
-    for slug, name, unit, channel, least, most, most_goal, first_goal, is_more, _ in _PLATES
+PLATE_MEASURES, WORN_MEASURES = (
+    tuple(
+        Measure(slug, name, unit, least, most, 0.0, most_goal, is_more, channel, first_goal)
+        for slug, name, unit, channel, least, most, most_goal, first_goal, is_more, *_ in rows
+    )
+    for rows in (_PLATES, _WORN)
 )
 TYPICAL_SD = {row[3]: row[-1] for row in _PLATES}
 

@@ -30,11 +30,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from robot.port.fresh_order import MAX_FRAME_BYTES
 from robot.port.opening import PortOpener
 from robot.port.orphan_stop import OrphanStop
 from robot.port.owner import PortOwner
 from robot.port.priority import raise_priority
-from robot.port.setpoint import MAX_FRAME_BYTES
 
 LINES_KEPT = 25  # received ones, while nobody reads them: half a second
 

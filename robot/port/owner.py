@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from robot.port.setpoint import Setpoint
+from robot.port.fresh_order import FreshOrder
 
 SEND_EVERY_S = 0.02
 READ_S = 0.005  # how long a read waits; a stop is delayed by at most that
@@ -60,7 +60,7 @@ class PortOwner:
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.setpoint = Setpoint(stop)
+        self.setpoint = FreshOrder(stop)
         self.opened = 0
         self.problem = "The port has not been opened yet."
         self._open_port = open_port

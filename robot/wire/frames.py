@@ -8,8 +8,9 @@ import re
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
-from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS, MAX_NESTING
+from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS
 
+MAX_NESTING = 8  # of objects and lists in a report
 NAME = re.compile(rf"[A-Za-z0-9_.:-]{{1,{MAX_NAME_CHARS}}}")
 # What no text in a database may hold: NUL, and single halves of surrogate pairs (a whole pair is
 # one character). Only an escape can write them.

@@ -8,13 +8,11 @@ SERVER_HEADER = "GARRY-Server"
 SERVER_COOKIE = "garry_server"  # the same of browsers
 
 MAX_FRAME_BYTES = 64 * 1024
-MAX_REPORT_CHARS = 8 * 1024
 MAX_STEPS = 256  # in one frame, and without an acknowledgment
 MAX_REASONS = 8  # of one step
 MAX_EXTRA = 40  # named values beside a step's own
 MAX_NAME_CHARS = 64
 MAX_CUE_GESTURES = 8  # composed ones that come along with a cue
-MAX_NESTING = 8  # of objects and lists in a report
 
 # Times in seconds since 1970 are accepted, times in milliseconds are not.
 TIME_MAX_S = 1e10

@@ -64,7 +64,7 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
 
     from rehab.sessions.live import auth
     from rehab.sessions.live.database import owners
-    from rehab.sessions.live.protocol import backlog
+    from rehab.sessions.live.protocol import backlog, resent_steps
     from rehab.sessions.live.session import loading
     from rehab.sessions.live.session.commits import Job, commit
     from rehab.sessions.models import TrainingSession
@@ -107,7 +107,7 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     assert isinstance(measure, Measure)
     yield (
         "a step that came again",
-        lambda: async_to_sync(backlog.is_duplicate)(keys[0], resent, measure),
+        lambda: async_to_sync(resent_steps.is_duplicate)(keys[0], resent, measure),
     )
     device = Device.everywhere.filter(kind=Device.Kind.SOURCE)[0]
     tablet = Device.everywhere.filter(kind=Device.Kind.TABLET)[0]

@@ -15,6 +15,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "rehab/training/valences.py",
         "if not 0 <= (self.hit_points or 1) <= POINTS_MAX:",
     ): "0 and 1 are both between the bounds",
+    (
+        "robot/motion/pose.py",
+        "straight = math.sin(half_rad) / half_rad if abs(half_rad) >= 1e-09 else 1.0",
+    ): "sin x / x is 1 there, to the last digit",
 }
 
 _COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {

@@ -203,3 +203,14 @@ def test_ranks_follow_from_the_figures(figures, later, ties):
             half = (len(now) + 1) // 2
             assert all(cutoff_rank(board, each.row) <= half or each.row == row for each in chosen)
             assert not [c for c in chosen if c.has_rank and cutoff_rank(board, c.row) > half]
+
+
+def test_the_boards_read_last_are_cached_and_as_many_as_it_says():
+    cache.clear_cache()
+    first, second, *_ = kept = [cache._find_cached(key) for key in range(cache.MAX_BOARDS)]
+    assert [cache._find_cached(key) for key in range(cache.MAX_BOARDS)] == kept
+    assert cache._find_cached(0) is first  # now the second one was read longest ago
+    cache._find_cached("one more")
+    assert cache._find_cached(0) is first
+    assert cache._find_cached(1) is not second
+    cache.clear_cache()

@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
+from scipy.spatial.transform import Rotation
 
 from tests.support.browsers import PATIENCE_MS, Visit
 from tests.support.servers import Server
+from tests.support.simulated_leg import Floats
 from tests.support.walk_seed import make_walks
-from tests.support.worn_phone import WornPhone, read_steps
+from tests.support.worn_phone import Change, WornPhone, read_steps
 
-pytestmark = [pytest.mark.browser, pytest.mark.essential]
+pytestmark = pytest.mark.browser
 
 
+@pytest.mark.essential
 def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: Visit):
     (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
     pt = visit(walk.monitor_path, walk, size="laptop")
@@ -75,6 +79,84 @@ def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: V
         assert not any(is_valid for is_valid, _ in later)  # and so none is a missed goal
 
 
+def slip(part: Floats) -> Floats:
+    """Turn a phone by 25° on its leg."""
+    matrix = np.eye(7)
+    matrix[1:4, 1:4] = matrix[4:, 4:] = Rotation.from_euler(
+        "xz", (25, 10), degrees=True
+    ).as_matrix()
+    return part @ matrix.T
+
+
+LOW_BATTERY = "navigator.getBattery = async () => ({ charging: false, level: 0.1 })"
+# What happens to a phone after 20 s, what the therapist reads, and how many strides may count until
+# then; None where all do.
+TROUBLES: dict[str, tuple[Change, str, int | None]] = {
+    "slow": (lambda part: part[np.arange(len(part)) % 3 > 0], "too slowly", 2),
+    "gap": (lambda part: part[abs(part[:, 0] - 21) > 0.25], "missed samples", 1),
+    "slip": (slip, "has moved", 5),
+    "battery": (lambda part: part, "battery is low", None),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", TROUBLES)
+def test_what_is_wrong_with_a_phone_is_told_and_marks_no_miss(
+    name: str, server: Server, browser: Browser, visit: Visit
+):
+    change, words, late = TROUBLES[name]
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    pt = visit(walk.monitor_path, walk, size="laptop")
+    with browser.new_context(base_url=server.url) as pocket:
+        pocket.set_default_timeout(PATIENCE_MS)
+        if name == "battery":
+            pocket.add_init_script(LOW_BATTERY)
+        page = pocket.new_page()
+        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        pt.click("[data-main]")
+        expect(pt.locator("[data-presence=source]")).to_contain_text("connected")
+        phone = WornPhone(page, 40)
+        phone.walk(0, 20)
+        before = phone.strides
+        phone.walk(20, 40, change)
+        expect(pt.locator("[data-presence=source]")).to_contain_text(words)
+        page.locator("[data-lock]").dispatch_event("click")
+        expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
+        assert phone.strides > before + 4
+        valid = [is_valid for is_valid, _ in read_steps(server, walk.session)]
+    assert all(valid[:before])
+    assert all(valid) if late is None else not any(valid[before + late :])
+
+
+@pytest.mark.long
+def test_a_phone_that_is_strapped_on_otherwise_is_told(
+    server: Server, browser: Browser, visit: Visit
+):
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    pt = visit(walk.monitor_path, walk, size="laptop")
+    with browser.new_context(base_url=server.url) as pocket:
+        pocket.set_default_timeout(PATIENCE_MS)
+        page = pocket.new_page()
+        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        phone = WornPhone(page, 40)
+        phone.walk(0, 9.5)  # how it stood is known once it is known how a leg swings
+        page.click("[data-lock]")
+        page.reload()
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        phone.walk(0, 9.5, lambda part: slip(part) + np.eye(7)[0] * 20)  # seconds later
+        expect(page.locator("[data-show=verdict]")).to_contain_text("compared with last time")
+        expect(page.locator("[data-show=verdict]")).to_have_attribute("data-sign", "amber")
+        expect(pt.locator("[data-presence=source]")).to_contain_text("differently from last time")
+        page.click("[data-lock]")  # the therapist takes it as it is
+        expect(pt.locator("[data-presence=source]")).not_to_contain_text("differently")
+
+
+@pytest.mark.essential
 def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
     with browser.new_context(base_url=server.url) as pocket:
         page = pocket.new_page()
@@ -86,6 +168,7 @@ def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
         expect(page.locator("[data-show=refusal]")).to_contain_text("https")
 
 
+@pytest.mark.essential
 def test_a_therapist_shows_the_square_once(visit: Visit):
     page = visit("/stations/", size="laptop")
     page.click("text=A phone as a sensor")

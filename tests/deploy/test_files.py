@@ -56,6 +56,15 @@ def test_a_unit_starts_a_command_that_exists(unit: Path) -> None:
     assert all(one.startswith(f"/var/lib/{read['Service']['StateDirectory']}/") for one in written)
 
 
+def test_containers_of_others_are_named_by_digest() -> None:
+    """A tag can be given to another image; what stands in a digest cannot."""
+    texts = [(DEPLOY / name).read_text() for name in ("Dockerfile", "compose.yaml")]
+    named = re.findall(r"^(?:FROM|\s*image:) (\S+)", "\n".join(texts), re.MULTILINE)
+    others = {name for name in named if name != "garry"}
+    assert {name.partition(":")[0] for name in others} == {"node", "python", "postgres", "haproxy"}
+    assert all(re.fullmatch(r"\w+:[\w.-]+@sha256:[0-9a-f]{64}", name) for name in others)
+
+
 def parse_source(arguments: list[str]) -> None:
     """Parse a source's options as its command does."""
     options = ["--listen", "tcp://127.0.0.1:9101", "--mass", "75"]

@@ -8,18 +8,22 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
+from django.urls import reverse
 
 from rehab.outbox.delivery import deliver_due, is_due
 from rehab.outbox.http_post import Answer
 from rehab.outbox.models import Endpoint, OutboxMessage
+from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
+from rehab.people.sign_in.step_up import CONFIRMED_AT
 from tests.support.clock import START as NOW
 from tests.support.programs import ROOT, program_of
+from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.walks import walk
-from tests.support.world import build_world
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
 KINDS = ("Patient", "Encounter", "Observation", "QuestionnaireResponse", "Provenance", "Device")
@@ -144,6 +148,25 @@ def test_the_whole_clinic_is_exported_a_line_each(world):
             fhir.get_fhir_model_class(kind).model_validate_json(line)
 
 
+@pytest.mark.parametrize("path", ["bulk/Patient.ndjson?before=2100-01-01T00:00:00Z", "$export"])
+def test_an_open_screen_does_not_let_the_whole_clinic_out(world, path):
+    browser = client_of(world)
+    store = browser.session
+    shown_at = store[CONFIRMED_AT]
+    store[CONFIRMED_AT] = 0
+    store.save()
+    refused = browser.get(f"{ROOT}/fhir/{path}")
+    assert refused.status_code == 403
+    assert reverse("confirm") in refused.json()["message"]
+    store[CONFIRMED_AT] = shown_at
+    store.save()
+    assert browser.get(f"{ROOT}/fhir/{path}").status_code in (200, 202)
+    noted = AuditEntry.everywhere.filter(act=Act.EXPORT, clinic=world.clinic)
+    assert [one.about.rpartition("/")[2] for one in noted] == (
+        ["Patient.ndjson"] if "bulk" in path else []
+    )
+
+
 class FhirServer:
     """Stores what is put, as a server does that knows transactions."""
 
@@ -213,6 +236,23 @@ def test_what_is_sent_is_valid_and_what_is_read_is_the_same(world, endpoint):
     for entry in json.loads(sent[0])["entry"]:
         answer = read(world, entry["request"]["url"])
         assert json.loads(answer.content) == entry["resource"]
+
+
+def test_what_a_running_study_hides_is_sent_when_it_is_closed(world, endpoint):
+    """An assessor may read the hospital's record, where points and hits would tell the arm."""
+    study = running_study(world)
+    enrollment = enrolled(study, new_patient(world))
+    walk(enrollment.patient, "binary", [4.0] * 4)
+    server = FhirServer()
+    server.is_away = False
+    assert deliver_due(NOW + timedelta(hours=1), server) == 0
+    (message,) = OutboxMessage.everywhere.filter(endpoint=endpoint)
+    assert (message.state, server.stored) == ("refused", {})
+    assert "once the study is closed" in message.answer
+    type(study).everywhere.filter(pk=study.pk).update(state="closed")
+    message.send_again(NOW)
+    assert deliver_due(NOW + timedelta(hours=2), server) == 1
+    assert f"Encounter/session-{message.body['session']}" in server.stored
 
 
 def test_an_erased_patient_and_a_refusal_are_shown_and_not_repeated(world, endpoint):

@@ -47,6 +47,31 @@ def test_the_weakest_foot_is_found_with_the_right_sign(name, strides):
         assert times.std() / times.mean() < 0.12
 
 
+def test_the_sign_is_not_taken_from_a_leg_that_is_hardly_known():
+    """It begins in the middle of a walk, as after a reload, and swings around as much as ahead."""
+    (walk,) = stroke_walks("pp01_003_leftfoot")
+    later = walk.picked((walk.t_s >= 52.85) & (walk.t_s < 77.85))
+    found, detector = measure(later)
+    assert detector.left[1] < -0.5
+    assert len(found) >= 8
+
+
+@pytest.mark.parametrize("begin_s", np.arange(0, STRIDE_S, 0.2))
+def test_the_sign_is_known_soon_wherever_a_walk_begins(begin_s):
+    t_s, rate, acceleration = walk_foot(begin_s + 7)
+    later = t_s >= begin_s
+    detector = WearableDetector("foot")
+    assert len(detector.feed(t_s[later], rate[later], acceleration[later])) >= 3
+    assert detector.left[1] > 0.8
+
+
+def test_the_wobble_of_a_foot_that_has_landed_prolongs_no_swing():
+    walk = next(stroke_walks("pp03_003_leftfoot")).picked(slice(1500, 4500))
+    times = [one.stride_s for one in measure(walk)[0]]
+    assert len(times) >= 26
+    assert max(times) < 1.25 * np.median(times)
+
+
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_people_and_sensors_lose_no_stride(name):
     walk = next(stroke_walks("pp03_005_leftfoot")).picked(slice(0, 4000))

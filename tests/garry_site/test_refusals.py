@@ -5,11 +5,14 @@ from __future__ import annotations
 import io
 import logging
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
+from django.conf import settings
 from django.test import Client
+from django.utils.module_loading import import_string
 
-from garry_site.logs import REFUSAL_EVERY_S, REFUSALS_AT_ONCE, LineFormatter, RefusalFilter
+from garry_site.logs import REFUSAL_EVERY_S, REFUSALS_AT_ONCE, LineFormatter
 
 pytestmark = pytest.mark.django_db
 
@@ -22,7 +25,10 @@ class Log:
         self._stream = io.StringIO()
         self.handler = logging.StreamHandler(self._stream)
         self.handler.setFormatter(LineFormatter("%(levelname)s %(name)s: %(message)s"))
-        self.handler.addFilter(RefusalFilter(lambda: self.now_s))
+        served: Any = settings.LOGGING
+        for name in served["handlers"]["stderr"]["filters"]:
+            make = import_string(served["filters"][name]["()"])
+            self.handler.addFilter(make(lambda: self.now_s))
 
     def lines(self) -> list[str]:
         """Return the lines since this was asked last."""

@@ -15,17 +15,12 @@ from rehab.people.roles import Role
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from tests.support.forms import gesture_form
-from tests.support.world import World, build_world, client_of
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
 WAVE: list[dict[str, Any]] = [{"turn_deg": 30}, {"turn_deg": -60, "hold_s": 0.5}, {"turn_deg": 30}]
 ADD = "/admin/rehab/composedgesture/add/"
-
-
-@pytest.fixture
-def pt(world: World) -> Client:
-    return client_of(world)
 
 
 def complaints(page: Any) -> list[str]:

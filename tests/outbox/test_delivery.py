@@ -15,7 +15,7 @@ from django.urls import reverse
 
 from rehab.exports.encryption import generate_key
 from rehab.outbox.delivery import deliver_due, is_due, sign
-from rehab.outbox.http_post import Answer
+from rehab.outbox.http_post import Answer, Refused
 from rehab.outbox.models import PAUSES, Endpoint, OutboxMessage, Topic, notify
 from rehab.people.roles import Role
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
@@ -143,6 +143,26 @@ def test_a_refusal_is_final_and_shown(world, endpoint, status, active):
     assert f"{status} no more" in page
 
 
+@pytest.mark.parametrize("cause", ["address", "key"])
+def test_what_never_can_be_sent_is_refused_at_once(world, endpoint, cause):
+    for _ in range(2):
+        notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    if cause == "key":
+        Endpoint.everywhere.filter(pk=endpoint.pk).update(secret="of another key")
+    assert deliver_due(NOW, Receiver(Refused("A private address."))) == 0
+    assert [one.state for one in messages(endpoint)] == ["refused", "waiting"]  # one each call
+    words = {"address": "A private address.", "key": "Give the receiver a new secret."}[cause]
+    assert words in messages(endpoint)[0].answer
+
+
+def test_a_new_secret_signs_from_then_on(world, endpoint):
+    old, address = endpoint.open_secret(), reverse("admin:rehab_endpoint_changelist")
+    page = world.lead.post(address, {"action": "renew_secrets", "_selected_action": [endpoint.pk]})
+    endpoint.refresh_from_db()
+    assert endpoint.open_secret() != old
+    assert endpoint.open_secret() in page.content.decode()
+
+
 def test_a_message_is_claimed_by_one_server(world, endpoint):
     notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
     inner = Receiver()
@@ -208,6 +228,19 @@ class Hook(BaseHTTPRequestHandler):
 
     def log_message(self, *_):
         pass
+
+
+def test_a_stored_token_goes_to_no_other_address(world):
+    endpoint = add_endpoint(world, kind=Endpoint.Kind.FHIR)
+    page = reverse("admin:rehab_endpoint_change", args=[endpoint.pk])
+    form = {"name": "Hook", "url": "https://elsewhere.example/in", "active": "on"}
+    assert "give the token again" in world.lead.post(page, form).content.decode()
+    assert world.lead.post(page, form | {"url": endpoint.url, "name": "EHR"}).status_code == 302
+    kept = Endpoint.everywhere.get(pk=endpoint.pk)
+    assert (kept.name, kept.open_secret()) == ("EHR", endpoint.open_secret())
+    assert world.lead.post(page, form | {"token": "its-own"}).status_code == 302
+    moved = Endpoint.everywhere.get(pk=endpoint.pk)
+    assert (moved.url, moved.open_secret()) == (form["url"], "its-own")
 
 
 def test_over_a_real_socket_where_the_host_allows_the_network(world, settings):

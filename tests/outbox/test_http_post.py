@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import socket
+import socketserver
+import threading
+import time
+from contextlib import suppress
 
 import pytest
 
@@ -54,6 +58,29 @@ def test_the_address_that_was_checked_is_the_one_that_is_reached(monkeypatch):
     with pytest.raises(ConnectionRefusedError):
         post("https://receiver.example:8443/hook", b"", {}, [])
     assert reached == [("93.184.216.34", 8443)]
+
+
+def test_a_receiver_that_dawdles_is_hung_up_on(monkeypatch):
+    """Everybody's messages wait behind it. It would send a letter of a header each 10 ms."""
+    monkeypatch.setattr(http_post, "TIMEOUT_S", 0.3)
+    sent = []
+
+    class Dawdler(socketserver.BaseRequestHandler):
+        def handle(self):
+            self.request.sendall(b"HTTP/1.1 200 OK\r\nX-Slow: ")
+            with suppress(OSError):
+                for _ in range(300):
+                    self.request.sendall(b"x")
+                    sent.append(1)
+                    time.sleep(0.01)
+
+    with socketserver.TCPServer(("127.0.0.1", 0), Dawdler) as server:
+        thread = threading.Thread(target=server.handle_request)
+        thread.start()
+        with suppress(OSError):
+            post(f"http://127.0.0.1:{server.server_address[1]}/", b"", {}, ["127.0.0.1/32"])
+        thread.join()
+    assert 0 < len(sent) < 200
 
 
 @pytest.mark.parametrize("url", ["ftp://x.example/", "//x.example/", "https:///", "x", ""])

@@ -96,6 +96,18 @@ def test_accounts_are_made_only_where_the_host_says_so(linked, settings):
         sign_on.find_account({"sub": "4713", "groups": ["cardiology"]})
 
 
+def test_an_assessor_gets_no_second_account(linked, world, settings):
+    """Whose own is not linked, or not any more; the mark would stay with that one."""
+    group(linked, "gait", Role.PT)
+    settings.OIDC_CREATE = True
+    give_mark(running_study(world), linked, Task.ASSESSOR, None, NOW)
+    assert sign_on.find_account({"sub": "4712", "groups": ["gait"]}) != linked
+    linked.subject = None
+    linked.save()
+    with pytest.raises(SignOnRefused, match="An assessor of your clinic has not linked"):
+        sign_on.find_account({"sub": "4711", "groups": ["gait"]})
+
+
 @pytest.mark.parametrize(
     ("claims", "shown"),
     [({}, False), ({"acr": "gold"}, True), ({"amr": ["pwd", "mfa"]}, True), ({"acr": "1"}, False)],

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from robot.__main__ import main
+from tests.support.commands import finish, hear_sigint
 from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 
 REPO = Path(__file__).parents[2]
@@ -21,11 +22,6 @@ def _no_environment(monkeypatch):
         monkeypatch.delenv(name, raising=False)
 
 
-def hear_sigint():
-    """Undo what a shell does to a command in the background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 async def start(garry, *arguments, token=TOKEN):
     return await asyncio.create_subprocess_exec(
         *(sys.executable, "-W", "error", "-m", "robot", "--base", "kinematic"),
@@ -36,12 +32,6 @@ async def start(garry, *arguments, token=TOKEN):
         stderr=asyncio.subprocess.PIPE,
         preexec_fn=None if sys.platform == "win32" else hear_sigint,
     )
-
-
-async def finish(process):
-    async with asyncio.timeout(20):
-        _, text = await process.communicate()
-    return process.returncode, text.decode()
 
 
 async def end_with_stdin(process):

@@ -16,17 +16,10 @@ from robot.link import (
     Timing,
 )
 from robot.wire.limits import MAX_FRAME_BYTES
-from tests.support.running_client import serving
+from tests.support.running_client import serving, until
 
 QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
 HELLO = {"type": "hello", "version": 1}
-
-
-async def until(condition):
-    """Wait until something holds that nobody will tell us of."""
-    async with asyncio.timeout(5):
-        while not condition():  # noqa: ASYNC110
-            await asyncio.sleep(0.002)
 
 
 class Losses:

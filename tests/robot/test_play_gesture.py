@@ -16,6 +16,7 @@ from robot.bases.twinned import TwinBase
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import TETHER_M
 from robot.play_gesture import play_gesture
+from tests.support.commands import hear_sigint
 from tests.support.fake_kobuki import FakeKobuki
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
@@ -25,11 +26,6 @@ ROOT = Path(__file__).parents[2]
 def is_home(pose):
     away_m = math.hypot(pose["x_m"], pose["y_m"])
     return away_m <= 0.02 and abs(pose["heading_rad"]) <= math.radians(2)
-
-
-def hear_sigint():
-    """Undo what a shell does to a command in the background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("name", {**GESTURES} | ORIGINALS)

@@ -4,6 +4,7 @@ activity.
 
 from __future__ import annotations
 
+import re
 from datetime import timedelta
 from typing import Any
 
@@ -13,6 +14,7 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
+from rehab.patients import urls
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
@@ -53,6 +55,18 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert "fell" not in seen(pt, "start")
     row = SessionEvent.everywhere.get(session=session, kind="fall_acknowledged")
     assert row.by == world.people[Role.PT]
+
+
+def test_each_page_of_a_patient_asks_for_alarms_where_they_are(world, session):
+    pt, asked = client_of(world), {}
+    for pattern in urls.urlpatterns:
+        if pattern.pattern.converters.keys() == {"patient_id"}:
+            address = reverse(pattern.name, args=[session.patient_id])
+            page = pt.get(address).content.decode()
+            asked[address] = re.search(r'data-alarms="([^"]*)"', page)
+    found = {address: match[1] for address, match in asked.items() if match}
+    assert len(found) >= 5
+    assert set(found.values()) == {reverse("alarms")}, found
 
 
 def test_another_clinic_acknowledges_nothing(world, session):

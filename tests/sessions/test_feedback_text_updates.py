@@ -14,14 +14,9 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from tests.support.walks import make_session
-from tests.support.world import build_world, client_of, set_owner
+from tests.support.world import build_world, set_owner
 
 pytestmark = pytest.mark.django_db(transaction=True)
-
-
-@pytest.fixture
-def pt(world):
-    return client_of(world)
 
 
 def begin(world, valence="positive", language="en"):

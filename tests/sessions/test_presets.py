@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from django.core.exceptions import ValidationError
-from django.test import Client
 
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient
@@ -20,11 +19,6 @@ from tests.support.marks import mark
 from tests.support.world import World, build_world, client_of
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
-
-
-@pytest.fixture
-def pt(world: World) -> Client:
-    return client_of(world)
 
 
 @pytest.fixture

@@ -236,7 +236,8 @@ def test_the_parser_of_an_upload_has_no_key_and_may_use_little(tmp_path, monkeyp
     monkeypatch.setenv("PGPASSWORD", "another")
     run = subprocess.run
     asked = (
-        "import json, os, resource; from rehab.gait.recordings.limits import limit_resources; "
+        "import json, os, resource; "
+        "from rehab.gait.recordings.resource_limits import limit_resources; "
         "limit_resources(); kinds = ('CPU', 'AS', 'FSIZE', 'NOFILE'); print(json.dumps({'names': "
         "sorted(os.environ), 'most': [resource.getrlimit(getattr(resource, f'RLIMIT_{kind}'))[0] "
         "for kind in kinds]}))"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 
 import pytest
-from django.test import Client
 
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient
@@ -25,14 +24,9 @@ from robot.wire.cue_limits import CueRule
 from tests.support.page_text import plain
 from tests.support.tablets import approved
 from tests.support.walks import make_patient, make_session
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def pt(world: World) -> Client:
-    return client_of(world)
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from rehab.sources.synthetic import PROFILES, walk
 from rehab.training.phases import make_phase
 from rehab.training.steps import Side
 from tests.sources.fake_garry import TOKEN, FakeGarry, serve_garry
+from tests.support.commands import finish, hear_sigint
 
 REPO = Path(__file__).parents[2]
 UNREACHABLE = ["--server", "http://127.0.0.1:9", "--token", TOKEN]
@@ -35,11 +36,6 @@ def recording(tmp_path):
     return path
 
 
-def hear_sigint():
-    """Undo what a shell does to a command in the background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 async def start(*arguments, **environment):
     return await asyncio.create_subprocess_exec(
         *(sys.executable, "-W", "error", "-m", "rehab.sources", *map(str, arguments)),
@@ -48,12 +44,6 @@ async def start(*arguments, **environment):
         stderr=asyncio.subprocess.PIPE,
         preexec_fn=None if sys.platform == "win32" else hear_sigint,
     )
-
-
-async def finish(process):
-    async with asyncio.timeout(20):
-        _, text = await process.communicate()
-    return process.returncode, text.decode()
 
 
 async def test_a_simulated_patient_dials_in_and_walks(tmp_path):

@@ -185,17 +185,20 @@ def fill(
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
             return
-        elif wanted == {"fhir_id"}:  # of each kind the clinic's own, by its session
-            of, what = world.session.pk, name.removeprefix("api:read_")
+        elif wanted == {"fhir_id"}:  # of each kind the clinic's own, by its sessions
+            what = name.removeprefix("api:read_")
+            answered = [(one.session_id, one.pk) for one in world.rows_of(QuestionnaireResponse)]
+            walked = [one.pk for one in world.rows_of(TrainingSession)]
             found = {
-                "Patient": f"patient-{world.patient.pk}",
-                "Encounter": f"session-{of}",
-                "Provenance": f"provenance-{of}",
-                "QuestionnaireResponse": f"answers-{of}-{world.rows[QuestionnaireResponse].pk}",
-                "Observation": f"figure-{of}-score",
+                "Patient": [f"patient-{one.pk}" for one in world.rows_of(Patient)],
+                "Encounter": [f"session-{pk}" for pk in walked],
+                "Provenance": [f"provenance-{pk}" for pk in walked],
+                "QuestionnaireResponse": [f"answers-{of}-{pk}" for of, pk in answered],
+                "Observation": [f"figure-{pk}-score" for pk in walked],
             }
-            url = reverse(name, kwargs={"fhir_id": found.get(what, "garry")})
-            yield Route(name, url, world.name, Patient) if what in found else Route(name, url)
+            for one in found.get(what, ["garry"]):
+                owner = (world.name, Patient) if what in found else ()
+                yield Route(name, reverse(name, kwargs={"fhir_id": one}), *owner)
         elif wanted == {"fhir_type"}:
             for what in FHIR_TYPES:
                 url = reverse(name, kwargs={"fhir_type": what})

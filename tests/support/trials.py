@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
 
+import time_machine
 from django.contrib.sessions.models import Session
 from django.db import transaction
 from django.test import Client
@@ -140,6 +141,8 @@ def add_records(session: TrainingSession, enrollment: Enrollment) -> list[Any]:
 class Trial:
     """A running study with participants of each arm, who have walked as many steps."""
 
+    looked_at: datetime | None = None  # when everybody looks, before and after the exchange
+
     def __init__(self, *, withdrawn: bool = False, ended: bool = True, pairs: int = 1) -> None:
         self.world = world = build_world("amber")
         fill_board(world)
@@ -198,7 +201,8 @@ class Trial:
         """Return the addresses of what the participants walked, and of their stations' tablets."""
         keys = "|".join(str(session.pk) for session in self.sessions)
         found = [route.url for route in all_routes((self.world,))]
-        own = [url for url in found if re.search(rf"(sessions|trainingsession)/({keys})/", url)]
+        named = re.compile(rf"(sessions/|trainingsession/|fhir/\w+/\w+-)({keys})(/|-|$)")
+        own = [url for url in found if named.search(url)]
         lists = ("api:list_sessions", "tablet-state", "waiting-board", "start")
         return [*dict.fromkeys(own), *(reverse(name) for name in lists)]
 
@@ -249,22 +253,28 @@ def answers(
     trial: Trial, actors: dict[str, Client], urls: Sequence[str] = ()
 ) -> dict[tuple[str, str, str], str]:
     """Return what every address answers each actor: to GET, and to POST the participants' own and
-    what makes an export. Nothing stays of it in the database.
+    what makes an export. Nothing stays of it in the database. Each actor's looks begin at the same
+    moment: pages tell of what is ten minutes old, which a busy machine takes.
     """
     seen = {}
-    exports = [reverse("prepare-research"), reverse("advance-research")]
+    trial.looked_at = trial.looked_at or timezone.now()
+    exports = [reverse(f"{step}-research") for step in ("prepare", "advance")]
+    exports = [url for url in exports if url in urls]
     for name, client in actors.items():
         own = [*trial.addresses(), *(trial.family if name == FAMILY else [])]
-        for url in dict.fromkeys([*own, *urls]):
-            seen[name, "get", url] = read(client, "get", url)
-            if url in own or url in exports:
-                seen[name, "post", url] = read(client, "post", url)
+        with time_machine.travel(trial.looked_at):
+            for url in dict.fromkeys([*exports, *own, *urls]):  # files stay: they are made anew
+                seen[name, "get", url] = read(client, "get", url)
+                if url in own or url in exports:
+                    seen[name, "post", url] = read(client, "post", url)
     for name, client in actors.items():  # the sockets, which ask the same of their token
         bearer = client.defaults.get("HTTP_AUTHORIZATION", "").removeprefix("Bearer ")
         token = client.cookies[COOKIE].value if COOKIE in client.cookies else bearer
-        device = find_device(token, timezone.now())
-        rows = TrainingSession.objects.visible_to(device).order_by("pk")
-        seen[name, "socket", ""] = str(list(rows.values_list("pk", "valence")))
+        with transaction.atomic():  # asked for, a device that is not trusted any more ends
+            device = find_device(token, timezone.now())
+            rows = TrainingSession.objects.visible_to(device).order_by("pk")
+            seen[name, "socket", ""] = str(list(rows.values_list("pk", "valence")))
+            transaction.set_rollback(True)
     return seen
 
 

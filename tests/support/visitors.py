@@ -59,30 +59,36 @@ class Visitor:
         return self.request("POST", path, urlencode(form), **kind)
 
     def dial(self, path: str) -> ClientConnection:
-        """Open a socket."""
+        """Open a socket. What nobody reads for a while on a busy machine does not break it."""
         own = {name: value for name, value in self._headers().items() if name != "X-CSRFToken"}
         return connect(
             f"ws{self.url.removeprefix('http')}{path}",
             additional_headers=own,
             origin=Origin(self.url),
             open_timeout=PATIENCE_S,
+            ping_interval=None,
             max_size=None,
+            max_queue=None,
         )
 
     def watch(self, path: str, hello: str = "") -> tuple[int, str]:
         """Open a socket, and say hello as a source. Return 0 and the snapshot or welcome, or the
-        close code and the refusal.
+        close code and the refusal. A connection that only breaks says nothing: dial again.
         """
-        said = ""
-        with self.dial(path) as socket:
-            try:
-                if hello:
-                    socket.send(hello)
-                while '"snapshot"' not in said and '"welcome"' not in said:
-                    said = str(socket.recv(PATIENCE_S))
-            except ConnectionClosed as closed:
-                return closed.rcvd.code if closed.rcvd else 0, said
-        return 0, said
+        for _ in range(3):
+            said = ""
+            with self.dial(path) as socket:
+                try:
+                    if hello:
+                        socket.send(hello)
+                    while '"snapshot"' not in said and '"welcome"' not in said:
+                        said = str(socket.recv(PATIENCE_S))
+                except ConnectionClosed as closed:
+                    if closed.rcvd is None:
+                        continue
+                    return closed.rcvd.code, said
+            return 0, said
+        raise ConnectionError(f"{path} broke three times")
 
     def _headers(self) -> dict[str, str]:
         cookies = {"csrftoken": CSRF} | self.cookies

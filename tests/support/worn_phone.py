@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Callable
 from contextlib import closing
 
 import numpy as np
 from playwright.sync_api import Page
 
 from tests.support.servers import Server
-from tests.support.simulated_leg import random_mounting, walk_foot
+from tests.support.simulated_leg import Floats, random_mounting, walk_foot
+
+Change = Callable[[Floats], Floats]
 
 # What a phone's browser says of a sample, as fast as it is given. Times are the phone's own.
 FEED = """([t0, rows]) => rows.forEach(([t, ax, ay, az, gx, gy, gz]) => {
@@ -44,10 +47,10 @@ class WornPhone:
         self._t_s = t_s
         self._start_ms = page.evaluate("performance.timeOrigin + performance.now()")
 
-    def walk(self, begin_s: float, end_s: float) -> None:
-        """Feed it with the samples of that time."""
+    def walk(self, begin_s: float, end_s: float, change: Change = lambda part: part) -> None:
+        """Feed it with the samples of that time: rows of s, m/s², °/s, which may be changed."""
         part = self._table[(self._t_s >= begin_s) & (self._t_s < end_s)]
-        self.page.evaluate(FEED, [self._start_ms, part.tolist()])
+        self.page.evaluate(FEED, [self._start_ms, change(part).tolist()])
 
     @property
     def strides(self) -> int:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, hilbert, sosfiltfilt
 
 from rehab.gait.wearables import WearableDetector, WearableStride
 from tests.support.data import signals
@@ -149,3 +150,19 @@ def match(found: Floats, true: Floats, within_s: float = 0.15) -> Floats:
     apart = found[np.newaxis] - true[:, np.newaxis]
     nearest = apart[np.arange(len(true)), np.abs(apart).argmin(axis=1)]
     return np.where(np.abs(nearest) <= within_s, nearest, np.nan)
+
+
+def count_cycles(left: Walk, right: Walk) -> tuple[Floats, Floats]:
+    """Return times [s] and how many strides were walked until then, without any detector.
+
+    By the phase of the left leg's rate less the right one's, both about the axis from left to
+    right: they swing in turn, so that a stride is one cycle of it, whatever each leg's shape. The
+    band, 0.5 to 1.5 times the trial's main frequency, leaves out its halves and multiples.
+    """
+    t_s = np.arange(0, min(left.t_s[-1], right.t_s[-1]), 0.01)
+    one, other = (np.interp(t_s, walk.t_s, walk.rate[:, 1]) for walk in (left, right))
+    power = np.abs(np.fft.rfft(one - other, 2**16))
+    hz = np.fft.rfftfreq(2**16, 0.01)
+    main_hz = hz[np.where((hz > 0.2) & (hz < 2), power, 0).argmax()]
+    band = butter(2, (0.5 * main_hz, 1.5 * main_hz), "bandpass", fs=100, output="sos")
+    return t_s, np.unwrap(np.angle(hilbert(sosfiltfilt(band, one - other)))) / (2 * np.pi)

@@ -22,9 +22,11 @@ from rehab.exports.fhir.resources import (
     session_resources,
 )
 from rehab.people.access import for_roles
+from rehab.people.audit.audit_log import Act, record
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
-from rehab.people.roles import Role
+from rehab.people.networks import client_address
+from rehab.people.roles import PATIENT_EXPORTERS
 from rehab.people.web.api_base import AwareDatetime, TextLine, caller, responses
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED_STATES
@@ -130,7 +132,7 @@ def _add_calls(kind: str) -> None:
         operation_id=f"search_{kind}",
         url_name=f"search_{kind}",
     )
-    @for_roles(Role.LEAD, Role.PT)
+    @for_roles(*PATIENT_EXPORTERS)
     def search(request: HttpRequest, wanted: Query[Search]) -> HttpResponse:
         found, has_more = _search(caller(request), kind, wanted)
         place = request.build_absolute_uri(request.path)
@@ -149,7 +151,7 @@ def _add_calls(kind: str) -> None:
         operation_id=f"read_{kind}",
         url_name=f"read_{kind}",
     )
-    @for_roles(Role.LEAD, Role.PT)
+    @for_roles(*PATIENT_EXPORTERS)
     def read(request: HttpRequest, fhir_id: Path[str]) -> HttpResponse:
         return _answer(_find(caller(request), kind, fhir_id))
 
@@ -157,7 +159,7 @@ def _add_calls(kind: str) -> None:
 
 
 @router.get("/fhir/metadata", response=responses(dict))
-@for_roles(Role.LEAD, Role.PT, patients=False)
+@for_roles(*PATIENT_EXPORTERS, patients=False)
 def show_capabilities(request: HttpRequest) -> HttpResponse:
     """Show what this FHIR server can do: its CapabilityStatement."""
     texts = {"patient": "reference", "encounter": "reference"}
@@ -204,7 +206,7 @@ def show_capabilities(request: HttpRequest) -> HttpResponse:
 
 
 @router.get("/fhir/$export", response=responses(dict, code=202))
-@for_roles(Role.LEAD, Role.PT, exports=True)
+@for_roles(*PATIENT_EXPORTERS, exports=True, patients=False)
 def start_bulk(request: HttpRequest) -> HttpResponse:
     """Begin an export of the whole clinic (Bulk Data); its files are made while they are read."""
     place = request.build_absolute_uri(request.path).removesuffix("$export")
@@ -223,7 +225,7 @@ class Before(Schema):
 
 
 @router.get("/fhir/bulk", response=responses(dict))
-@for_roles(Role.LEAD, Role.PT, exports=True)
+@for_roles(*PATIENT_EXPORTERS, exports=True, patients=False)
 def show_bulk(request: HttpRequest, wanted: Query[Before]) -> dict[str, Any]:
     """Show the files of an export of the whole clinic."""
     place = request.build_absolute_uri(request.path)
@@ -238,12 +240,14 @@ def show_bulk(request: HttpRequest, wanted: Query[Before]) -> dict[str, Any]:
 
 
 @router.get("/fhir/bulk/{fhir_type}.ndjson", response=responses(dict, 404))
-@for_roles(Role.LEAD, Role.PT, exports=True)
+@for_roles(*PATIENT_EXPORTERS, exports=True, patients=False)  # audited here, before the first byte
 def read_bulk(request: HttpRequest, fhir_type: Path[str], wanted: Query[Before]) -> HttpResponse:
     """Read all resources of one type, one a line."""
     if fhir_type not in TYPES:
         raise Http404
-    lines = _lines(_all(caller(request), fhir_type, wanted.before))
+    user, now = caller(request), timezone.now()
+    record(Act.EXPORT, user, about=request.path, address=client_address(request), now=now)
+    lines = _lines(_all(user, fhir_type, wanted.before))
     return StreamedResponse(lines, content_type=NDJSON)  # type: ignore[return-value]
 
 

@@ -11,6 +11,7 @@ from rehab.outbox.delivery import WRITERS, NothingToSend, Request
 from rehab.outbox.models import Endpoint, OutboxMessage
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import User
+from rehab.people.models.blinding import is_in_running_study
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 
@@ -41,6 +42,11 @@ def write_session(message: OutboxMessage, _now: datetime) -> Request:
         raise NothingToSend("The patient has not agreed to care.")
     if session.excluded:
         raise NothingToSend("A correction took the session out.")
+    if is_in_running_study(session.patient):  # assessors may read the hospital's record
+        raise NothingToSend(
+            "A running study has the patient, and this would tell the arm. "
+            "Send it again once the study is closed."
+        )
     # What a lead sees from whom no study hides anything; nobody can sign in as this.
     reader = User(pk=0, role=Role.LEAD, clinic=session.clinic, is_active=True)
     body = json.dumps(make_transaction(reader, session), ensure_ascii=False).encode()

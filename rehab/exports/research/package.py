@@ -21,7 +21,8 @@ from rehab.exports.archive import write_csv
 from rehab.exports.fhir.resources import garry_version
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
-from rehab.exports.research.metadata import write_anonymity, write_crate
+from rehab.exports.research.k_anonymity import write_anonymity
+from rehab.exports.research.ro_crate import write_crate
 from rehab.exports.research.session_files import ABOUT, KINDS, write_part
 from rehab.exports.research.sinks import FORMATS, available_formats
 from rehab.exports.research.study_files import groups_of, studies_of, study_files

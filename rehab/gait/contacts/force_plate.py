@@ -15,13 +15,14 @@ from rehab.gait.contacts.chunk_wait import ChunkWait
 from rehab.gait.contacts.contact import Contact
 from rehab.gait.contacts.drag import REST_N, find_edge
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
-from rehab.gait.settings import CONTACT_N, RELEASE_N
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, find_finite_maximum, find_last
 from rehab.gait.signals.samples import FORCE, TIME
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
 # (docs/reference/gait.md#contacts).
+CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
+RELEASE_N = 20.0  # there both ends of a contact are timed
 STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
 BOUNCE_S = 0.15  # debounce: no foot swings faster; a sooner contact continues the last stance
 # A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rehab.gait.settings import CUTOFF_HZ
-from rehab.gait.signals.filters import Floats, ZeroPhaseFilter
+from rehab.gait.signals.filters import CUTOFF_HZ, Floats, ZeroPhaseFilter
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError, Stride
 

@@ -11,6 +11,8 @@ from scipy.signal import butter, lfilter
 
 Floats = NDArray[np.float64]
 
+CUTOFF_HZ = 6.0  # of moments and angles (docs/reference/gait.md#filters)
+
 _FIVE_POINTS = np.array([1.0, -8.0, 0.0, 8.0, -1.0])
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rehab.gait.settings import CUTOFF_HZ
 from rehab.gait.signals.filters import (
+    CUTOFF_HZ,
     Floats,
     ZeroPhaseFilter,
     differentiate,

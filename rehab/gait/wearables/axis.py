@@ -116,6 +116,9 @@ class SagittalAxis:
     def _add_travel(
         self, step_s: float, acceleration: Vector, speed: float, orientation: Orientation
     ) -> None:
+        if not orientation.is_settled:  # an unknown vertical would be taken for travel
+            self._velocity, self._travels = NOWHERE, 0
+            return
         kept, linear = 1 - step_s / SPEED_S, orientation.linear_m_s2
         velocity = self._velocity
         self._velocity = (
@@ -126,8 +129,6 @@ class SagittalAxis:
         self._travels += 1
         weight = max(1 / self._travels, step_s / (DRIFT_S + step_s))
         drift = self._drift = mix(self._drift, self._velocity, weight)
-        if not orientation.is_settled:
-            return
         shaken = math.sqrt(dot(acceleration, acceleration)) - GRAVITY_M_S2
         quiet_s = step_s * math.exp(-speed / QUIET_RAD_S**2 - (shaken / QUIET_M_S2) ** 2)
         x, y, z = self._velocity

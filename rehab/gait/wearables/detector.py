@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.strides import GaitInputError
-from rehab.gait.wearables.axis import SagittalAxis
+from rehab.gait.wearables.axis import SHARE_SURE, SagittalAxis
 from rehab.gait.wearables.history import History, Moment
 from rehab.gait.wearables.mounting import Mounting
 from rehab.gait.wearables.orientation import NOWHERE, Orientation, Vector, dot
@@ -24,7 +24,7 @@ HELD_S = 60.0  # how long samples wait until the axis is known
 STRIDES_MIN, STRIDES_SURE = 3, 5  # of a sign that may be right; of the one with more of them
 STRIDES_ASKED = 12  # from which a sign that is still unknown is asked for
 # A leg moves less in the middle of a stance than in what is taken for one with the wrong sign; by
-# half where travel does not say where ahead is.
+# half where travel does not say where ahead is, which counts only about a certain axis.
 QUIETER, QUIETER_ALONE = 0.9, 0.5
 STRIDES_MOVED = 5  # that do not count after the sensor moved
 
@@ -212,7 +212,8 @@ class WearableDetector:
         strides = []
         while self._best.strides:
             stride, rest = self._best.strides.popleft()
-            has_moved = rest != NOWHERE and self._mounting.add(rest, self._axis.axis)
+            axis = self._axis.axis if self._axis.share >= SHARE_SURE else NOWHERE
+            has_moved = rest != NOWHERE and self._mounting.add(rest, axis)
             if has_moved or self._moved:
                 stride = replace(stride, reasons=(*stride.reasons, Doubt.SENSOR_MOVED))
             strides.append(stride)
@@ -230,7 +231,9 @@ class WearableDetector:
         quiet = min(known, key=lambda one: one.motion_rad_s)
         other = next(one for one in self._readings if one is not quiet)
         ahead = self._axis.left_sign
-        if ahead not in (None, quiet.sign) or (ahead is None and len(known) < 2):
+        if ahead not in (None, quiet.sign):
+            return
+        if ahead is None and (len(known) < 2 or self._axis.share < SHARE_SURE):
             return
         limit = QUIETER_ALONE if ahead is None else QUIETER
         if not quiet.is_plausible or quiet.motion_rad_s > other.motion_rad_s * limit:

@@ -24,7 +24,7 @@ class Mounting:
         """Add a stride: the vertical in its stance, and its axis. Return whether the sensor moved.
 
         It has if it is tilted by 12° against its first ten strides, over the last few, or its axis
-        has turned by 20°.
+        has turned by 20°. An axis of no length is uncertain, and says nothing.
         """
         self._strides += 1
         if self._strides == 1:

@@ -41,6 +41,7 @@ class SwingDetector:
         """Wait for a new swing, as after a gap."""
         self._begin_s = math.nan
         self._end_s = math.nan  # of the rotation toes-up, until it is certain
+        self._flat_s = math.nan  # since when there is none but noise
         self._peak_rad_s = self._turned_rad = 0.0
 
     def add(self, time_s: float, rate_rad_s: float) -> Swing | None:
@@ -62,17 +63,22 @@ class SwingDetector:
             return None
         if rate_rad_s < 0:
             self._end_s = math.nan
+            if rate_rad_s < -NOISE_RAD_S:
+                self._flat_s = math.nan
             self._turn(time_s - last_s, min(last, 0.0), rate_rad_s)
         elif math.isnan(self._end_s):
             self._end_s = find_crossing(last_s, last, time_s, rate_rad_s)
             self._turn(self._end_s - last_s, last, 0.0)
-        begin_s, end_s = self._begin_s, self._end_s
-        if math.isnan(end_s):
+            if math.isnan(self._flat_s):
+                self._flat_s = self._end_s
+        begin_s, flat_s = self._begin_s, self._flat_s
+        if math.isnan(flat_s):
             if time_s - begin_s > SWING_MAX_S:
                 self.restart()
             return None
-        if rate_rad_s <= NOISE_RAD_S and time_s - end_s <= END_S:
+        if rate_rad_s <= NOISE_RAD_S and time_s - flat_s <= END_S:
             return None
+        end_s = self._end_s if rate_rad_s > NOISE_RAD_S else flat_s
         is_swing = (
             end_s - begin_s >= SWING_MIN_S
             and self._turned_rad >= SWING_RAD

@@ -5,12 +5,7 @@ Timers run it (deploy/systemd, deploy/compose.yaml). How each chore went is in /
 
 from __future__ import annotations
 
-import os
-import shutil
 import ssl
-import subprocess
-import sys
-import tempfile
 from argparse import ArgumentParser
 from collections.abc import Callable
 from datetime import datetime, timedelta
@@ -29,6 +24,7 @@ from rehab.management.commands.doctor import (
     examine_new_steps,
     examine_seals,
 )
+from rehab.management.restore_test import restore_newest
 from rehab.people.chores import record_chore
 
 NAMED = "garry-{:%Y-%m-%d}.backup"
@@ -81,19 +77,10 @@ def check_certificate(now: datetime) -> str:
     return f"The certificate of {host} is valid until {ends:%Y-%m-%d}."
 
 
-def try_restore(now: datetime) -> str:
-    """Restore the newest backup into a scratch database, and look at it there."""
-    key = _setting("GARRY_RESTORE_KEY", settings.RESTORE_KEY)
-    files = sorted(Path(_setting("GARRY_BACKUP_DIR", settings.BACKUP_DIR)).glob("garry-*.backup"))
-    if not files:
-        raise CommandError("There is no backup to restore. Run manage.py upkeep backup.")
-    scratch = Path(tempfile.mkdtemp(prefix="restore-", dir=settings.DATA_DIR))
-    try:
-        said = _run_in(scratch, "restore", str(files[-1]), "--key", key)
-        _run_in(scratch, "upkeep", "keys", "seals")
-    finally:
-        shutil.rmtree(scratch)
-    return said
+def test_restore(now: datetime) -> str:
+    """Restore the newest backup into a scratch database."""
+    folder = Path(_setting("GARRY_BACKUP_DIR", settings.BACKUP_DIR))
+    return restore_newest(folder, _setting("GARRY_RESTORE_KEY", settings.RESTORE_KEY))
 
 
 CHORES: dict[str, Callable[[datetime], str]] = {
@@ -103,7 +90,7 @@ CHORES: dict[str, Callable[[datetime], str]] = {
     "seals": check_seals,
     "keys": check_keys,
     "certificate": check_certificate,
-    "restore": try_restore,
+    "restore": test_restore,
 }
 TIMES = {
     "hourly": ["shiplogs"],
@@ -155,19 +142,3 @@ def _called(*command: Any) -> str:
     out = StringIO()
     call_command(*command, stdout=out)
     return out.getvalue()
-
-
-def _run_in(folder: Path, *command: str) -> str:
-    """Run a command of an installation in this folder, on SQLite. Raises CommandError."""
-    own = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
-    done = subprocess.run(
-        [sys.executable, "-m", "garry_site", *command],
-        cwd=settings.BASE_DIR,
-        env=own | {"GARRY_DATA_DIR": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode:
-        raise CommandError((done.stderr or done.stdout).strip())
-    return done.stdout

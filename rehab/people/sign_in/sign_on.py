@@ -168,7 +168,17 @@ def groups_of(claims: Mapping[str, Any]) -> list[SignOnGroup]:
 
 
 def create_account(claims: Mapping[str, Any], group: SignOnGroup) -> User:
-    """Create an account without a password for a person whom a group lets in."""
+    """Create an account without a password for a person whom a group lets in.
+
+    Raises SignOnRefused where that may be an assessor, who is known here by another account.
+    """
+    if User.everywhere.assessors().filter(clinic=group.clinic_id, subject=None).exists():
+        raise SignOnRefused(
+            _(
+                "An assessor of your clinic has not linked the hospital account. Until then your "
+                "clinic’s lead makes new accounts, which you link under Your account."
+            )
+        )
     wished = str(claims.get("preferred_username") or claims["sub"])[:140]
     with transaction.atomic():
         names = (wished, *(f"{wished}-{number}" for number in range(2, 100)))

@@ -17,6 +17,7 @@ from django.conf import settings
 from django.core.exceptions import NON_FIELD_ERRORS
 from django.db.models import QuerySet
 from django.http import HttpRequest
+from django.urls import reverse
 from django.utils import timezone
 from ninja import Field, Schema
 from ninja.errors import HttpError
@@ -31,6 +32,7 @@ from rehab.people.audit import sign_in_log
 from rehab.people.models import User
 from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import TokenScope, find_user_by_token
 
 CALLS_A_MINUTE = 600
@@ -124,17 +126,22 @@ def check_roles(call: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_token_scope(request: HttpRequest, call: Callable[..., Any]) -> None:
-    """Raise HttpError where a program's token does not allow a call; browsers have no token."""
+    """Raise HttpError where a program's token does not allow a call, and for data that leave by a
+    browser in which nobody has shown lately who it is.
+    """
     user = caller(request)
     scope = TokenScope.READ
     if request.method not in ("GET", "HEAD", "OPTIONS"):
         scope = TokenScope.STEER
     elif getattr(call, "exports", False):
         scope = TokenScope.EXPORT
-    if user.program and scope.value not in user.program_scopes:
-        raise HttpError(
-            403, f"This token lacks the scope {scope.value}. Have one made that has it."
-        )
+    if user.program:
+        if scope.value not in user.program_scopes:
+            raise HttpError(
+                403, f"This token lacks the scope {scope.value}. Have one made that has it."
+            )
+    elif scope == TokenScope.EXPORT and not step_up.is_confirmed(request, timezone.now()):
+        raise HttpError(403, f"First show at {reverse('confirm')} who you are, or send a token.")
 
 
 def may_see_names(context: dict[str, Any]) -> bool:

@@ -10,7 +10,6 @@ from rehab.training.measures import InvalidSetting
 MAX_DEVICE_LETTERS = 64
 BELT_M_S = (0.0, 5.0)
 SUPPORT_PERCENT = (0.0, 100.0)
-HEART_RATE_LIMIT_MIN = (60, 220)  # [1/min]
 
 
 @dataclass(frozen=True, slots=True)

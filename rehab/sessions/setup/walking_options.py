@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from django.utils.translation import gettext_lazy as _
 
-from rehab.sessions.setup.option import (
-    Group,
-    Option,
-    OptionColumn,
-)
+from rehab.sessions.setup.option import Group, Option, OptionColumn
 from rehab.sessions.setup.walking import (
     BELT_M_S,
-    HEART_RATE_LIMIT_MIN,
     MAX_DEVICE_LETTERS,
     SUPPORT_PERCENT,
 )
+from rehab.training.heart_rate_limit import LIMIT_MIN
 
 WALKING_OPTIONS = (
     Option(
@@ -62,8 +58,8 @@ WALKING_OPTIONS = (
         help="A stride with a higher heart rate pauses the session; needs a heart-rate sensor.",
         kind=int,
         nullable=True,
-        least=HEART_RATE_LIMIT_MIN[0],
-        most=HEART_RATE_LIMIT_MIN[1],
+        least=LIMIT_MIN[0],
+        most=LIMIT_MIN[1],
         unit=_("per minute"),
         place="heart_rate_limit",
         group=Group.WALKING,

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 from rehab.sources.client.journal import Journal
 from rehab.sources.client.journal_state import JournalState
 from rehab.training.steps import InvalidReason, Measurement
-from robot.wire.clocks import LATE_S
 from robot.wire.frames import NAME
+from robot.wire.late_steps import LATE_S
 from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 
 Message = dict[str, Any]

@@ -19,11 +19,11 @@ from rehab.training.fold.goal_following import GoalFollowing
 from rehab.training.fold.tallies import Block, Tally
 from rehab.training.fold.valence_course import ValenceCourse
 from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
+from rehab.training.heart_rate_limit import is_above_limit
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.scoring import RULES_VERSION, score_measurement
 from rehab.training.steps import (
-    HEART_RATE,
     InvalidMeasurement,
     InvalidReason,
     Measurement,
@@ -193,8 +193,7 @@ class SessionFold:
         self.was_walking = running and not backwards
         if running and self.phase.is_over(self.phase_strides, self.phase_s):
             self._advance_phase()
-        limit, rate = self.plan.heart_rate_limit, scored.extra.get(HEART_RATE)
-        if self.state is State.RUNNING and limit is not None and rate is not None and rate > limit:
+        if self.state is State.RUNNING and is_above_limit(scored, self.plan.heart_rate_limit):
             self.state = State.PAUSED
             self.pause(PauseReason.HEART_RATE)
         return scored

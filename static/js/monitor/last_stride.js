@@ -10,6 +10,20 @@ const WORN = {
   wearable_shank: _("sensor on the shin, algorithm %(version)s"),
 };
 
+// What a name ends with, and how it is read: "stance_s" as "stance 0.62 s".
+const UNITS = {
+  deg_s: "°/s",
+  m_s: "m/s",
+  percent: "%",
+  deg: "°",
+  mm_min: "mm·min",
+  min: "/min",
+  hz: "Hz",
+  ms: "ms",
+  s: "s",
+};
+const NAMED = new RegExp(`^(.+?)_(${Object.keys(UNITS).join("|")})$`);
+
 export function createLastStride({ state, show }) {
   const dot = document.querySelector(".verdict .dot");
 
@@ -38,7 +52,8 @@ export function createLastStride({ state, show }) {
   function describeExtra([name, value]) {
     if (name in WORN) return fill(WORN[name], { version: value });
     if (name === "heart_rate") return fill(_("heart rate %(rate)s/min"), { rate: number(value, 0) });
-    return `${name} ${number(+value.toPrecision(3), null)}`;
+    const [, what, unit] = NAMED.exec(name) ?? [name, name];
+    return `${what.replaceAll("_", " ")} ${number(+value.toPrecision(3), null)} ${UNITS[unit] ?? ""}`;
   }
 
   return {

@@ -7,7 +7,7 @@ const FORGET_S = 30;
 const MOVING_RAD_S = 1;
 const MOVED_S = 2;
 const SHARE_MIN = 0.6;
-const SHARE_SURE = 0.9;
+export const SHARE_SURE = 0.9;
 const TRAVEL_FORGET_S = 10;
 const SPEED_S = 1.5;
 const DRIFT_S = 3;
@@ -84,12 +84,16 @@ export class SagittalAxis {
   }
 
   #addTravel(step_s, acceleration, speed, orientation) {
+    if (!orientation.isSettled) {
+      this.#velocity = NOWHERE;
+      this.#travels = 0;
+      return;
+    }
     const kept = 1 - step_s / SPEED_S;
     const linear = orientation.linear;
     this.#velocity = this.#velocity.map((one, n) => kept * (one + linear[n] * step_s));
     this.#travels += 1;
     this.#drift = mix(this.#drift, this.#velocity, Math.max(1 / this.#travels, step_s / (DRIFT_S + step_s)));
-    if (!orientation.isSettled) return;
     const shaken = Math.sqrt(dot(acceleration, acceleration)) - GRAVITY_M_S2;
     const quiet_s = step_s * Math.exp(-speed / QUIET_RAD_S ** 2 - (shaken / QUIET_M_S2) ** 2);
     let behind = removePart(orientation.toSensor(this.#velocity.map((one, n) => one - this.#drift[n])), orientation.up);

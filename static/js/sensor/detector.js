@@ -2,7 +2,7 @@
 //
 // tests/sensor/test_detector.py feeds both with the same samples: they decide alike, to less than a millisecond.
 
-import { SagittalAxis } from "garry/sensor/axis";
+import { SHARE_SURE, SagittalAxis } from "garry/sensor/axis";
 import { History } from "garry/sensor/history";
 import { Mounting, Standing } from "garry/sensor/mounting";
 import { NOWHERE, Orientation, dot, isNowhere, scale } from "garry/sensor/orientation";
@@ -131,7 +131,8 @@ export class WearableDetector {
     const strides = [];
     while (this.#best?.strides.length) {
       const [stride, rest] = this.#best.strides.shift();
-      const hasMoved = !isNowhere(rest) && this.#mounting.add(rest, this.#axis.axis);
+      const axis = this.#axis.share >= SHARE_SURE ? this.#axis.axis : NOWHERE;
+      const hasMoved = !isNowhere(rest) && this.#mounting.add(rest, axis);
       if (hasMoved || this.#moved) stride.reasons.push("sensor_moved");
       strides.push(stride);
       this.#moved = hasMoved ? STRIDES_MOVED : Math.max(0, this.#moved - 1);
@@ -146,7 +147,8 @@ export class WearableDetector {
     const quiet = known.reduce((best, one) => (one.motion < best.motion ? one : best));
     const other = this.#readings.find((one) => one !== quiet);
     const ahead = this.#axis.leftSign;
-    if (ahead === null ? known.length < 2 : ahead !== quiet.sign) return;
+    const isAxisSure = this.#axis.share >= SHARE_SURE;
+    if (ahead === null ? known.length < 2 || !isAxisSure : ahead !== quiet.sign) return;
     if (!quiet.isPlausible || quiet.motion > other.motion * (ahead === null ? QUIETER_ALONE : QUIETER)) return;
     if (!this.#best) {
       this.#best = quiet;

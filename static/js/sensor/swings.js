@@ -19,6 +19,7 @@ export class SwingDetector {
   #last = 0;
   #begin_s;
   #end_s;
+  #flat_s;
   #peak;
   #turned;
 
@@ -27,7 +28,7 @@ export class SwingDetector {
   }
 
   restart() {
-    this.#begin_s = this.#end_s = NaN;
+    this.#begin_s = this.#end_s = this.#flat_s = NaN;
     this.#peak = this.#turned = 0;
   }
 
@@ -47,17 +48,20 @@ export class SwingDetector {
     }
     if (rate < 0) {
       this.#end_s = NaN;
+      if (rate < -NOISE_RAD_S) this.#flat_s = NaN;
       this.#turn(time_s - last_s, Math.min(last, 0), rate);
     } else if (Number.isNaN(this.#end_s)) {
       this.#end_s = findCrossing(last_s, last, time_s, rate);
       this.#turn(this.#end_s - last_s, last, 0);
+      if (Number.isNaN(this.#flat_s)) this.#flat_s = this.#end_s;
     }
-    const [begin_s, end_s] = [this.#begin_s, this.#end_s];
-    if (Number.isNaN(end_s)) {
+    const [begin_s, flat_s] = [this.#begin_s, this.#flat_s];
+    if (Number.isNaN(flat_s)) {
       if (time_s - begin_s > SWING_MAX_S) this.restart();
       return null;
     }
-    if (rate <= NOISE_RAD_S && time_s - end_s <= END_S) return null;
+    if (rate <= NOISE_RAD_S && time_s - flat_s <= END_S) return null;
+    const end_s = rate > NOISE_RAD_S ? this.#end_s : flat_s;
     const isSwing =
       end_s - begin_s >= SWING_MIN_S && this.#turned >= SWING_RAD && this.#peak > this.#findThreshold(time_s);
     if (isSwing) {

@@ -1,6 +1,8 @@
 """A base that answers late: what is on its way to it is counted, and how late it is is measured."""
 
 import math
+from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -90,6 +92,18 @@ def test_one_that_plans_from_where_it_is_would_fail(monkeypatch):
     monkeypatch.setattr("robot.motion.player.DelayMeter.delay_s", None)
     played = play_in_a_row(GESTURES["sway"], Imperfections(0.16), times=2, response=AT_ONCE)
     assert played[-1].outcome != "done"
+
+
+@pytest.mark.parametrize(
+    ("field", "least", "most"),
+    [("lag_s", 0.0, 0.6), ("wheel_scale", 0.8, 1.2), ("stiction_m_s", 0.0, 0.08)],
+)
+def test_a_response_is_accepted_within_its_bounds_alone(field, least, most):
+    of_base = partial(replace, Response(dead_time_s=0.0))
+    assert [getattr(of_base(**{field: at}), field) for at in (least, most)] == [least, most]
+    for beyond in (math.nextafter(least, -1), math.nextafter(most, 9), math.nan):
+        with pytest.raises(ValueError, match=r"0 or more|lies|finite"):
+            of_base(**{field: beyond})
 
 
 def test_one_that_answers_at_once_is_believed():

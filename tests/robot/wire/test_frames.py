@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot.wire.frames import (
+    MAX_NESTING,
     BadFrame,
     check_values,
     read_name,
@@ -14,7 +15,7 @@ from robot.wire.frames import (
     read_object,
     read_whole,
 )
-from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS, MAX_NESTING
+from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS
 from tests.support.json_values import ANYTHING
 
 

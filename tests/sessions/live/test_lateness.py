@@ -10,7 +10,7 @@ from rehab.sessions.live import orders
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.log import Step
-from robot.wire.clocks import DRIFT_MAX, LATE_S
+from robot.wire.late_steps import DRIFT_MAX, LATE_S
 from tests.support.callers import a_step, change
 
 

@@ -26,10 +26,10 @@ from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.frames import BadFrame
 from robot.wire.incident import MOTION
-from robot.wire.limits import MAX_REPORT_CHARS
 
 log = logging.getLogger(__name__)
 
+MAX_REPORT_CHARS = 8 * 1024
 INCIDENTS_WAITING = 4  # of one robot, for the disk
 
 

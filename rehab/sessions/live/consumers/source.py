@@ -10,7 +10,6 @@ from django.utils import timezone
 from rehab.sessions.events.event import source_goal_event
 from rehab.sessions.live.consumers.base import CloseSocket
 from rehab.sessions.live.consumers.device import DeviceSocket
-from rehab.sessions.live.protocol.backlog import is_duplicate
 from rehab.sessions.live.protocol.messages import (
     Hello,
     read_clock,
@@ -19,6 +18,7 @@ from rehab.sessions.live.protocol.messages import (
     read_plain,
     read_sensor,
 )
+from rehab.sessions.live.protocol.resent_steps import is_duplicate
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.live_session import LiveSession

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robot.wire.clocks import RemoteClock
+from robot.wire.late_steps import RemoteClock
 
 
 class Lateness:

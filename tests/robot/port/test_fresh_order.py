@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.port.setpoint import Setpoint
+from robot.port.fresh_order import FreshOrder
 from tests.support.extent import examples
 
 STOP, GO, OTHER = b"\xaa\x55stop", b"\xaa\x55go", b"\xaa\x55other"
@@ -19,7 +19,7 @@ def order(number, frame=GO, sent_s=10.0, **more):
 
 @pytest.fixture
 def setpoint():
-    setpoint = Setpoint(STOP)
+    setpoint = FreshOrder(STOP)
     assert setpoint.frame(10.0) == STOP
     setpoint.store(order(1, STOP), 10.0)
     return setpoint
@@ -30,6 +30,14 @@ def test_an_order_holds_for_a_quarter_of_a_second(setpoint):
     assert setpoint.frame(10.02) == setpoint.frame(10.25) == GO
     assert setpoint.frame(10.26) == STOP
     assert setpoint.counters["lapsed"] == 1
+
+
+@pytest.mark.parametrize(("sent_s", "frame"), [(0.05, GO), (0.0501, STOP)])
+def test_a_clock_may_be_ahead_by_a_twentieth_of_a_second(sent_s, frame):
+    setpoint = FreshOrder(STOP)
+    setpoint.store(order(1, STOP, sent_s=0.0), 0.0)
+    setpoint.store(order(2, sent_s=sent_s), 0.0)
+    assert setpoint.frame(0.0) == frame
 
 
 def test_the_last_order_wins(setpoint):
@@ -113,7 +121,7 @@ def test_what_is_no_order_is_counted(setpoint, bad):
     )
 )
 def test_it_never_sends_what_is_not_the_freshest_order(told):
-    setpoint, now_s, newest, fresh = Setpoint(STOP), 10.0, -1, (STOP, -math.inf)
+    setpoint, now_s, newest, fresh = FreshOrder(STOP), 10.0, -1, (STOP, -math.inf)
     for frame, number, age_s, pause_s in told:
         sent_s = now_s + age_s
         setpoint.store(order(number, frame, sent_s), now_s)

@@ -42,8 +42,12 @@ class Order:
             raise BadOrder(f"Frames have up to {MAX_FRAME_BYTES} bytes.")
         return cls(number, sent_s, frame, once)
 
+    def is_fresh(self, now_s: float) -> bool:
+        """Return whether a base may still move by it now [s]."""
+        return -MAX_AHEAD_S <= now_s - self.sent_s <= ORDER_HOLDS_S
 
-class Setpoint:
+
+class FreshOrder:
     """The last order while it is fresh, else the stop. Nothing is queued.
 
     After a pause in the orders, and at the beginning, only the stop is sent until the stop is
@@ -88,10 +92,7 @@ class Setpoint:
             return self._store(order, now_s)
 
     def _store(self, order: Order, now_s: float) -> bytes:
-        if (
-            order.number <= self._number
-            or not -MAX_AHEAD_S <= now_s - order.sent_s <= ORDER_HOLDS_S
-        ):
+        if order.number <= self._number or not order.is_fresh(now_s):
             self.counters["old"] += 1
             return b""
         self._number = order.number
@@ -109,7 +110,7 @@ class Setpoint:
             order = self._order
             if order is None or order.frame == self.stop:
                 return self.stop
-            if -MAX_AHEAD_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
+            if order.is_fresh(now_s):
                 return order.frame
             self.counters["lapsed"] += 1
             self._order, self._is_held = None, True
