@@ -69,7 +69,7 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     expect(strip.locator("path.hit")).to_have_count(1)
     expect(strip.locator("path.miss")).to_have_count(1)
     expect(strip.locator(".minute")).to_have_text(["now", "−1 min"])
-    for remark in ("pain", "dizziness", "handrail"):
+    for remark in ("rest", "dizziness", "verbal_cue"):
         page.click(f"[data-remark={remark}]")
     expect(strip.locator(".remark-words")).to_have_count(3)
     assert page.evaluate(OVERLAP, "#strip text:not(.part)") is False
