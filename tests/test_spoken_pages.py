@@ -31,7 +31,7 @@ AS_IT_IS = re.compile(
     r"mm/\(steps/min\)|W/kg|\b(?:kg|min|s|m)\b|(?:localhost|testserver|http)\S*|"
     r"\bde\b|\ba las\b|UTC|[A-Z]\w+/\w+|/admin/[\w/]*|"
     r"P-[A-Z0-9]{8}|\b[A-Z0-9]{6}\b|\b[A-Z]\b|"
-    r"\b(?:a\.m|p\.m|noon|midnight)\b\.?|[a-z]+(?:_[a-z]+)+|\{\x22.*|\w+\.py"
+    r"\b(?:a\.m|p\.m|noon|midnight)\b\.?|msg_[0-9a-f]{32}|[a-z]+(?:_[a-z]+)+|\{\x22.*|\w+\.py"
 )
 DJANGO_SAYS = {"Search", "True", "False", "None"}  # of its own icons, in every language
 NUMBERS = {"x", "y", "x1", "x2", "y1", "y2", "cx", "cy", "r", "rx", "ry", "width", "height"}

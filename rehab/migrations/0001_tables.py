@@ -1652,7 +1652,10 @@ class Migration(migrations.Migration):
                 (
                     "key",
                     models.CharField(
-                        default=rehab.outbox.models.new_key, max_length=64, unique=True
+                        default=rehab.outbox.models.new_key,
+                        max_length=64,
+                        unique=True,
+                        verbose_name="number",
                     ),
                 ),
                 (

@@ -130,7 +130,7 @@ class OutboxMessage(ClinicModel):
     endpoint = models.ForeignKey(
         Endpoint, on_delete=models.CASCADE, related_name="messages", verbose_name=_("receiver")
     )
-    key = models.CharField(max_length=64, unique=True, default=new_key)
+    key = models.CharField(_("number"), max_length=64, unique=True, default=new_key)
     topic = models.CharField(_("what"), max_length=32, choices=Topic.choices)
     body = models.JSONField(_("content"))
     at = models.DateTimeField(_("at"))
