@@ -294,6 +294,7 @@ def test_nobody_else_on_the_machine_may_read_it(file, key):
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
+@pytest.mark.long
 @pytest.mark.server
 def test_from_one_machine_to_another(file, key, tmp_path):
     """The two commands as an administrator runs them, on SQLite, each in a process of its own."""

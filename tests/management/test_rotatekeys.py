@@ -140,6 +140,7 @@ print({_fernet(key).decrypt(one.encode()) for one in rows}, ServerKey.objects.co
 """
 
 
+@pytest.mark.long
 @pytest.mark.server
 def test_a_killed_rotation_goes_on_where_it_was(tmp_path):
     (tmp_path / "garry.sqlite3").write_bytes(read_tables())

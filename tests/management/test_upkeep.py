@@ -76,6 +76,7 @@ def test_backups_past_their_time_go_once_a_new_one_is_there(folder, settings, wo
     assert {file.name for file in folder.iterdir()} == kept | {"before.backup"}
 
 
+@pytest.mark.long
 @pytest.mark.server
 @pytest.mark.django_db(transaction=True)
 @pytest.mark.postgres

@@ -159,7 +159,7 @@ def test_who_must_not_know_an_arm_sees_the_same_whichever_is_walked(state):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("withdrawn", [False, True])
+@pytest.mark.parametrize("withdrawn", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_an_assessors_previews_of_boards_are_the_same(monkeypatch, withdrawn):
     monkeypatch.setitem(globals(), "all_routes", lambda worlds: [])
     trial = Trial(withdrawn=withdrawn)
@@ -170,13 +170,19 @@ def test_an_assessors_previews_of_boards_are_the_same(monkeypatch, withdrawn):
         assert "seen_as" not in url or "No board yet" not in words_of(account.get(url)), url
 
 
-@pytest.mark.parametrize("ended", [False, True])
+@pytest.mark.parametrize("ended", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_whatever_an_assessor_becomes_sees_the_same(ended):
     trial = Trial(ended=ended)
     assert find_differences(trial, become(trial, trial.assessor, trial.earlier)) == {}
 
 
-@pytest.mark.parametrize("rule", LEFT_OUT)
+@pytest.mark.parametrize(
+    "rule",
+    [
+        rule if rule == "a sign-in ends" else pytest.param(rule, marks=pytest.mark.long)
+        for rule in LEFT_OUT
+    ],
+)
 def test_a_rule_that_is_left_out_is_found(monkeypatch, rule):
     trial = Trial()
     module, name, left_out, found = LEFT_OUT[rule]

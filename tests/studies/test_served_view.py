@@ -110,7 +110,8 @@ def find_differences(
     return {key for key, said in before.items() if after[key] != said}
 
 
-@pytest.mark.parametrize("is_ended", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("is_ended", [False, True])
 def test_whatever_an_assessor_becomes_is_answered_the_same(seed, tmp_path, is_ended):
     folder, trial = seed(is_ended)
     copy = shutil.copytree(folder, tmp_path / "data")

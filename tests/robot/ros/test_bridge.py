@@ -280,7 +280,11 @@ ENDS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.server
-@pytest.mark.parametrize("how", [*ENDS, "silence", "end"])
+@pytest.mark.parametrize(
+    "how",
+    ["stop", "silence", "end"]
+    + [pytest.param(how, marks=pytest.mark.long) for how in ENDS if how != "stop"],
+)
 async def test_the_original_s_nodes_are_told_to_end_where_our_robot_may_not_act(ros, how):
     garry, heard = FakeGarry(), hear_good_steps(ros)
     garry.welcome |= {"valence": "positive", "watched": True}
