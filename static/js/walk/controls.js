@@ -42,9 +42,10 @@ export function createControls(body, socket, showQuestion) {
 
   function askToEnd(asked) {
     showQuestion(asked);
-    const yes = body.querySelector("[data-change=finish]");
-    yes.disabled = asked;
-    if (asked) setTimeout(() => (yes.disabled = false), GUARD_MS);
+    const answers = body.querySelectorAll("[data-change=finish], [data-ask='']");
+    const lock = (isLocked) => answers.forEach((answer) => (answer.disabled = isLocked));
+    lock(asked);
+    if (asked) setTimeout(() => (lock(false), keepFocus()), GUARD_MS);
   }
 
   // Show at once that the tap was registered; the server says when the robot is stopped.
