@@ -38,7 +38,7 @@ from rehab.training.plans import SessionPlan
 from rehab.training.steps import SENT_VALUE
 
 # What one page has room for; omitted entries are counted, and are on the session's own page.
-MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 6
+MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 5
 # A line of the page of paper has room for so many.
 MAX_EXTRAS = 8
 # Moments and marks of single strides, of which a mean says nothing.
