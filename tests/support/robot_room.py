@@ -134,7 +134,7 @@ class Room:
         self.walk()
         self.until(lambda: self.kobuki.is_moving)
         time.sleep(further_s)
-        assert self.kobuki.is_moving
+        self.until(lambda: self.kobuki.is_moving)  # it may just turn around
 
     def still_after(self, deed: Callable[[], object], wait_s: float = 1.0) -> float:
         """Do something; give how long the setpoint was still other than zero [s]."""
