@@ -34,9 +34,9 @@ def read(world: World, session: TrainingSession, client: Client | None = None) -
 @pytest.mark.parametrize(
     ("rate", "goal", "said"),
     [
-        (0.7, 2.0, "More steps at the goal than last time."),
-        (0.62, 2.0, "As many steps at the goal as last time."),
-        (0.4, 2.0, "Fewer steps at the goal than last time. Every day is different."),
+        (0.7, 2.0, "More often at the goal than last time."),
+        (0.62, 2.0, "As often at the goal as last time."),
+        (0.4, 2.0, "Less often at the goal than last time. Every day is different."),
         (0.6, 2.2, "The goal was higher than last time, and you reached it just as often."),
         (0.3, 2.2, "The goal was higher than last time."),
         (0.9, 1.8, "The goal was lower than last time."),
@@ -59,7 +59,7 @@ def test_today_stands_beside_last_time(world, patient):
     assert "Today 7 of 10 Last time 4 of 10" in words
     assert "Most in a row 5" in words
     assert f"{day:%A} {day.day} {day:%B}, 14:15" in words
-    assert "More steps at the goal than last time." in words
+    assert "More often at the goal than last time." in words
 
 
 @pytest.mark.parametrize(

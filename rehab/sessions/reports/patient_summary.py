@@ -104,11 +104,11 @@ def describe_today(today: Result, last: Result | None) -> str:
         case Change.LESS, _hits:
             return _("The goal was lower than last time.")
         case _goal, Change.LESS:
-            return _("Fewer steps at the goal than last time. Every day is different.")
+            return _("Less often at the goal than last time. Every day is different.")
         case _goal, Change.MORE:
-            return _("More steps at the goal than last time.")
+            return _("More often at the goal than last time.")
         case _:
-            return _("As many steps at the goal as last time.")
+            return _("As often at the goal as last time.")
 
 
 def is_milestone(sessions: int) -> bool:
