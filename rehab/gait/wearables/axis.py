@@ -62,6 +62,11 @@ class SagittalAxis:
         return dot(self._component, self._spread(self._component)) / total if total else 0.0
 
     @property
+    def is_sure(self) -> bool:
+        """Whether the rotation alone shows the axis."""
+        return self.share >= SHARE_SURE
+
+    @property
     def left_sign(self) -> float | None:
         """Whether the axis points left (1) or right (-1) by where the leg travels; None: unsure."""
         if not self._quiet_s:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.strides import GaitInputError
-from rehab.gait.wearables.axis import SHARE_SURE, SagittalAxis
+from rehab.gait.wearables.axis import SagittalAxis
 from rehab.gait.wearables.history import History, Moment
 from rehab.gait.wearables.mounting import Mounting
 from rehab.gait.wearables.orientation import NOWHERE, Orientation, Vector, dot
@@ -212,7 +212,7 @@ class WearableDetector:
         strides = []
         while self._best.strides:
             stride, rest = self._best.strides.popleft()
-            axis = self._axis.axis if self._axis.share >= SHARE_SURE else NOWHERE
+            axis = self._axis.axis if self._axis.is_sure else NOWHERE
             has_moved = rest != NOWHERE and self._mounting.add(rest, axis)
             if has_moved or self._moved:
                 stride = replace(stride, reasons=(*stride.reasons, Doubt.SENSOR_MOVED))
@@ -233,7 +233,7 @@ class WearableDetector:
         ahead = self._axis.left_sign
         if ahead not in (None, quiet.sign):
             return
-        if ahead is None and (len(known) < 2 or self._axis.share < SHARE_SURE):
+        if ahead is None and (len(known) < 2 or not self._axis.is_sure):
             return
         limit = QUIETER_ALONE if ahead is None else QUIETER
         if not quiet.is_plausible or quiet.motion_rad_s > other.motion_rad_s * limit:

@@ -7,7 +7,7 @@ const FORGET_S = 30;
 const MOVING_RAD_S = 1;
 const MOVED_S = 2;
 const SHARE_MIN = 0.6;
-export const SHARE_SURE = 0.9;
+const SHARE_SURE = 0.9;
 const TRAVEL_FORGET_S = 10;
 const SPEED_S = 1.5;
 const DRIFT_S = 3;
@@ -45,6 +45,11 @@ export class SagittalAxis {
     const { xx, yy, zz } = this.#spread;
     const total = xx + yy + zz;
     return total ? dot(this.#component, this.#times(this.#component)) / total : 0;
+  }
+
+  // Whether the rotation alone shows the axis.
+  get isSure() {
+    return this.share >= SHARE_SURE;
   }
 
   get leftSign() {

@@ -2,7 +2,7 @@
 //
 // tests/sensor/test_detector.py feeds both with the same samples: they decide alike, to less than a millisecond.
 
-import { SHARE_SURE, SagittalAxis } from "garry/sensor/axis";
+import { SagittalAxis } from "garry/sensor/axis";
 import { History } from "garry/sensor/history";
 import { Mounting, Standing } from "garry/sensor/mounting";
 import { NOWHERE, Orientation, dot, isNowhere, scale } from "garry/sensor/orientation";
@@ -131,7 +131,7 @@ export class WearableDetector {
     const strides = [];
     while (this.#best?.strides.length) {
       const [stride, rest] = this.#best.strides.shift();
-      const axis = this.#axis.share >= SHARE_SURE ? this.#axis.axis : NOWHERE;
+      const axis = this.#axis.isSure ? this.#axis.axis : NOWHERE;
       const hasMoved = !isNowhere(rest) && this.#mounting.add(rest, axis);
       if (hasMoved || this.#moved) stride.reasons.push("sensor_moved");
       strides.push(stride);
@@ -147,8 +147,7 @@ export class WearableDetector {
     const quiet = known.reduce((best, one) => (one.motion < best.motion ? one : best));
     const other = this.#readings.find((one) => one !== quiet);
     const ahead = this.#axis.leftSign;
-    const isAxisSure = this.#axis.share >= SHARE_SURE;
-    if (ahead === null ? known.length < 2 || !isAxisSure : ahead !== quiet.sign) return;
+    if (ahead === null ? known.length < 2 || !this.#axis.isSure : ahead !== quiet.sign) return;
     if (!quiet.isPlausible || quiet.motion > other.motion * (ahead === null ? QUIETER_ALONE : QUIETER)) return;
     if (!this.#best) {
       this.#best = quiet;
