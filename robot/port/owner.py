@@ -60,7 +60,7 @@ class PortOwner:
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.setpoint = FreshOrder(stop)
+        self.fresh_order = FreshOrder(stop)
         self.opened = 0
         self.problem = "The port has not been opened yet."
         self._open_port = open_port
@@ -76,7 +76,7 @@ class PortOwner:
 
     def order(self, line: bytes) -> None:
         """Handle a line of the orders, from any thread."""
-        once = self.setpoint.store(line, self._monotonic())
+        once = self.fresh_order.store(line, self._monotonic())
         if once:
             self._once.append(once)
 
@@ -126,7 +126,7 @@ class PortOwner:
         elif now_s >= self._open_at_s:
             self._port = self._open_port()
             self.opened, self.problem = self.opened + 1, ""
-            self.setpoint.hold()
+            self.fresh_order.hold()
             self._once.clear()
             self._send_stops()
         else:
@@ -140,30 +140,30 @@ class PortOwner:
                     "bytes": data.hex(),
                     "problem": self.problem,
                     "owes_stop": self.owes_stop,
-                    "counters": dict(self.setpoint.counters),
+                    "counters": dict(self.fresh_order.counters),
                 }
             )
 
     def _send_due(self, port: SerialPort, now_s: float) -> None:
         while self._once:
             port.write(self._once.popleft())
-        frame = self.setpoint.frame(now_s)
+        frame = self.fresh_order.frame(now_s)
         if frame != self._sent or now_s - self._sent_s >= SEND_EVERY_S - READ_S / 2:
             port.write(frame)
             self._sent, self._sent_s = frame, now_s
-            is_stop = frame == self.setpoint.stop
+            is_stop = frame == self.fresh_order.stop
             self._unsure = max(self._unsure - 1, 0) if is_stop else SURE_STOPS
 
     def _send_stops(self) -> None:
         if self._port is not None:
             for _ in range(STOPS):
-                self._port.write(self.setpoint.stop)
+                self._port.write(self.fresh_order.stop)
             self._unsure = 0
 
     def _handle_failure(self, problem: Exception) -> None:
         self.problem = f"{problem}"[:300] or type(problem).__name__
         self._close()
-        self.setpoint.hold()
+        self.fresh_order.hold()
         self._open_at_s = self._monotonic() + RETRY_S
         self._reported_s = -math.inf
 

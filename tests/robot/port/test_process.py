@@ -246,7 +246,7 @@ def test_a_base_whose_port_was_lost_while_it_moved_is_stopped_after_the_end(back
     def each():
         if bench.now_s < 10.5:
             frame = FORWARD_200 if bench.ports and len(bench.ports[0].sent) > 3 else STOP_FRAME
-            bench.owner.setpoint.store(order(next(numbers), frame, bench.now_s), bench.now_s)
+            bench.owner.fresh_order.store(order(next(numbers), frame, bench.now_s), bench.now_s)
         elif bench.now_s < 11.0 + back_s:
             bench.ports[0].problem, bench.refuses = OSError(5, "unplugged"), True
         else:
