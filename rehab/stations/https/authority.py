@@ -6,7 +6,6 @@ The authority's certificate is installed on phones and tablets. By its name cons
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Iterable
 from datetime import datetime, timedelta
 from ipaddress import ip_address, ip_network
@@ -22,6 +21,8 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from robot.atomic_file import replacing
 
 AUTHORITY_LIFETIME = timedelta(days=3650)
 # Apple's limits: 825 days for an installed authority's, 398 for a public one's.
@@ -181,10 +182,5 @@ def _encode(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 def _write(file: Path, data: bytes) -> None:
     """Write a file that only this account reads, whole or not at all."""
-    fresh = file.with_suffix(".new")
-    fresh.unlink(missing_ok=True)
-    with os.fdopen(os.open(fresh, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as out:
+    with replacing(file) as out:
         out.write(data)
-        out.flush()
-        os.fsync(out.fileno())
-    fresh.replace(file)
