@@ -4,32 +4,45 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 from scipy.spatial.transform import Rotation
 
 from tests.support.browsers import PATIENCE_MS, Visit
 from tests.support.servers import Server
 from tests.support.simulated_leg import Floats
-from tests.support.walk_seed import make_walks
+from tests.support.walk_seed import Walk, make_walks
 from tests.support.worn_phone import Change, WornPhone, read_steps
 
 pytestmark = pytest.mark.browser
+
+
+@contextmanager
+def checking(
+    browser: Browser, server: Server, walk: Walk, script: str | None = None
+) -> Iterator[Page]:
+    """Open the page of a phone on the left shin, begun: it checks. A script runs before it."""
+    with browser.new_context(base_url=server.url) as pocket:
+        pocket.set_default_timeout(PATIENCE_MS)
+        if script is not None:
+            pocket.add_init_script(script)
+        page = pocket.new_page()
+        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
+        assert walk.source not in page.url  # it leaves the address at once
+        page.click("[data-begin]")
+        page.wait_for_selector("body[data-step=check]")
+        yield page
 
 
 @pytest.mark.essential
 def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: Visit):
     (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
     pt = visit(walk.monitor_path, walk, size="laptop")
-    with browser.new_context(base_url=server.url) as pocket:
-        pocket.set_default_timeout(PATIENCE_MS)
-        page = pocket.new_page()
-        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
-        assert walk.source not in page.url  # it leaves the address at once
-        page.click("[data-begin]")
-        page.wait_for_selector("body[data-step=check]")
+    with checking(browser, server, walk) as page:
         phone = WornPhone(page, 360)
         phone.walk(0, 4)
         expect(page.locator("[data-check=still]")).to_have_class("done")
@@ -42,12 +55,12 @@ def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: V
         expect(page.locator("[data-show=state]")).to_contain_text("0 waiting")
         assert phone.strides >= 14
 
-        pocket.set_offline(True)  # strides wait on the phone, also through a reload
+        page.context.set_offline(True)  # strides wait on the phone, also through a reload
         phone.walk(24, 300)
         before = phone.strides
         expect(page.locator("[data-show=state]")).to_contain_text("no network", timeout=PATIENCE_MS)
         assert len(read_steps(server, walk.session)) < before - 200
-        pocket.set_offline(False)
+        page.context.set_offline(False)
         page.reload()
         page.click("[data-begin]")
         page.wait_for_selector("body[data-step=check]")
@@ -107,14 +120,8 @@ def test_what_is_wrong_with_a_phone_is_told_and_marks_no_miss(
     change, words, late = TROUBLES[name]
     (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
     pt = visit(walk.monitor_path, walk, size="laptop")
-    with browser.new_context(base_url=server.url) as pocket:
-        pocket.set_default_timeout(PATIENCE_MS)
-        if name == "battery":
-            pocket.add_init_script(LOW_BATTERY)
-        page = pocket.new_page()
-        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
-        page.click("[data-begin]")
-        page.wait_for_selector("body[data-step=check]")
+    script = LOW_BATTERY if name == "battery" else None
+    with checking(browser, server, walk, script) as page:
         pt.click("[data-main]")
         expect(pt.locator("[data-presence=source]")).to_contain_text("connected")
         phone = WornPhone(page, 40)
@@ -136,12 +143,7 @@ def test_a_phone_that_is_strapped_on_otherwise_is_told(
 ):
     (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
     pt = visit(walk.monitor_path, walk, size="laptop")
-    with browser.new_context(base_url=server.url) as pocket:
-        pocket.set_default_timeout(PATIENCE_MS)
-        page = pocket.new_page()
-        page.goto(f"/sensor/#token={walk.source}&place=shank&side=left")
-        page.click("[data-begin]")
-        page.wait_for_selector("body[data-step=check]")
+    with checking(browser, server, walk) as page:
         phone = WornPhone(page, 40)
         phone.walk(0, 9.5)  # how it stood is known once it is known how a leg swings
         page.click("[data-lock]")
