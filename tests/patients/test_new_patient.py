@@ -28,3 +28,14 @@ def test_a_new_patient_reads_the_clinics_language_or_the_chosen_one(world, chose
     client.post(f"/patients/{patient.pk}/details/", data | {"language": ""})
     patient.refresh_from_db()
     assert patient.language == stored
+
+
+def test_a_new_patient_and_a_code_that_is_taken(pt, patient, world):
+    form = {"nickname": "Ann", "code": "K7-9", "paretic_side": "right"}
+    answer = pt.post("/patients/new/", form)
+    ann = Patient.everywhere.get(code="K7-9")
+    assert ann.clinic == world.clinic
+    assert answer.headers["Location"] == f"/patients/{ann.pk}/new/"
+    page = pt.post("/patients/new/", form).content.decode()
+    assert "Code K7-9 already exists: it is Ann&#x27;s." in page
+    assert Patient.everywhere.filter(code="K7-9").count() == 1

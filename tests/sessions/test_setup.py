@@ -329,41 +329,6 @@ def test_recorded_signals_can_be_chosen_once_the_body_mass_is_known(
     assert newest().source_args == ["recording", str(file), "--mass", "71.5"]
 
 
-def test_a_patients_details_can_be_mended_but_not_into_somebody_elses(pt, patient, world):
-    url = f"/patients/{patient.pk}/details/"
-    other = Patient.everywhere.create(clinic=world.clinic, code="K9", nickname="Anton")
-    details = {"nickname": "Rosa", "code": "K9", "paretic_side": "right", "body_mass_kg": ""}
-    assert "it is Anton&#x27;s" in pt.post(url, details).content.decode()
-    pt.post(url, details | {"code": "K7-205"})
-    patient.refresh_from_db()
-    assert (patient.code, patient.paretic_side) == ("K7-205", "right")
-    other.refresh_from_db()
-    assert other.code == "K9"
-
-
-def test_a_patients_screen_is_kept(pt, patient):
-    url = f"/patients/{patient.pk}/screen/"
-    assert "Rosa’s screen" in pt.get(url).content.decode()
-    answer = pt.post(url, {"screen_side": "left", "screen_text": "large", "screen_still": "on"})
-    assert answer.url == f"/patients/{patient.pk}/"
-    patient.refresh_from_db()
-    kept = (patient.screen_side, patient.screen_still, patient.screen_sounds)
-    assert kept == ("left", True, False)
-    assert patient.screen_text == "large"
-    assert "Select a valid choice" in pt.post(url, {"screen_side": "up"}).content.decode()
-
-
-def test_a_new_patient_and_a_code_that_is_taken(pt, patient, world):
-    form = {"nickname": "Ann", "code": "K7-9", "paretic_side": "right"}
-    answer = pt.post("/patients/new/", form)
-    ann = Patient.everywhere.get(code="K7-9")
-    assert ann.clinic == world.clinic
-    assert answer.headers["Location"] == f"/patients/{ann.pk}/new/"
-    page = pt.post("/patients/new/", form).content.decode()
-    assert "Code K7-9 already exists: it is Ann&#x27;s." in page
-    assert Patient.everywhere.filter(code="K7-9").count() == 1
-
-
 def test_a_protocol_that_ends_by_itself_says_how_long_it_takes(pt, patient, station):
     page = pt.get(f"/patients/{patient.pk}/new/")
     assert page.context["form"]["minutes"].value() == 13  # 54 strides, 600 s and 120 s
@@ -372,19 +337,6 @@ def test_a_protocol_that_ends_by_itself_says_how_long_it_takes(pt, patient, stat
     assert targets[by_name["Training only"]] == {"minutes": None, "wanted_hits": None}
     assert targets[by_name["Baseline, training, washout"]]["minutes"] == 13
     assert targets[by_name["Ten minutes at 60 %"]] == {"minutes": 10, "wanted_hits": 60}
-
-
-def test_the_demo_is_one_simulated_patient(pt, world):
-    places = {pt.post("/patients/demo/").headers["Location"] for _ in range(2)}
-    (demo,) = Patient.everywhere.filter(clinic=world.clinic, code="demo")
-    assert demo.simulated
-    assert places == {f"/patients/{demo.pk}/"}
-
-
-def test_patients_are_found_by_name_or_code(pt, patient):
-    for words in ("ros", "K7-2"):
-        assert "Rosa" in pt.get("/start/", {"q": words}).content.decode()
-    assert "No patient is called" in pt.get("/start/", {"q": "xyz"}).content.decode()
 
 
 def test_the_page_says_what_each_protocol_has_and_how_long_it_takes(pt, patient):
