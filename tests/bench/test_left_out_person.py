@@ -10,6 +10,7 @@ import pytest
 from rehab.gait.wearables import Place, WearableDetector, axis, swings
 from rehab.gait.wearables.strides import OFFSETS_S, STRIDE_MIN_S
 from tests.support.worn_sensors import (
+    STARTS_S,
     Floats,
     Walk,
     count_cycles,
@@ -21,8 +22,6 @@ from tests.support.worn_sensors import (
 )
 
 pytestmark = pytest.mark.bench
-
-STARTS_S = 20  # in which the belt begins to move
 
 
 @pytest.fixture(scope="module")

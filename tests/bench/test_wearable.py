@@ -15,6 +15,7 @@ from tests.support.other_walkers import OTHERS
 from tests.support.simulated_leg import random_mounting
 from tests.support.worn_sensors import (
     GAITMAP_HZ,
+    STARTS_S,
     Floats,
     Walk,
     captured_walks,
@@ -164,9 +165,6 @@ def test_straight_walks_turns_and_standing(lost):
     else:
         assert missed <= 0.02 * known
         assert np.median(spread) <= 0.012
-
-
-STARTS_S = 20  # in which the belt begins to move: until then there is no main frequency
 
 
 def test_after_a_stroke():

@@ -106,6 +106,8 @@ def turning_walks(*names: str) -> Iterator[Walk]:
 
 
 GAITMAP_HZ = 204.8
+# After a stroke: in which the belt begins to move. Until then there is no main frequency [s].
+STARTS_S = 20
 
 
 def captured_walks(*, is_rotated: bool = True) -> Iterator[Walk]:
