@@ -21,7 +21,7 @@ from typing import Any
 import uvloop
 from websockets.asyncio.client import ClientConnection, connect
 
-NUMBERS = re.compile(r'"kind":"step","number":(\d+)|"type":"step","number":(\d+)')
+NUMBERS = re.compile(r'"kind":"step",(?:"live":true,)?"number":(\d+)|"type":"step","number":(\d+)')
 CONFIRM_EVERY = 8
 now = time.perf_counter
 
