@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 
 from django.http import HttpRequest, HttpResponseBase
 
-from rehab.people.rate_limits import TokenBuckets
+from rehab.people.token_buckets import TokenBuckets
 
 HEADER = "X-Request-ID"
 # What opens a page by itself: a family's link.

@@ -27,8 +27,7 @@ from rehab.people.models import User
 from rehab.people.web.api_base import PerUserThrottle, Rejected, SessionAuth, TokenAuth, check_roles
 from rehab.sessions import api as sessions
 from rehab.sessions.live.database.owners import OwnedElsewhere
-from rehab.sessions.pages.server.whereabouts import at_clinics_server, is_named
-from robot.wire.limits import SERVER_COOKIE
+from rehab.sessions.pages.server.whereabouts import at_clinics_server, redirect_call
 
 
 class Api(NinjaAPI):
@@ -108,14 +107,10 @@ def on_http_error(request: HttpRequest, problem: HttpError) -> HttpResponse:
 @api.exception_handler(OwnedElsewhere)
 def on_owned_elsewhere(request: HttpRequest, problem: OwnedElsewhere) -> HttpResponse:
     """Send a call to the server that has the clinic."""
-    if not problem.server:  # a command
-        return problem_response(request, 409, str(problem))
-    if is_named(request, problem.server):
-        return problem_response(request, 503, str(problem))
-    query = request.GET.copy()
-    query[SERVER_COOKIE] = problem.server
-    response = problem_response(request, 307, str(problem))
-    response["Location"] = f"{request.path}?{query.urlencode()}"
+    status, address = redirect_call(request, problem.server)
+    response = problem_response(request, status, str(problem))
+    if address:
+        response["Location"] = address
     return response
 
 

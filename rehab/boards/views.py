@@ -18,6 +18,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.models import TrainingSession
+from rehab.stations.tablets import SCORES_STAY_S
 from rehab.training.changes import OPEN_STATES, State
 
 ROTATION_S = 20  # for which a waiting tablet shows each board
@@ -43,6 +44,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
         "session": session,
         "boards": boards,
         "tablet": not request.user.is_authenticated,
+        "stays_s": SCORES_STAY_S,
         "early": State(session.state) is State.ABORTED,
         "ranked": not boards or any(board.has_you for board in boards),
     }

@@ -28,7 +28,7 @@ from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
 
 WALKED = retained("what was walked and how, under a pseudonym", shown=True, research=True)
-SCORES_SHOWN_FOR = timedelta(minutes=15)
+ENDED_VISIBLE_FOR = timedelta(minutes=15)  # to the tablet of its station
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def _just_ended(tablet: Device, now: datetime) -> QuerySet[TrainingSession, Any]
     last = here.filter(**_in_states(ENDED_STATES), ended_at__isnull=False).order_by("-ended_at")
     others = here.exclude(pk=OuterRef("pk"))
     started_since = others.filter(started_at__gte=OuterRef("ended_at"))
-    recent = here.filter(pk__in=last.values("pk")[:1], ended_at__gt=now - SCORES_SHOWN_FOR)
+    recent = here.filter(pk__in=last.values("pk")[:1], ended_at__gt=now - ENDED_VISIBLE_FOR)
     return recent.exclude(Exists(started_since)).values("pk")
 
 

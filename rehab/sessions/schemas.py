@@ -20,10 +20,11 @@ from rehab.people.web.api_base import (
     may_see_names,
     optional,
 )
-from rehab.sessions.log import STEP_COLUMNS, SessionMetric, Step
+from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.option import Option
 from rehab.sessions.setup.options import OPTIONS
+from rehab.sessions.step_columns import STEP_COLUMNS
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
 from rehab.training.steps import Side

@@ -24,8 +24,9 @@ from rehab.people.audit.sealing import with_floats
 from rehab.people.field_policy import personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import Scope
-from rehab.sessions.log import PATIENT_IS_ERASED, STEP_COLUMNS, SessionEvent, Step
+from rehab.sessions.log import PATIENT_IS_ERASED, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.step_columns import STEP_COLUMNS
 from rehab.training.changes import OPEN_STATES
 
 BATCH_ROWS = 500

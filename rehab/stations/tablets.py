@@ -16,6 +16,8 @@ from rehab.stations.tokens import find_device
 
 COOKIE = "garry_tablet"
 COOKIE_AGE_S = UNUSED_FOR.total_seconds()  # each visit renews it
+# Then a tablet that nobody touches goes back to its waiting page.
+ENDING_STAYS_S, SCORES_STAY_S = 90, 60
 
 
 def find_tablet(token: str | None, now: datetime, address: str = "") -> Device | None:

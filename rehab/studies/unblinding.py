@@ -27,6 +27,11 @@ ASKED_FOR = timedelta(hours=1)  # so long a second person can confirm that an ar
 ALONE = "alone"
 
 
+def must_not_know_arms(study: Study, user: User) -> bool:
+    """Return whether the arms of a study are hidden from ``user`` now: from its assessors."""
+    return study.state != StudyState.CLOSED and has_mark(study, user, Task.ASSESSOR)
+
+
 def give_mark(study: Study, user: User, task: Task, by: User | None, now: datetime) -> None:
     """Mark an account as an assessor, a monitor, or as one that may see interim results.
 
@@ -158,7 +163,7 @@ def reveal_arms(
         raise InvalidSetting(
             gettext("Say why the arm must be known. The study's report shows the reason.")
         )
-    if study.state == StudyState.RUNNING and has_mark(study, by, Task.ASSESSOR):
+    if must_not_know_arms(study, by):
         note(study, kinds.REFUSED, by, now, enrollment=enrollment, reason=reason.strip())
         raise UnblindingRefused(
             gettext(

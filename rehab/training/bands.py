@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from rehab.training import phrases
 from rehab.training.measures import InvalidSetting
 
 BANDS_MAX = 12
@@ -44,6 +45,15 @@ class Band:
     def phrases(self) -> tuple[str, ...]:
         """The phrases of its pool."""
         return tuple(filter(None, map(str.strip, self.words.splitlines())))
+
+
+# The bands of hits that earn points. Their limits: docs/reference/scoring.md#bands (they split the
+# recorded strides usefully; the original's did not).
+REWARDING = (
+    Band(1, phrases.REACHED, Confetti.LITTLE),
+    Band(1.1, phrases.STRONG, Confetti.MUCH),
+    Band(1.25, phrases.STRONGEST, Confetti.MOST),
+)
 
 
 def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:

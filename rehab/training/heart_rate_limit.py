@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rehab.training.steps import HEART_RATE, ScoredStep
 
-LIMIT_MIN = (60, 220)  # what a plan may set [1/min]
+LIMIT_RANGE = (60, 220)  # of what a plan may set [1/min]
 
 
 def is_above_limit(step: ScoredStep, limit: int | None) -> bool:

@@ -12,7 +12,7 @@ from enum import StrEnum
 from itertools import pairwise
 
 from rehab.training import phrases
-from rehab.training.bands import BANDS_MAX, TEXT_MAX, Band, Confetti
+from rehab.training.bands import BANDS_MAX, REWARDING, TEXT_MAX, Band
 from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
 from robot.wire.cue_limits import VARIED
@@ -163,8 +163,6 @@ class Valence:
         )
 
 
-# Band limits: docs/reference/scoring.md#bands (they split the recorded strides usefully; the
-# original's did not).
 POSITIVE = Valence(
     slug="positive",
     label=gettext_noop("Positive"),
@@ -174,9 +172,7 @@ POSITIVE = Valence(
     bands=(
         Band(0, phrases.ONWARD),
         Band(0.75, phrases.NEAR),
-        Band(1, phrases.REACHED, Confetti.LITTLE),
-        Band(1.1, phrases.STRONG, Confetti.MUCH),
-        Band(1.25, phrases.STRONGEST, Confetti.MOST),
+        *REWARDING,
     ),
     cue=CueGestures(above=VARIED),
 )
@@ -202,9 +198,7 @@ BINARY = Valence(
     bands=(
         Band(0, phrases.FAR_BELOW),
         Band(0.75, phrases.BELOW),
-        Band(1, phrases.REACHED, Confetti.LITTLE),
-        Band(1.1, phrases.STRONG, Confetti.MUCH),
-        Band(1.25, phrases.STRONGEST, Confetti.MOST),
+        *REWARDING,
     ),
     cue=CueGestures(above=VARIED, below=VARIED),
 )

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from robot.behavior.answer_choice import AnswerChooser, Choice
 from robot.behavior.body import Body
 from robot.behavior.cue import Cue
 from robot.behavior.idle import IdleLife
-from robot.behavior.variety import Choice, Variety
 
 # What a message of the session's state may order: pools of ``robot.motion.pools``.
 MOMENTS = ("greeting", "rest", "farewell")
@@ -24,7 +24,7 @@ class BesideAnswers:
 
     def __init__(self, body: Body, seed: int) -> None:
         self._body, self._seed = body, seed
-        self._variety, self._idle = Variety(seed), IdleLife(seed)
+        self._chooser, self._idle = AnswerChooser(seed), IdleLife(seed)
 
     def disturb(self, now_s: float) -> None:
         """Note that something else moves or was decided [s]: no idle motion follows at once."""
@@ -44,9 +44,9 @@ class BesideAnswers:
         """
         is_driven = not self._body.manual_drive.twist(now_s).is_still  # somebody stands beside it
         busy = self._body.player.is_busy or is_driven
-        choice = None if busy else self._variety.take(moment, cue.pace)
+        choice = None if busy else self._chooser.take(moment, cue.pace)
         if choice is not None and self._start(choice, cue, now_s):
-            self._variety.mark_started(choice)
+            self._chooser.mark_started(choice)
 
     def idle(self, cue: Cue, now_s: float, free_s: float, *, may_idle: bool) -> None:
         """Begin an idle motion, if one may begin and no answer can be due before it ends.

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from robot.bases import Answer, BaseState, MobileBase
+from robot.behavior.answer_choice import Choice
 from robot.behavior.cue import QUIET_PACE
 from robot.behavior.expression import Expression
 from robot.behavior.manual_drive import ManualDrive
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
 from robot.behavior.status import RobotState, StatusReporter
-from robot.behavior.variety import Choice
 from robot.motion.base_response import AT_ONCE
 from robot.motion.gesture import Gesture
 from robot.motion.limits import Limits

@@ -1,8 +1,8 @@
 """What a robot does with the server's messages. Time is a parameter, so that hours take a second.
 
-It moves only while all of this holds: the server was heard within ``SILENCE_S``, the session runs,
-and ``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is not
-played later, nor one whose steps waited while this program hung.
+It moves only while all of this holds: the server was heard within ``SERVER_SILENT_S``, the session
+runs, and ``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is
+not played later, nor one whose steps waited while this program hung.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from robot.bases import MobileBase
+from robot.behavior.answer_choice import AnswerChooser
 from robot.behavior.beside_answers import MOMENTS, BesideAnswers
 from robot.behavior.body import Body
 from robot.behavior.cue import Cue
 from robot.behavior.gesture_library import GestureLibrary
-from robot.behavior.safety import LAPSED_S, STOPPED
+from robot.behavior.safety import LAPSED_S, SERVER_SILENT_S, STOPPED
 from robot.behavior.status import Report
-from robot.behavior.variety import Variety
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import BUILT_IN, ORIGINALS
@@ -28,10 +28,6 @@ from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
 
 Message = Mapping[str, Any]
-
-# Without a message for this long [s] the base stands still. A heartbeat comes every 0.25 s, at most
-# 0.4 s late; the order to stand still takes up to 0.05 s to the wheels, which makes 0.75 s at most.
-SILENCE_S = 0.65
 
 # Codes: why a robot does not move, and how a gesture ended; ``safety`` has more.
 NO_LINK = "no_link"
@@ -75,7 +71,7 @@ class Performer:
         self.body = Body(base, limits)
         self.gestures = GestureLibrary(gestures, limits)
         self.decider = WindowDecider(Cue())
-        self.variety, self._beside = Variety(0), BesideAnswers(self.body, 0)
+        self.answers, self._beside = AnswerChooser(0), BesideAnswers(self.body, 0)
         self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad_message = ""
@@ -144,7 +140,7 @@ class Performer:
         """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
         self._has_hung, self._ticked_s = now_s - self._ticked_s > LAPSED_S, now_s
         # Without a session it does not move, and the server sends no heartbeat.
-        if self.session is not None and self.is_linked and now_s - self._heard_s > SILENCE_S:
+        if self.session is not None and self.is_linked and now_s - self._heard_s > SERVER_SILENT_S:
             self.disconnect(NO_LINK)
         free_s = self.decider.free_s(self._step_s + now_s - self._stepped_s)
         may_idle = self.decider.cue.idles and self.may_act
@@ -201,7 +197,7 @@ class Performer:
             if session != self.session:
                 self.decider = WindowDecider(cue)
                 seed = session if cue.seed is None else cue.seed
-                self.variety, self._beside = Variety(seed), BesideAnswers(self.body, seed)
+                self.answers, self._beside = AnswerChooser(seed), BesideAnswers(self.body, seed)
                 self.reports.clear()
             self._set_cue(cue)
             self.decider.drop_window()
@@ -263,12 +259,12 @@ class Performer:
     def _respond(self, decision: Decision, now_s: float) -> None:
         """Report a decision, and start the gesture that follows from it."""
         state, cue = self.body.read(), self.decider.cue
-        self.variety.observe(decision)
+        self.answers.observe(decision)
         name, share = cue.gesture(decision.above), self.decider.share
         reason = self.decider.blocking_reason(decision, performing=self.body.player.is_busy)
         gesture = choice = None
         if not reason and name is not None:
-            choice = self.variety.choose(name, decision, cue.pace)
+            choice = self.answers.choose(name, decision, cue.pace)
             gesture, reason = (choice.gesture, "") if choice else self.gestures.find(name)
         if gesture is not None:
             reason = self.body.refusal_reason(gesture, state)
@@ -285,4 +281,4 @@ class Performer:
         )
         self.decider.mark_started(decision)
         if choice is not None:
-            self.variety.mark_started(choice)
+            self.answers.mark_started(choice)

@@ -26,6 +26,9 @@ ANNOUNCE_S = 0.5
 # (docs/reference/kobuki.md#watchdogs); twice that forgives a busy computer (largest gap measured:
 # 0.03 s) and keeps the whole within 0.35 s.
 BASE_SILENT_S = 0.2
+# Nothing heard of the server for this long [s]. A heartbeat comes every 0.25 s, at most
+# 0.4 s late; the order to stand still takes up to 0.05 s to the wheels, which makes 0.75 s at most.
+SERVER_SILENT_S = 0.65
 # A computer that hung for this long [s]: the base has stopped by itself, a gesture that was
 # interrupted is not resumed (ISO 13850), and what waited in the socket begins none.
 LAPSED_S = ORDER_HOLDS_S

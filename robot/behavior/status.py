@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 from robot.bases import BaseState, Indication, MobileBase
+from robot.behavior.answer_choice import Choice
 from robot.behavior.safety import BATTERY_WARN_V, battery_share
-from robot.behavior.variety import Choice
 from robot.behavior.window_decider import Decision
 from robot.motion.gesture import Gesture
 from robot.motion.looks import REST, look_of

@@ -3,6 +3,7 @@
 The paper's rule (P 3.4.1), on the source's clock: windows of 5 s follow each other without a gap
 from the first step on; a window's mean is *above* where it reaches the threshold. Two rules are
 ours: streaks, so many steps in a row on one side of the threshold; and steps, the mean of so many.
+Which pool answers: answer_choice.py.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from robot.wire.cue_limits import CueRule
 
 MIN_STEPS = 2  # of a window; with fewer valid steps there is no decision
 # A window above gets a gesture of full size from this mean performance on, where the strong words
-# for the patient begin; at the threshold one of this share (our choice).
+# for the patient begin (rehab/training/bands.py); at the threshold one of this share (our choice).
 FULL_PERFORMANCE = 1.1
 MIN_STRENGTH = 0.5
 SHORTEST_STEP_S = 0.7  # nobody who trains after a stroke takes steps of one leg faster (ours)

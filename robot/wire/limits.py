@@ -19,5 +19,5 @@ TIME_MAX_S = 1e10
 # With a tiny goal, performance would outgrow charts, database and JSON readers.
 PERFORMANCE_MAX = 1000.0
 
-ROBOT_HEARTBEAT_S = 0.25  # robots stand still after 0.65 s of silence
+ROBOT_HEARTBEAT_S = 0.25  # the robot stands still after safety.SERVER_SILENT_S
 PAGE_HEARTBEAT_S = 1.0  # pages turn gray after 2 s of silence

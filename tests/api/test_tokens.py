@@ -13,9 +13,9 @@ from django.test import Client
 from django.utils import timezone
 
 from rehab.people.access import UndeclaredView
-from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import LIFETIME, ApiToken
+from rehab.people.token_buckets import TokenBuckets
 from rehab.people.web import api_base
 from tests.support.programs import ROOT, Program, bearer_token, program_of
 from tests.support.world import NOW, build_world, client_of

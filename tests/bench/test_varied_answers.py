@@ -7,7 +7,7 @@ import pytest
 
 from rehab.training.valences import VALENCES
 from robot.bases.kinematic import Imperfections
-from robot.behavior.variety import APART
+from robot.behavior.answer_choice import APART
 from robot.motion.pools import POOLS
 from tests.support.gesture_runs import play_seen
 from tests.support.robot_stage import walk_ten_minutes

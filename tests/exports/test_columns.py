@@ -17,8 +17,9 @@ from rehab.exports.step_tables import StepRow
 from rehab.exports.table import WHOSE, Type
 from rehab.exports.tables import TABLES, AnswerRow, VisitRow, codebook_rows
 from rehab.sessions.events.step import MONITOR_FIELDS
-from rehab.sessions.log import STEP_COLUMNS, Step
+from rehab.sessions.log import Step
 from rehab.sessions.schemas import StepOut
+from rehab.sessions.step_columns import STEP_COLUMNS
 from rehab.training.summary.metrics import METRICS
 
 Row: Any = SimpleNamespace  # stands for any row of the database

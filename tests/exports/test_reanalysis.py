@@ -24,8 +24,8 @@ from rehab.studies.models import Study
 from rehab.studies.registration.lifecycle import close
 from rehab.studies.registration.outcome_changes import registered_outcomes
 from rehab.studies.registration.protocol_json import write_json
-from rehab.studies.results.conduct import ENDED_EARLY, Occurrence
 from rehab.studies.results.drawing import TABLES, write_table
+from rehab.studies.results.harms_and_deviations import ENDED_EARLY, Occurrence
 from rehab.studies.results.reading import Analysis
 from rehab.studies.results.results import Results, label_arms
 from rehab.studies.screening import count_assessed

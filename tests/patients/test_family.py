@@ -23,8 +23,8 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import EndReason, ErasureReason, Patient
-from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
+from rehab.people.token_buckets import TokenBuckets
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.better_or_worse import Result
 from rehab.sessions.reports.patient_summary import describe_weeks

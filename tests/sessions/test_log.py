@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rehab.people.models import Clinic, Patient
 from rehab.people.scope import CrossClinicReference
 from rehab.sessions.live.session.aggregate import SessionAggregate, StepRow
-from rehab.sessions.live.session.commits import STEP_COLUMNS, LogDiffers
+from rehab.sessions.live.session.commits import STORED_COLUMNS, LogDiffers
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
@@ -101,7 +101,7 @@ def test_every_field_of_a_step_is_kept(patient):
 
 def test_the_writer_writes_every_column_of_a_step():
     columns = {field.column for field in Step._meta.concrete_fields}
-    assert set(STEP_COLUMNS) == columns - {"id"}
+    assert set(STORED_COLUMNS) == columns - {"id"}
 
 
 def test_date_start_duration_score_type_and_goal_are_there_to_read(patient):

@@ -158,7 +158,7 @@ def test_an_upload_that_nobody_stores_is_removed_after_a_day():
 
 
 def test_sizes_are_bounded(monkeypatch):
-    monkeypatch.setattr(recordings, "BYTES_MAX", 10)
+    monkeypatch.setattr(recordings, "UPLOAD_BYTES_MAX", 10)
     file = uploaded_file(7, ".csv")
     add_part(file, b"12345678", 0)
     with pytest.raises(UploadRefused):

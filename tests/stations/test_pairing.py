@@ -11,9 +11,9 @@ from django.utils import timezone
 
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.random_codes import ALPHABET
-from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import hash_token
+from rehab.people.token_buckets import TokenBuckets
 from rehab.sessions.pages.tablet import PAIRING_COOKIE
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station

@@ -11,7 +11,7 @@ from django.urls import reverse
 from rehab.people.consent.services import active_consents
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionEvent, Step
-from rehab.sessions.models import SCORES_SHOWN_FOR, TrainingSession
+from rehab.sessions.models import ENDED_VISIBLE_FOR, TrainingSession
 from rehab.stations.models import Device
 from tests.support.world import NOW, World
 
@@ -70,9 +70,9 @@ def test_it_sees_the_last_one_until_the_next_starts(world, tablet):
 @pytest.mark.parametrize("state", ["finished", "aborted"])
 def test_it_sees_the_last_one_for_a_quarter_of_an_hour(world, tablet, state):
     TrainingSession.everywhere.update(state=state)
-    end(world.session, NOW - SCORES_SHOWN_FOR + MINUTE)
+    end(world.session, NOW - ENDED_VISIBLE_FOR + MINUTE)
     assert seen(tablet) == {world.session.pk}
-    end(world.session, NOW - SCORES_SHOWN_FOR)
+    end(world.session, NOW - ENDED_VISIBLE_FOR)
     assert seen(tablet) == set()
 
 

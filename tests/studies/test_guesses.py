@@ -7,7 +7,7 @@ from django.urls import reverse
 
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.studies.analysis.blinding import bang_index, james_index
+from rehab.studies.analysis.blinding_index import bang_index, james_index
 from rehab.studies.enrolling import withdraw
 from rehab.studies.guesses import UNKNOWN, guess_rows, record_guess
 from rehab.studies.participants import StudyEvent

@@ -11,8 +11,8 @@ import pytest
 from django.test import Client
 
 from rehab.people.models import Patient
-from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
+from rehab.people.token_buckets import TokenBuckets
 from rehab.people.web import api_base
 from tests.support.api_noise import make_noise
 from tests.support.marks import mark

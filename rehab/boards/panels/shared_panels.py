@@ -22,7 +22,7 @@ from rehab.boards.panels.formatting import (
     name_rows,
     to_percent,
 )
-from rehab.boards.ranking.anonymity import count_participants, find_visible_rows
+from rehab.boards.ranking.anonymity import count_participants, find_visible_rows, has_too_few
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
@@ -88,10 +88,10 @@ class BoardViewer:
         if board.is_own:
             return self._own_panel("")
         standings = read_standings(board, self.valence, self.now)
-        count = count_participants(standings, board.min_participants)
+        count = count_participants(board, standings)
         people = ngettext("%(count)d patient on it now.", "%(count)d patients on it now.", count)
         people %= {"count": count}
-        if count < board.min_participants:
+        if has_too_few(board, standings):
             fewest = {"fewest": board.min_participants}
             why = _("Under %(fewest)d, all see their own sessions.") % fewest
             few = _("Fewer than %(fewest)d people so far.") % fewest

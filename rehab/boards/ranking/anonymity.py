@@ -16,13 +16,19 @@ OWN_BEST = 10
 OWN_NEIGHBORS = 15
 
 
-def count_participants(standings: Standings, fewest: int) -> int:
-    """Return how many patients a board compares, for the check that there are ``fewest``.
+def count_participants(board: Leaderboard, standings: Standings) -> int:
+    """Return how many patients a board compares.
 
-    Among fewer people than that, simulated patients do not count, since they make nobody anonymous.
-    Where there are no people they do, as in a clinic that tries GARRY.
+    Among fewer people than ``min_participants`` simulated patients do not count, since they make
+    nobody anonymous. Where there are no people they do, as in a clinic that tries GARRY.
     """
-    return standings.people if 0 < standings.people < fewest else standings.count
+    few_people = 0 < standings.people < board.min_participants
+    return standings.people if few_people else standings.count
+
+
+def has_too_few(board: Leaderboard, standings: Standings) -> bool:
+    """Return whether a board compares fewer than ``min_participants``: then it is not shown."""
+    return count_participants(board, standings) < board.min_participants
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from rehab.exports.research.sinks import Rows
 from rehab.exports.session_table import PARTICIPANT
 from rehab.exports.step_tables import STEPS
 from rehab.people.web.csv_tables import format_cell
-from rehab.sessions.log import MEASURE_UNIT
+from rehab.sessions.step_columns import MEASURE_UNIT
 
 BIDS_VERSION = "1.10.0"
 TASK, SYSTEM = "walking", "strides"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 CPU_S = 60
 MEMORY_BYTES = 4 * 1024**3  # of addresses; a minute of walking takes less than half a gigabyte
-FILE_BYTES = 512 * 1024**2  # of one that it writes; an upload has 64 MB at most
+FILE_BYTES = 512 * 1024**2  # of one that it writes
 OPEN_FILES = 128
 
 

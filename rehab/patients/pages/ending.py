@@ -19,6 +19,7 @@ from rehab.sessions.log import RobotEntry
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.after_session import page_after
 from rehab.sessions.reports.patient_summary import describe_ending
+from rehab.stations.tablets import ENDING_STAYS_S
 from rehab.training.changes import OPEN_STATES, State
 
 
@@ -39,6 +40,7 @@ def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
     context = {
         "session": session,
         "tablet": tablet,
+        "stays_s": ENDING_STAYS_S,
         "walked": format_duration(session.active_s),
         "visit": next_visit(session.patient_id, midnight),
         "after": page_after(session, actor, tablet=tablet),

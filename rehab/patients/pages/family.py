@@ -28,9 +28,9 @@ from rehab.patients.visits import next_visit
 from rehab.people.access import for_roles, get_patient, public, user_of
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
-from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
+from rehab.people.token_buckets import TokenBuckets
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.reports.patient_summary import describe_for_family

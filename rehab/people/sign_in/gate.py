@@ -20,8 +20,8 @@ from django.utils.translation import gettext as _
 from django.utils.translation.trans_real import parse_accept_lang_header
 
 from rehab.people.networks import resolve_client_address
-from rehab.people.rate_limits import TokenBucket, TokenBuckets
 from rehab.people.sign_in.known import Lanes
+from rehab.people.token_buckets import TokenBucket, TokenBuckets
 
 PATH = "/sign-in/"
 BURST = 30  # attempts at once from one address: the staff of a clinic may share one

@@ -30,10 +30,10 @@ from rehab.people import roles
 from rehab.people.access import UndeclaredView
 from rehab.people.audit import sign_in_log
 from rehab.people.models import User
-from rehab.people.rate_limits import TokenBuckets
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import TokenScope, find_user_by_token
+from rehab.people.token_buckets import TokenBuckets
 
 CALLS_A_MINUTE = 600
 PAGE_SIZE, MAX_PAGE_SIZE = 50, 200

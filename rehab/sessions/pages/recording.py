@@ -15,12 +15,12 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.models import SIDES as LEGS
 from rehab.people.roles import Role
 from rehab.sessions.setup.recordings import (
-    BYTES_MAX,
     CHANNELS,
     MASS_MAX_KG,
     MASS_MIN_KG,
     PART_BYTES,
     SIDES,
+    UPLOAD_BYTES_MAX,
     Checked,
     UploadRefused,
     add_part,
@@ -43,7 +43,7 @@ def add_recording_part(request: HttpRequest) -> HttpResponse:
         if not place.isdecimal() or len(place) > 1:
             raise UploadRefused
         file = uploaded_file(user_of(request).pk, request.GET.get("ending", "").lower(), int(place))
-        if not at.isdecimal() or len(at) > len(str(BYTES_MAX)):
+        if not at.isdecimal() or len(at) > len(str(UPLOAD_BYTES_MAX)):
             raise UploadRefused
         add_part(file, request.body, int(at))
     except UploadRefused:
@@ -58,8 +58,8 @@ def check_recording(request: HttpRequest) -> HttpResponse:
     asked = request.POST
     context: dict[str, Any] = {
         "endings": ",".join(find_endings()),
-        "bytes_max": BYTES_MAX,
-        "mib_max": BYTES_MAX // 2**20,
+        "bytes_max": UPLOAD_BYTES_MAX,
+        "mib_max": UPLOAD_BYTES_MAX // 2**20,
         "part_bytes": PART_BYTES,
         "mass": asked.get("mass", ""),
         "name": asked.get("name", "")[:60],
@@ -187,5 +187,5 @@ def _quote(pair: str) -> str:
 def _refusal() -> str:
     return _("Choose a file of %(kinds)s with at most %(most)d MiB.") % {
         "kinds": ", ".join(find_endings()),
-        "most": BYTES_MAX // 2**20,
+        "most": UPLOAD_BYTES_MAX // 2**20,
     }

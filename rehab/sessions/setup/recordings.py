@@ -26,7 +26,7 @@ from django.utils.translation import gettext
 from robot.plugins import find_names
 from robot.wire.limits import TIME_MAX_S
 
-BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
+UPLOAD_BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
 PART_BYTES = 1024 * 1024
 WAIT_S = 90.0
 # Variables of the server that a file's parser gets: no key, no database.
@@ -109,7 +109,7 @@ def add_part(file: Path, part: bytes, at: int) -> None:
     file.
     """
     is_known = file.exists() if at else True
-    if not is_known or at < 0 or len(part) > PART_BYTES or at + len(part) > BYTES_MAX:
+    if not is_known or at < 0 or len(part) > PART_BYTES or at + len(part) > UPLOAD_BYTES_MAX:
         raise UploadRefused
     if at and file.stat().st_size != at:
         raise UploadRefused

@@ -10,7 +10,7 @@ from rehab.sessions.setup.walking import (
     MAX_DEVICE_LETTERS,
     SUPPORT_PERCENT,
 )
-from rehab.training.heart_rate_limit import LIMIT_MIN
+from rehab.training.heart_rate_limit import LIMIT_RANGE
 
 WALKING_OPTIONS = (
     Option(
@@ -58,8 +58,8 @@ WALKING_OPTIONS = (
         help="A stride with a higher heart rate pauses the session; needs a heart-rate sensor.",
         kind=int,
         nullable=True,
-        least=LIMIT_MIN[0],
-        most=LIMIT_MIN[1],
+        least=LIMIT_RANGE[0],
+        most=LIMIT_RANGE[1],
         unit=_("per minute"),
         place="heart_rate_limit",
         group=Group.WALKING,

@@ -18,8 +18,8 @@ from scipy.special import stdtrit
 
 from rehab.studies.analysis import designs
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Design, Observation
-from rehab.studies.analysis.missing import Missing, missing_of
 from rehab.studies.analysis.mixed_model import Estimate, Floats
+from rehab.studies.analysis.tipping_point import Missing, missing_of
 
 CONFIDENCE = 0.95
 

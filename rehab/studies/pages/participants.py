@@ -19,12 +19,18 @@ from rehab.stations.builtin import first_station
 from rehab.studies.agreements import agree, agreed_version, version_to_agree_to
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.guesses import GUESSERS, UNKNOWN, group_labels, may_guess, record_guess
-from rehab.studies.pages.planning import get_study, is_assessor
+from rehab.studies.pages.planning import get_study
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participant_forms import EnrollmentForm, PlaceForm
 from rehab.studies.participants import Enrollment
 from rehab.studies.screening import find_unmet, turn_away
-from rehab.studies.unblinding import arms_of, find_request, may_read_arm, reveal_arms
+from rehab.studies.unblinding import (
+    arms_of,
+    find_request,
+    may_read_arm,
+    must_not_know_arms,
+    reveal_arms,
+)
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -87,7 +93,7 @@ def render_participant(
     """
     user, now = user_of(request), timezone.now()
     first_station(enrollment.patient.clinic)
-    blind = is_assessor(enrollment.study, user)
+    blind = must_not_know_arms(enrollment.study, user)
     visits = list(enrollment.visits.select_related("session"))
     if not blind and "revealed" not in more and may_read_arm(enrollment, user, now):
         more["revealed"] = arms_of(enrollment)

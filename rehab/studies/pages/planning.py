@@ -26,7 +26,7 @@ from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
-from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState, has_mark
+from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import may_monitor
@@ -35,7 +35,7 @@ from rehab.studies.registration.outcome_changes import first_primary, outcome_ch
 from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import write_pdf
 from rehab.studies.results.results import may_look
-from rehab.studies.unblinding import MARKABLE, Task, give_mark, take_mark
+from rehab.studies.unblinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 
@@ -47,11 +47,6 @@ STEPS: dict[str, StudyAction] = {"register": register, "start": start, "close": 
 def get_study(user: User, study_id: int) -> Study:
     """Return the study of key ``study_id``. Raises Http404 if ``user`` may not see it."""
     return get_object_or_404(Study.objects.visible_to(user).select_related("clinic"), pk=study_id)
-
-
-def is_assessor(study: Study, user: User) -> bool:
-    """Return whether the arms of a study are hidden from ``user`` now."""
-    return study.state != StudyState.CLOSED and has_mark(study, user, Task.ASSESSOR)
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
@@ -112,7 +107,7 @@ def show_study(request: HttpRequest, study_id: int) -> HttpResponse:
 
 def study_context(study: Study, user: User) -> dict[str, Any]:
     """Return what the page of a study shows ``user``; from an assessor, the arms are hidden."""
-    blind, is_lead = is_assessor(study, user), user.role == Role.LEAD
+    blind, is_lead = must_not_know_arms(study, user), user.role == Role.LEAD
     by_name, events = may_see_names(user.role), StudyEvent.objects.visible_to(user)
     return {
         "study": study,
@@ -203,7 +198,7 @@ def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpRes
     """
     user = user_of(request)
     study = get_study(user, study_id)
-    if is_assessor(study, user) or study.is_draft:
+    if must_not_know_arms(study, user) or study.is_draft:
         raise PermissionDenied
     content: str | bytes = write_pdf(study) if kind == "pdf" else write_json(study)
     response = HttpResponse(content, content_type=f"application/{kind}")

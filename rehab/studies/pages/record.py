@@ -18,7 +18,7 @@ from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.sessions.log import SessionEvent
 from rehab.studies.models import Study, StudyState
-from rehab.studies.pages.planning import get_study, is_assessor
+from rehab.studies.pages.planning import get_study
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.participants import Enrollment
 from rehab.studies.record.adverse_events import (
@@ -32,9 +32,10 @@ from rehab.studies.record.adverse_events import (
 from rehab.studies.record.checklists import checklist_rows
 from rehab.studies.record.forms import AdverseEventForm, FactsForm
 from rehab.studies.registration.lifecycle import revise
-from rehab.studies.results.conduct import label_of
 from rehab.studies.results.drawing import write_table
+from rehab.studies.results.harms_and_deviations import label_of
 from rehab.studies.results.results import read_results
+from rehab.studies.unblinding import must_not_know_arms
 from rehab.training.measures import InvalidSetting
 
 Proposed = dict[str, tuple[Enrollment, SessionEvent]]  # by the key of the log's entry
@@ -69,7 +70,7 @@ def download_checklists(request: HttpRequest, study_id: int) -> HttpResponse:
     """Return SPIRIT, CONSORT, TIDieR and WHO's items as CSV, in English as they are sent."""
     user, now = user_of(request), timezone.now()
     study = get_study(user, study_id)
-    if is_assessor(study, user) or (study.is_draft and user.role != Role.LEAD):
+    if must_not_know_arms(study, user) or (study.is_draft and user.role != Role.LEAD):
         raise PermissionDenied
     audit_log.record(Act.EXPORT, user, about=f"{study.code} checklists.csv", now=now)
     with override("en"):
@@ -87,7 +88,7 @@ def show_harms(request: HttpRequest, study_id: int) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     study = get_study(user, study_id)
     monitors = may_monitor(study, user)
-    treats = user.role in {Role.LEAD, Role.PT} and not is_assessor(study, user)
+    treats = user.role in {Role.LEAD, Role.PT} and not must_not_know_arms(study, user)
     if study.is_draft or not (monitors or treats):
         raise PermissionDenied
     proposed: Proposed = {}

@@ -18,7 +18,7 @@ from rehab.people.models import User
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.studies.models import Study, StudyMark, has_mark
 from rehab.studies.participants import Enrollment
-from rehab.studies.results.conduct import HARMS
+from rehab.studies.results.harms_and_deviations import HARMS
 from rehab.training.measures import InvalidSetting
 
 # Days until a serious event has to be reported: ICH E2A, III.A and B (7 days where a life was in

@@ -16,7 +16,7 @@ from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.document import describe
 from rehab.studies.registration.estimands import METHOD, estimands, summary
 from rehab.studies.registration.outcome_changes import outcome_changes
-from rehab.studies.results.conduct import HARMS, label_of
+from rehab.studies.results.harms_and_deviations import HARMS, label_of
 from rehab.studies.results.results import Results
 
 METHODS = {

@@ -36,7 +36,13 @@ from rehab.studies.registration.outcome_changes import (
     registered_outcomes,
 )
 from rehab.studies.registration.sealing import unseal
-from rehab.studies.results.conduct import ConductRow, Occurrence, count, read_occurrences, unwalked
+from rehab.studies.results.harms_and_deviations import (
+    ConductRow,
+    Occurrence,
+    count,
+    read_occurrences,
+    unwalked,
+)
 from rehab.studies.results.reading import Analysis, analyze
 from rehab.studies.screening import Assessed, count_assessed
 

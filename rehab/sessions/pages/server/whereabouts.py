@@ -38,6 +38,23 @@ def is_named(request: HttpRequest, server: str) -> bool:
     return server in ("", named or request.COOKIES.get(SERVER_COOKIE))
 
 
+def redirect_call(request: HttpRequest, server: str) -> tuple[int, str]:
+    """Return how a call of the API is answered whose clinic lives elsewhere: status and address.
+
+    Parameters
+    ----------
+    request, server
+        The call; the name of the clinic's server, empty while a command has the clinic.
+    """
+    if not server:
+        return 409, ""
+    if is_named(request, server):
+        return 503, ""
+    query = request.GET.copy()
+    query[SERVER_COOKIE] = server
+    return 307, f"{request.path}?{query.urlencode()}"
+
+
 class ClinicServerMiddleware:
     """Sends the forms of a clinic's people to the clinic's server. Sync; it keeps no state."""
 

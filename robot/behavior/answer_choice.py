@@ -48,7 +48,7 @@ def pick(pool: Sequence[Gesture], seed: int, number: int, recent: Sequence[str])
     return fresh[int(random.Random(f"{seed} {number}").random() * len(fresh))]  # noqa: S311
 
 
-class Variety:
+class AnswerChooser:
     """Chooses the variants of one session.
 
     Parameters

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.behavior.variety import APART, Variety, pick
+from robot.behavior.answer_choice import APART, AnswerChooser, pick
 from robot.behavior.window_decider import Decision
 from robot.motion.pools import POOLS, VARIANTS
 from robot.wire.cue_limits import VARIED
@@ -22,11 +22,11 @@ def decision(mean, threshold=0.9):
 
 
 def answers(seed, walked, name=VARIED):
-    variety, chosen = Variety(seed), []
+    chooser, chosen = AnswerChooser(seed), []
     for mean in walked:
-        variety.observe(decision(mean))
-        choice = variety.choose(name, decision(mean), 1.0)
-        variety.mark_started(choice)
+        chooser.observe(decision(mean))
+        choice = chooser.choose(name, decision(mean), 1.0)
+        chooser.mark_started(choice)
         chosen.append(choice)
     return chosen
 
