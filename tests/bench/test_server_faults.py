@@ -58,6 +58,7 @@ class Faults:
         self.began_s = 0.0
         self.random = random.Random(seed)
         self.walks: list[Walk] = []
+        self.tasks: list[asyncio.Task[None]] = []  # of the walks: none of them ends by itself
         self.recovered_s: dict[str, list[float]] = {}
         self.stops_s: list[float] = []
         self.paused_by_order = 0
@@ -193,9 +194,19 @@ class Faults:
     async def go_on(self) -> None:
         """Wait until each source is acknowledged and each viewer sees more."""
         marks = [walk.made for walk in self.walks]
-        async with asyncio.timeout(RECOVERED_S):
-            while not all(map(has_more, self.walks, marks)):  # noqa: ASYNC110
-                await asyncio.sleep(0.02)
+        try:
+            async with asyncio.timeout(RECOVERED_S):
+                while not all(map(has_more, self.walks, marks)):  # noqa: ASYNC110
+                    await asyncio.sleep(0.02)
+        except TimeoutError:
+            behind = [
+                f"session {walk.row['session']}: made {mark}, then {walk.made}, acknowledged "
+                f"{walk.acknowledged}, seen {walk.seen[-1:]}"
+                for walk, mark in zip(self.walks, marks, strict=True)
+                if not has_more(walk, mark)
+            ]
+            ended = [repr(task.exception()) for task in self.tasks if task.done()]
+            raise AssertionError("\n".join(behind + ended)) from None
 
     async def run_one(self, name: str) -> None:
         """Let one thing fail, and wait until all sessions have gone on."""
@@ -288,6 +299,7 @@ class Faults:
         self.walks = [Walk(row, self.entrance, RATE) for row in rows]
         senders = [asyncio.create_task(walk.send()) for walk in self.walks]
         watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
+        self.tasks = senders + watchers
         async with asyncio.timeout(RECOVERED_S):
             while not all(walk.acknowledged for walk in self.walks):  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
