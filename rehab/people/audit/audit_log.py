@@ -226,8 +226,6 @@ def record_security_change(act: Act, request: HttpRequest, row: Any, now: dateti
 
 def record_after_the_fact(entries: list[AuditEntry]) -> None:
     """Add entries about what has happened already. A failure is logged: care must go on."""
-    for entry in entries:
-        entry.set_digest()
     try:
         with transaction.atomic():
             AuditEntry.everywhere.bulk_create(entries)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
+from collections.abc import Iterable
 from datetime import UTC, datetime
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from django.core.serializers.json import DjangoJSONEncoder
 from django.db import models
@@ -30,6 +31,17 @@ def is_cut(log: str) -> str:
     return has_seal(log, "OLD.id BETWEEN s.first_id AND s.last_id AND s.cut_at IS NOT NULL")
 
 
+class SealableRows(models.QuerySet[Any]):
+    """Rows of a log; each that is added gets its digest, also of many at once."""
+
+    def bulk_create(self, objs: Iterable[Any], *args: Any, **kwargs: Any) -> list[Any]:
+        """Add rows in one query, each with its digest."""
+        rows = list(objs)
+        for row in rows:
+            row.set_digest()
+        return super().bulk_create(rows, *args, **kwargs)
+
+
 class SealableModel(AppendOnlyModel):
     """A row of a log, with a moment (``at``) and a digest of its values.
 
@@ -39,6 +51,8 @@ class SealableModel(AppendOnlyModel):
     """
 
     sealed_fields: ClassVar[tuple[str, ...]]
+
+    everywhere: ClassVar[models.Manager[Self]] = models.Manager.from_queryset(SealableRows)()
 
     salt = models.CharField(max_length=32, blank=True, editable=False)
     digest = models.CharField(max_length=64, default="", editable=False)

@@ -29,12 +29,13 @@ def nothing_noted_yet(monkeypatch):
 
 
 async def noted(count: int) -> list[tuple[Any, ...]]:
-    """Return the entries once there are so many."""
+    """Return the entries once there are so many; the digest of each is that of its values."""
     names = ("act", "by", "through", "patient", "about")
     entries = AuditEntry.everywhere.exclude(act__in=SIGN_IN_ACTS).order_by("pk")
     for _ in range(500):
         rows = await sync_to_async(lambda: list(entries.all().values_list(*names)))()
         if len(rows) >= count:
+            assert all([entry.is_genuine() async for entry in entries])
             return rows
         await turns()
     raise AssertionError(f"{len(rows)} entries instead of {count}: {rows}")
