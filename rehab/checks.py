@@ -15,7 +15,7 @@ from rehab.people.field_policy import find_undeclared
 from rehab.stations.https.certificate import is_encrypting
 
 # Variables of tests, of robots and of sources, which may run on the same machine.
-OF_OTHERS = ("GARRY_TEST_", "GARRY_ROBOT_", "GARRY_ROS_URL", "GARRY_SERVER", "GARRY_TOKEN")
+OF_OTHERS = ("GARRY_TEST_", "GARRY_ROBOT", "GARRY_ROS_URL", "GARRY_SERVER", "GARRY_TOKEN")
 
 
 def _is_loopback(host: str) -> bool:

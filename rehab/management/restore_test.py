@@ -24,7 +24,7 @@ def restore_newest(folder: Path, key: str) -> str:
         _run_in(scratch, "upkeep", "keys", "seals")
     finally:
         shutil.rmtree(scratch)
-    return said
+    return said.splitlines()[0]
 
 
 def _run_in(folder: Path, *command: str) -> str:

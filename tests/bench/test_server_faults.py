@@ -201,7 +201,7 @@ class Faults:
         except TimeoutError:
             behind = [
                 f"session {walk.row['session']}: made {mark}, then {walk.made}, acknowledged "
-                f"{walk.acknowledged}, seen {walk.seen[-1:]}"
+                f"{walk.acknowledged}, seen {walk.seen[-1:]}, viewer heard {walk.viewer_heard}"
                 for walk, mark in zip(self.walks, marks, strict=True)
                 if not has_more(walk, mark)
             ]

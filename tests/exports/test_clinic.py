@@ -120,7 +120,10 @@ def test_all_rows_move_and_nothing_else_changes(world, file, key):
     assert {label for label in before if before[label] != after[label]} <= grown
     assert ClinicRows(other.clinic.pk).digest() == others
     assert find_broken(clinic) == []
-    assert "is as it was sealed" in run("verify", clinic.name, "--file", file, "--key", key)
+    said = run("verify", clinic.name, "--file", file, "--key", key)
+    assert f"{clinic} is as {file} has it." in said
+    assert f"{clinic} is as it was sealed: " in said
+    assert f"steps and events: {session_seals.last_seal(clinic.pk).digest}" in said
     for session in TrainingSession.everywhere.filter(clinic=clinic):
         check_log(session)
     shared = MeasureDefinition.everywhere.filter(clinic=None)

@@ -67,6 +67,7 @@ class Walk:
     seen: list[int] = field(default_factory=list)
     stopping: bool = False
     server: str = ""  # of several: the one that has the clinic, as another one said
+    viewer_heard: str = ""  # what its viewer heard last, or why it had to dial again
 
     @property
     def has_seen_all(self) -> bool:
@@ -144,6 +145,7 @@ class Walk:
             try:
                 async with self.dial(f"{path}?after={after}", self.row["tablet"]) as socket:
                     async for text in socket:
+                        self.viewer_heard = str(text)[:200]
                         message = json.loads(text)
                         self.server = message.get("server", self.server)
                         for step in message.get("steps", []) if "frame" in message else []:
@@ -155,7 +157,8 @@ class Walk:
                             await socket.send(
                                 json.dumps({"type": "seen", "frame": message["frame"]})
                             )
-            except GONE:
+            except GONE as problem:
+                self.viewer_heard = repr(problem)
                 await asyncio.sleep(0.05)
 
 

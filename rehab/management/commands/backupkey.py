@@ -20,6 +20,7 @@ class Command(BaseCommand):
         self.stdout.write(
             "# Print this page or keep it on a stick, away from the server: without it no backup "
             "can be opened.\n"
-            f"# On the server: GARRY_BACKUP_KEYS={public}\n"
+            f"# For a clinic that is to move here: clinic export … --to {public}\n"
+            f"# On a server that makes backups: GARRY_BACKUP_KEYS={public}\n"
             f"{secret}"
         )

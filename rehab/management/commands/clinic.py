@@ -19,6 +19,7 @@ from rehab.exports.clinic.departure import (
     PENDING,
     compare_with_file,
     finish_removal,
+    last_seals,
     remove_clinic,
 )
 from rehab.exports.clinic.rows import CannotMove, ClinicRows
@@ -80,6 +81,10 @@ class Command(BaseCommand):
         with new_file(file) as out:
             rows = write_clinic(one, out, recipients, now, with_tokens=tokens)
         self._tell(f"{file}: {one}", rows.counts)
+        if broken := self._report_broken(one):
+            self.stderr.write(
+                f"{broken} are not as they were sealed; the file has them as they are."
+            )
 
     def _import(self, file: Path, key: Path, name: str, **_: Any) -> None:
         os.nice(10)  # sessions of other clinics go first
@@ -133,23 +138,30 @@ class Command(BaseCommand):
 
     def _verify(self, clinic: str, file: Path | None, key: Path | None, **_: Any) -> None:
         one = _find(clinic)
-        broken = list(session_seals.find_broken_of(one.pk))
-        for log in seals.sealed_models():
-            broken += seals.find_broken_of(log, one.pk)
-        for problem in broken[:20]:
-            self.stderr.write(problem)
-        if broken:
-            raise CommandError(
-                f"{len(broken)} are not as they were sealed. Compare with a backup from before, "
-                "and find out who was there."
-            )
         if file is not None:
             with opened(file) as source:
                 content = inspect(source, read_key_file(key))
             move = one.moves.filter(file=content.header["file"]).first()
             rows = ClinicRows(one.pk, content.header["tokens"], move)
             compare_with_file(one, content, rows.digest())
+            self.stdout.write(f"{one} is as {file} has it.")
+        if broken := self._report_broken(one):
+            raise CommandError(
+                f"{broken} are not as they were sealed. Compare with a backup from before, "
+                "and find out who was there."
+            )
         self._tell(f"{one} is as it was sealed", ClinicRows(one.pk).count())
+        for log, digest in last_seals(one.pk).items():
+            self.stdout.write(f"  last seal of {log}: {digest}")
+
+    def _report_broken(self, clinic: Clinic) -> int:
+        """Write what is not as it was sealed, the first of many; return how many there are."""
+        broken = list(session_seals.find_broken_of(clinic.pk))
+        for log in seals.sealed_models():
+            broken += seals.find_broken_of(log, clinic.pk)
+        for problem in broken[:20]:
+            self.stderr.write(problem)
+        return len(broken)
 
     def _tell(self, what: str, counts: dict[str, int]) -> None:
         names = {"patient": "patients", "trainingsession": "sessions", "step": "steps"}

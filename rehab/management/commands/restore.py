@@ -42,5 +42,5 @@ class Command(BaseCommand):
         close_keys_again((), identities)
         self.stdout.write(
             f"{counts['rehab.patient']} patients, {counts['rehab.trainingsession']} sessions and "
-            f"{counts['rehab.step']} steps are restored. Everybody has to sign in again."
+            f"{counts['rehab.step']} steps are restored.\nEverybody has to sign in again."
         )
