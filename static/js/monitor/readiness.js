@@ -1,18 +1,20 @@
-// Before the start: whether the tablet shows this patient, and whether sensor and robot are there.
+// Before the start: whether a screen shows this patient, and whether sensor and robot are there.
 
 import { _, fill } from "garry/shared/language";
 
 export function createReadiness(robot) {
   const list = document.querySelector(".readiness");
+  const cure = document.querySelector("[data-cure-screen]"); // what opens the patient's page
 
-  // Return [sign, text] of each: ✓ ready, ! needs a look, – not there, which may be meant so.
+  // Return [sign, text, cure] of each: ✓ ready, ! needs a look, – not there, which may be meant so.
   function checkAll({ presence, about: { nickname: name } }) {
     return [
       presence.tablets
-        ? ["✓", fill(_("Tablet shows %(name)s"), { name })]
-        : ["!", fill(_("No tablet shows %(name)s: pair one, or open the patient’s page"), { name })],
+        ? ["✓", fill(_("A screen shows %(name)s"), { name })]
+        : ["!", fill(_("No screen shows %(name)s"), { name }), cure],
       presence.source ? ["✓", _("Sensor")] : ["!", _("No sensor: switch it on")],
       robot.readiness,
+      ["·", list.dataset.better], // what is trained
     ];
   }
 
@@ -21,14 +23,16 @@ export function createReadiness(robot) {
       list.hidden = session.state !== "ready";
       if (list.hidden) return;
       const checks = checkAll(session);
-      const written = checks.join();
+      const written = checks.map(([sign, text]) => sign + text).join();
       if (list.dataset.of === written) return;
       list.dataset.of = written;
-      const items = checks.map(([sign, text]) => {
+      const items = checks.map(([sign, text, cure]) => {
         const item = document.createElement("li");
         item.className = "row wrap";
         item.classList.toggle("low", sign === "!");
+        item.classList.toggle("calm", sign === "·");
         item.textContent = `${sign} ${text}`;
+        if (cure) item.append(cure.content.cloneNode(true));
         return item;
       });
       list.replaceChildren(...items);
