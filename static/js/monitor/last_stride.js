@@ -6,8 +6,8 @@ import { clockCures, phaseName, reasonName } from "garry/shared/labels";
 
 // By which sensor a stride was measured (rehab/training/measures.py).
 const WORN = {
-  wearable_foot: _("sensor on the foot, algorithm %(version)s"),
-  wearable_shank: _("sensor on the shin, algorithm %(version)s"),
+  wearable_foot: _("foot sensor, version %(version)s"),
+  wearable_shank: _("shin sensor, version %(version)s"),
 };
 
 // What a name ends with, and how it is read: "stance_s" as "stance 0.62 s".
@@ -74,7 +74,9 @@ export function createLastStride({ state, show }) {
         "extras",
         [
           ...clockCures([...(stride.reasons ?? []), ...Object.keys(stride.extra ?? {})]),
-          ...Object.entries(stride.extra ?? {}).map(describeExtra),
+          ...Object.entries(stride.extra ?? {})
+            .filter(([, value]) => value !== stride.value) // told already
+            .map(describeExtra),
         ].join("\n"),
       );
       show("verdict", describeVerdict(stride, session.phase));

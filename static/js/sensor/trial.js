@@ -3,6 +3,7 @@
 import { _ } from "garry/shared/language";
 
 const EVERY_MS = 10;
+const STARTS_S = 20; // in which a treadmill's belt comes up to speed: they pass at once
 const PAUSE_S = 0.2; // before a recording begins again: no stride reaches across
 const COUNT_HZ = 100;
 const COUNTS = 65_536; // from which packet counters begin again
@@ -37,7 +38,8 @@ export async function readRecording(file) {
 
 // Play both parts, the second one again and again. Return a function that says how far it is: which time, and seconds.
 export function walkInstead([first, again], take) {
-  const begin = performance.now();
+  const skipped_s = first.length_s > 2 * STARTS_S ? STARTS_S : 0;
+  const begin = performance.now() - 1000 * skipped_s;
   let [part, start_s, next, time] = [first, 0, 0, 1];
   const played_s = () => (performance.now() - begin) / 1000;
   setInterval(() => {
