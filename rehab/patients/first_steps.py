@@ -82,7 +82,7 @@ def look_at_all(user: User, now: datetime) -> dict[str, Found]:
 
 
 def is_new(user: User) -> bool:
-    """Return whether in a person's clinic no patient has walked yet; simulated ones do not count."""
+    """Return whether no patient of a person's clinic has walked yet, but simulated ones."""
     walked = TrainingSession.objects.visible_to(user).filter(active_s__gt=0)
     return not walked.filter(patient__simulated=False).exists()
 

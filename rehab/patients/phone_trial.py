@@ -21,7 +21,7 @@ from rehab.training.steps import Side
 from rehab.training.valences import POSITIVE
 
 MEASURE, GOAL_PERCENT, MINUTES = MEASURES["shank_stance"], 100.0, 10
-BASELINE_STRIDES = 12  # of which `TRIAL_BASELINE_STRIDES` have to be valid
+BASELINE_STRIDES = 10  # of which `TRIAL_BASELINE_STRIDES` have to be valid
 
 
 def find_trial(user: User) -> TrainingSession | None:

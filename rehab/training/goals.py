@@ -11,7 +11,7 @@ from rehab.training.measures import InvalidSetting, Measure, check_baseline_perc
 # (docs/reference/gait.md#protocol).
 MIN_BASELINE_STRIDES = 50
 # Of a trial, which shows how a goal comes about and trains nobody.
-TRIAL_BASELINE_STRIDES = 8
+TRIAL_BASELINE_STRIDES = 5
 
 
 @dataclass(frozen=True, slots=True)

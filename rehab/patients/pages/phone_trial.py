@@ -17,31 +17,36 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.people.web.refusals import format_refusal
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.services import StationTaken
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.device_trust import NotTrusted, check_approval
 from rehab.stations.models import Device, Station
 from rehab.stations.pages.pairing import address_for_others, let_in, tablet_address
 from rehab.stations.pages.phones import LEGS, sensor_path
+from rehab.training.measures import InvalidSetting
 from rehab.training.steps import Side
 
 
 @for_roles(Role.LEAD, Role.PT)
 @never_cache
-@step_up.required
 @require_http_methods(["GET", "HEAD", "POST"])
 def try_phone(request: HttpRequest) -> HttpResponse:
     """Show the three screens of a trial, each with its way there; first choose the leg.
 
     ``side`` opens a session of the demo patient; ``code`` lets a tablet in.
     """
+    lets_in = "code" in request.POST
+    if lets_in and not step_up.is_confirmed(request, timezone.now()):
+        return step_up.ask(request)
     side = request.POST.get("side", "")
     if side in LEGS:
         return _begin(request, Side(side))
     trial = find_trial(user_of(request))
     if trial is None:
         return render(request, "patients/phone_trial.html", {"legs": LEGS.items()})
-    asked = let_in(request) if "code" in request.POST else {}
+    asked = let_in(request) if lets_in else {}
     if asked is None:
         return redirect("try-phone")
     return _show(request, asked)
@@ -57,6 +62,12 @@ def _begin(request: HttpRequest, side: Side) -> HttpResponse:
     except StationTaken as taken:
         messages.error(request, format_refusal(taken))
         return redirect("monitor", session_id=taken.session.pk)
+    except InvalidSetting as refused:
+        messages.error(request, format_refusal(refused))
+        return redirect("start")
+    except (NotStored, OwnedElsewhere) as problem:
+        messages.error(request, str(problem))
+        return redirect("start")
     return redirect("try-phone")
 
 

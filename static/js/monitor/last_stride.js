@@ -27,7 +27,8 @@ const NAMED = new RegExp(`^(.+?)_(${Object.keys(UNITS).join("|")})$`);
 export function createLastStride({ state, show }) {
   const dot = document.querySelector(".verdict .dot");
 
-  function describeGoal({ goal, unit, obstacle }) {
+  function describeGoal({ goal, unit, obstacle, baseline }) {
+    if (baseline && baseline.count < baseline.needed) obstacle = ""; // its count is told beside it (goal_coach.js)
     if (goal !== null) return fill(_("goal %(goal)s"), { goal: `${number(goal, 2)} ${unit}` });
     return obstacle || _("The goal follows from the baseline.");
   }
