@@ -55,7 +55,7 @@ def test_a_taken_station_leads_to_its_session(pt, world: World):
     TrainingSession.everywhere.filter(station=station).update(state="finished")
     session = make_session(make_patient(world.clinic, code="K7-204"), station=station)
     there = pt.post(TRIAL, {"side": "left"}).headers["Location"]
-    assert there == f"/sessions/{session.pk}/"
+    assert there == f"/sessions/{session.pk}/monitor/"
 
 
 def test_a_trial_is_its_own_clinics(pt, world: World):
