@@ -23,7 +23,7 @@ from rehab.gait.wearables.swings import GAP_S, Swing, SwingDetector
 
 STRIDES_JUDGED = 10
 INTERRUPTED = 1.6  # times the usual stride: the person paused, or a swing was not found
-# Times longer or shorter than the usual swing: the foot seems to land at another moment than it did.
+# Times longer or shorter than the usual swing: the foot seems to land at another moment than usual.
 # A leg that turns back before it lands does so (stroke_imu, pp01: by 0.2 to 0.4 s, which its foot
 # does not); of 3,796 strides of the other shanks there 12 are marked.
 SWING_UNLIKE = 1.5
