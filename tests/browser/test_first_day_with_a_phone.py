@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from rehab.stations.https.certificate import network_address
 from tests.support.browsers import PATIENCE_MS, SIZES, picture, sign_in
@@ -87,7 +87,7 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     source = pt.locator("[data-presence=source]")
     expect(source).to_contain_text("recording · connected")
     expect(pt.locator(".readiness")).to_contain_text("✓ A screen shows Demo✓ Sensor")
-    expect(pt.locator(".readiness")).to_contain_text("More is better")
+    expect(pt.locator("[data-show=extras]")).to_contain_text("More is better")
     expect(pt.locator(".whom")).not_to_contain_text("simulated")
     picture(pt, "therapist-before-the-start")
     tap(pt, "[data-main]", "start")
@@ -110,13 +110,13 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
 def test_a_recording_that_begins_again_says_so(server: Server, browser: Browser):
     (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
     rows = [f"{n / 50},0,0,9.81,{n % 7},0,0" for n in range(100)]
-    file = {"name": "short.csv", "mimeType": "text/csv"}
     with browser.new_context(base_url=server.url) as pocket:
         page = pocket.new_page()
         page.goto(f"/sensor/?trial#token={walk.source}&place=shank&side=left")
         text = "\n".join(["time_s,ax,ay,az,gx,gy,gz", *rows]).encode()
         expect(page.locator("section[data-step=trial]")).to_be_visible()
-        page.set_input_files("[data-recording]", file | {"buffer": text})
+        file: FilePayload = {"name": "short.csv", "mimeType": "text/csv", "buffer": text}
+        page.set_input_files("[data-recording]", file)
         page.click("text=Play this recording")
         playing = page.locator("[data-show=playing]")
         expect(playing).to_contain_text("Recording, 0:00 of 0:02")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from django.test import Client
@@ -53,7 +54,7 @@ def test_a_new_token_of_a_phone_ends_as_early_as_the_first(pt: Client, world: Wo
 WAYS = {"paired": "/phones/pair/", "tried": "/first-steps/phone/open/"}
 
 
-def ask_for_token(who: Client, way: str, wish: dict[str, object], **request: str) -> str:
+def ask_for_token(who: Client, way: str, wish: dict[str, object], **request: Any) -> str:
     """Return the token that a way to one gives: behind the square, or in a trial's address."""
     if way == "tried":
         who.post("/first-steps/phone/", {"side": "left"}, **request)
@@ -79,7 +80,7 @@ def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
 def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way):
     wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
     type(world.clinic).everywhere.update(networks="192.168.7.0/24")
-    afar = {"REMOTE_ADDR": "203.0.113.9"}
+    afar: dict[str, Any] = {"REMOTE_ADDR": "203.0.113.9"}
     assert not ask_for_token(world.pt, way, wish, **afar)
     page = world.pt.post(WAYS[way], wish, follow=True, **afar).content.decode()
     assert "Connect it to the clinic’s network" in page

@@ -25,6 +25,7 @@ const UNITS = {
 const NAMED = new RegExp(`^(.+?)_(${Object.keys(UNITS).join("|")})$`);
 
 export function createLastStride({ state, show }) {
+  const better = document.getElementById("monitor")?.dataset.better ?? "";
   const dot = document.querySelector(".verdict .dot");
 
   function describeGoal({ goal, unit, obstacle, baseline }) {
@@ -63,7 +64,8 @@ export function createLastStride({ state, show }) {
       const stride = state.lastStride;
       dot.hidden = stride?.performance == null;
       if (!stride) {
-        for (const slot of ["number", "value", "extras", "verdict"]) show(slot, "");
+        for (const slot of ["number", "value", "verdict"]) show(slot, "");
+        show("extras", better); // which way is better, and why
         show("performance", "–");
         return;
       }

@@ -2,19 +2,25 @@
 
 import { _, fill } from "garry/shared/language";
 
+// A link that opens a page in a window beside this one (shared/own_window.js).
+function openBeside(href, text) {
+  const link = Object.assign(document.createElement("a"), { href, target: "_blank", textContent: text });
+  link.dataset.window = "1280 800";
+  return link;
+}
+
 export function createReadiness(robot) {
   const list = document.querySelector(".readiness");
-  const cure = document.querySelector("[data-cure-screen]"); // what opens the patient's page
+  const page = document.getElementById("monitor").dataset.page; // the patient's
 
-  // Return [sign, text, cure] of each: ✓ ready, ! needs a look, – not there, which may be meant so.
+  // Return [sign, text, what cures it] of each: ✓ ready, ! needs a look, – not there, which may be meant so.
   function checkAll({ presence, about: { nickname: name } }) {
     return [
       presence.tablets
         ? ["✓", fill(_("A screen shows %(name)s"), { name })]
-        : ["!", fill(_("No screen shows %(name)s"), { name }), cure],
+        : ["!", fill(_("No screen shows %(name)s: open the patient’s page"), { name }), page],
       presence.source ? ["✓", _("Sensor")] : ["!", _("No sensor: switch it on")],
       robot.readiness,
-      ["·", list.dataset.better], // what is trained
     ];
   }
 
@@ -30,9 +36,7 @@ export function createReadiness(robot) {
         const item = document.createElement("li");
         item.className = "row wrap";
         item.classList.toggle("low", sign === "!");
-        item.classList.toggle("calm", sign === "·");
-        item.textContent = `${sign} ${text}`;
-        if (cure) item.append(cure.content.cloneNode(true));
+        item.append(cure ? openBeside(cure, `${sign} ${text}`) : `${sign} ${text}`);
         return item;
       });
       list.replaceChildren(...items);

@@ -242,10 +242,8 @@ function offerTrial() {
     }
     recording.hidden = !leg;
   });
-  recording.addEventListener("click", () => play("recording", leg), { once: true });
-  simulated.addEventListener("click", async () => play("simulated", await fetchLeg(body.dataset.trial)), {
-    once: true,
-  });
+  recording.addEventListener("click", () => play("recording", leg));
+  simulated.addEventListener("click", async () => play("simulated", await fetchLeg(body.dataset.trial)));
   show("leg", fill(_("%(side)s %(place)s: try a recording"), { side: SIDES[side], place: PLACES[place] }));
   step("trial");
 }
