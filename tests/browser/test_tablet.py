@@ -58,5 +58,5 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         pt.click("[data-end]")
         pt.click("text=End session")
         go_on_to_scores(tablet)
-        tablet.click("text=Continue")
+        tablet.click(".go")
         expect(tablet.locator("h1")).to_have_text("Ready.", timeout=PATIENCE_MS)

@@ -114,7 +114,7 @@ def open_trial_phone(request: HttpRequest) -> HttpResponse:
     return _show(request, {"phone_qr": drawing.svg_inline(omitsize=True, border=2)})
 
 
-@for_roles(Role.LEAD, Role.PT)
+@for_roles(Role.LEAD, Role.PT, patients=False)  # of the simulated one alone, every two seconds
 @never_cache
 @require_safe
 def trial_state(request: HttpRequest) -> JsonResponse:
