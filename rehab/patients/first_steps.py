@@ -12,6 +12,7 @@ from django.utils.translation import gettext_lazy
 
 from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime
+from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import JUST_NOW, format_device_states
 
@@ -62,8 +63,9 @@ def _look_for_sensor(user: User, now: datetime) -> Found:
 
 
 def _look_for_patient(user: User, now: datetime) -> Found:
-    count = Patient.objects.visible_to(user).count()
-    return Found(count > 0, _("No patient yet.") if not count else _("There are patients."))
+    if not Patient.objects.visible_to(user).filter(simulated=False).exists():
+        return Found(False, _("No patient yet."))
+    return Found(True, _("There are patients."))
 
 
 STEPS = (
@@ -74,9 +76,15 @@ STEPS = (
 )
 
 
+def look_at_all(user: User, now: datetime) -> dict[str, Found]:
+    """Return what is there of each step, by its slug."""
+    return {step.slug: step.look(user, now) for step in STEPS}
+
+
 def is_new(user: User) -> bool:
-    """Return whether a person's clinic has no patient yet."""
-    return not Patient.objects.visible_to(user).exists()
+    """Return whether no patient of a person's clinic has walked yet, but simulated ones."""
+    walked = TrainingSession.objects.visible_to(user).filter(active_s__gt=0)
+    return not walked.filter(patient__simulated=False).exists()
 
 
 def _devices(user: User, kind: Device.Kind) -> list[Device]:

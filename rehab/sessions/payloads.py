@@ -10,7 +10,6 @@ from rehab.training.changes import ChangeKind, ChangeValue, PauseReason, State
 from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Tally
-from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.valences import VALENCES
 from robot.wire.cue_limits import VARIED
@@ -171,7 +170,7 @@ def _describe_baseline(fold: SessionFold) -> Message:
         "mean": walked.mean_value,
         "sd": walked.sd_value,
         "count": walked.valid,
-        "needed": MIN_BASELINE_STRIDES,
+        "needed": fold.plan.goal.baseline_strides,
         "goal": goal,
         "asks": fold.plan.goal.asks,
     }

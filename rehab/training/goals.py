@@ -10,6 +10,8 @@ from rehab.training.measures import InvalidSetting, Measure, check_baseline_perc
 # The lab's goal is the mean of the 54-55 usable baseline strides of a session
 # (docs/reference/gait.md#protocol).
 MIN_BASELINE_STRIDES = 50
+# Of a trial, which shows how a goal comes about and trains nobody.
+TRIAL_BASELINE_STRIDES = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,8 @@ class GoalRule:
     asks
         Whether the baseline goes on until the PT, who sees its mean, SD and number of strides,
         accepts the goal by going to the next phase.
+    baseline_strides
+        Valid strides that the baseline's mean needs.
 
     Raises
     ------
@@ -35,6 +39,7 @@ class GoalRule:
     value: float | None = None
     percent_of_baseline: float | None = None
     asks: bool = False
+    baseline_strides: int = MIN_BASELINE_STRIDES
 
     def __post_init__(self) -> None:
         if (self.value is None) == (self.percent_of_baseline is None):

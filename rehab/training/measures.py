@@ -97,6 +97,14 @@ class Measure:
             return self.first_goal
         return round((self.goal_min + self.goal_max) / 2, self.goal_places)
 
+    @property
+    def better(self) -> str:
+        """Which way is better, and why where it is known (translated by pages)."""
+        shipped = MEASURES.get(self.slug)
+        if shipped is not None and shipped.higher_is_better == self.higher_is_better:
+            return BETTER.get(self.slug, BETTER_ANY[self.higher_is_better])
+        return BETTER_ANY[self.higher_is_better]
+
     def check_goal(self, goal: float) -> float:
         """Return the goal as a float. Raises InvalidSetting outside (goal_min, goal_max]."""
         if not self.goal_min < goal <= self.goal_max:
@@ -207,6 +215,35 @@ MEASURES: Registry[Measure] = Registry(
     {one.slug: one for one in (A2, *PLATE_MEASURES, *WORN_MEASURES)},
     check_one(Measure, "slug"),
 )
+# Which way one is better; of those that are shipped also why: read before the first stride.
+BETTER_ANY = {True: gettext_noop("More is better."), False: gettext_noop("Less is better.")}
+BETTER = {
+    "a2": gettext_noop("More is better: the ankle pushes the body forward harder."),
+    "foot_stance": gettext_noop("More is better: a weak leg often carries the body too briefly."),
+    "shank_stance": gettext_noop("More is better: a weak leg often carries the body too briefly."),
+    "foot_swing": gettext_noop("More is better: the other leg carries the body for longer."),
+    "shank_swing": gettext_noop("More is better: the other leg carries the body for longer."),
+    "step_asymmetry": gettext_noop("Less is better: both legs step in the same rhythm."),
+    "cadence": gettext_noop("More is better: steps follow each other faster."),
+    "foot_strike": gettext_noop("More is better: raised toes do not catch on the floor."),
+    "push_off_speed": gettext_noop("More is better: the heel rises faster before the swing."),
+    "shank_lean": gettext_noop("More is better: the leg stays behind the body for longer."),
+    "propulsion_peak": gettext_noop("More is better: the leg drives the body forward harder."),
+    "propulsion_impulse": gettext_noop("More is better: the leg drives the body forward harder."),
+    "propulsion_share": gettext_noop("More is better: the weak leg does its part of the drive."),
+    "braking_impulse": gettext_noop("Less is better: each landing slows the body less."),
+    "step_length": gettext_noop("More is better: longer steps take the body further."),
+    "step_length_ratio": gettext_noop("More is better: a short step comes up to the other leg’s."),
+    "step_time": gettext_noop("Less is better: the leg steps through faster."),
+    "step_time_ratio": gettext_noop("Less is better: a slow step comes up to the other leg’s."),
+    "stance_ratio": gettext_noop("More is better: the weak leg carries as long as the other one."),
+    "swing_ratio": gettext_noop("Less is better: the weak leg carries as long as the other one."),
+    "double_support": gettext_noop("Less is better: the body moves from leg to leg faster."),
+    "trailing_limb": gettext_noop("More is better: a leg behind the body can push it forward."),
+    "knee_flexion": gettext_noop("More is better: the foot clears the floor more easily."),
+    "walking_ratio": gettext_noop("More is better: fewer and longer steps at the same speed."),
+    "margin": gettext_noop("More is better: there is more room before a fall backward."),
+}
 WORN_CHANNELS = {one.channel for one in WORN_MEASURES}
 
 

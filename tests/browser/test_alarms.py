@@ -164,15 +164,15 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
     server: Server, monitor: Page, walk: Walk
 ) -> None:
     readiness = monitor.locator(".readiness")
-    expect(readiness).to_contain_text("! No tablet shows Rosa")
+    expect(readiness).to_contain_text("! No screen shows Rosa")
     expect(readiness).to_contain_text("! No sensor")
     expect(readiness).to_contain_text("– No robot")
-    expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no tablet")
+    expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no screen")
     url = f"ws://127.0.0.1:{server.port}/ws/session/{walk.session}/patient/"
     tablet = {"Authorization": f"Bearer {walk.tablet}"}
     with feet_of(server, walk) as feet, robot_of(server, walk):
         with connect(url, additional_headers=tablet):
-            expect(readiness).to_have_text("✓ Tablet shows Rosa✓ Sensor✓ Robot")
+            expect(readiness).to_contain_text("✓ A screen shows Rosa✓ Sensor✓ Robot")
             expect(monitor.locator(".mirror h2")).to_have_text("Rosa sees now")
             monitor.click("[data-robot=stop]")
             expect(readiness).to_contain_text("! Robot stopped: first let it move")
@@ -185,7 +185,7 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
             expect(robot).to_have_count(0)
             expect(monitor.locator("[data-presence=robot]")).to_contain_text("✓")
         expect(monitor.locator("[data-alarm=tablet]")).to_contain_text("The tablet has dropped out")
-        expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no tablet")
+        expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no screen")
     expect(monitor.locator("[data-alarm=robot]")).to_contain_text("The robot has dropped out")
 
 

@@ -6,17 +6,18 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from rehab.stations.https.certificate import network_address
 from tests.support.browsers import PATIENCE_MS, SIZES, picture, sign_in
 from tests.support.data import signals
 from tests.support.servers import Server, free_port, serve
+from tests.support.walk_seed import make_walks
 from tests.support.worn_phone import read_steps
 
 pytestmark = [pytest.mark.browser, pytest.mark.server]
 
-TAPS, MINUTES = 12, 5
+TAPS, MINUTES = 10, 5  # of twelve: who is new to it takes a wrong turn
 
 
 @pytest.fixture
@@ -49,51 +50,74 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
         taps.append(name)
         page.click(what)
 
+    tablet = open_screen(browser, address, "tablet-landscape")
+    tablet.goto("/")
+    picture(tablet, "tablet-front-page")
+    tap(tablet, "text=This is the patient’s tablet", "the patient's tablet")
     pt = open_screen(browser, server.url, "laptop")
     pt.goto("/start/")
     sign_in(pt, server.password)
     taps.append("sign in")
-    tap(pt, "text=First steps, one by one", "first steps")
-    picture(pt, "first-steps")
+    picture(pt, "start")
+    tap(pt, "main >> text=Try a phone", "try a phone")
     expect(pt.locator("main")).to_contain_text(f"{address}/tablet/")
-    tablet = open_screen(browser, address, "tablet-landscape")
-    tablet.goto("/tablet/")
+    picture(pt, "try-a-phone")
     pt.fill("[name=code]", tablet.locator(".code").inner_text().replace(" ", ""))
     tap(pt, "text=Compare the code", "compare")
     picture(pt, "let-the-tablet-in")
     tap(pt, "text=It shows this code", "let in")
-    tap(pt, "[data-step=sensor] a", "the step Sensor")
-    picture(pt, "first-steps-sensor")
-    tap(pt, "text=Try a phone", "try a phone")
-    picture(pt, "try-a-phone")
+    expect(pt.locator("[data-live=screen]")).to_have_text("A screen shows Demo")
 
     with pt.expect_popup() as opened:
         tap(pt, "text=Open the phone’s page", "the phone's page")
     phone = opened.value
     phone.set_viewport_size({"width": SIZES["phone"][0], "height": SIZES["phone"][1]})
-    phone.wait_for_selector("[data-begin]:enabled")
-    picture(phone, "phone-strap")
-    phone.set_input_files("[data-recording]", leg)
+    expect(phone.locator("section[data-step=trial]")).to_be_visible()
+    recording = phone.locator("[data-recording]")
+    recording.set_input_files({"name": "a.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
+    expect(phone.locator("[data-show=problem]")).to_contain_text("seven columns")
+    expect(phone.locator("[data-play=recording]")).to_be_hidden()
+    recording.set_input_files(leg)
     taps.append("choose a recording")
-    tap(phone, "[data-begin]", "begin")
-    expect(phone.locator("[data-check=still]")).to_be_visible()
-    picture(phone, "phone-check")
+    picture(phone, "phone-recording")
+    tap(phone, "text=Play this recording", "play")
+    expect(phone.locator("[data-show=playing]")).to_contain_text("Recording, 0:2")
+    expect(pt.locator("[data-live=phone]")).to_have_text("The phone’s page is connected.")
     tap(pt, "text=To the therapist’s page", "the therapist's page")
-    expect(phone.locator("[data-show=verdict]")).to_have_text("Good.", timeout=PATIENCE_MS)
-    picture(phone, "phone-good")
-    tap(phone, "[data-lock]", "lock")
-    expect(pt.locator("[data-presence=source]")).to_contain_text("connected")
+    source = pt.locator("[data-presence=source]")
+    expect(source).to_contain_text("recording · connected")
+    expect(pt.locator(".readiness")).to_contain_text("✓ A screen shows Demo✓ Sensor")
+    expect(pt.locator("[data-show=extras]")).to_contain_text("More is better")
+    expect(pt.locator(".whom")).not_to_contain_text("simulated")
+    picture(pt, "therapist-before-the-start")
     tap(pt, "[data-main]", "start")
 
-    expect(tablet.locator("body")).to_have_attribute("data-step", "6", timeout=PATIENCE_MS)
-    picture(phone, "phone-locked")
+    expect(tablet.locator("body")).to_have_attribute("data-step", "12", timeout=PATIENCE_MS)
+    expect(tablet.locator("body")).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)
+    picture(phone, "phone-playing")
     picture(tablet, "tablet-walking")
     picture(pt, "therapist-walking")
     needed_s = time.monotonic() - begin_s
     print(f"\n{len(taps)} taps, {needed_s:.0f} s: {', '.join(taps)}")
     assert len(taps) <= TAPS
     assert needed_s <= 60 * MINUTES
-    expect(pt.locator("[data-presence=source]")).to_contain_text("clock")
+    expect(source).to_contain_text("clock")
     steps = read_steps(server, 1)
-    assert len(steps) >= 6
+    assert len(steps) >= 12
     assert all(is_valid for is_valid, _ in steps)
+
+
+def test_a_recording_that_begins_again_says_so(server: Server, browser: Browser):
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    rows = [f"{n / 50},0,0,9.81,{n % 7},0,0" for n in range(100)]
+    with browser.new_context(base_url=server.url) as pocket:
+        page = pocket.new_page()
+        page.goto(f"/sensor/?trial#token={walk.source}&place=shank&side=left")
+        text = "\n".join(["time_s,ax,ay,az,gx,gy,gz", *rows]).encode()
+        expect(page.locator("section[data-step=trial]")).to_be_visible()
+        file: FilePayload = {"name": "short.csv", "mimeType": "text/csv", "buffer": text}
+        page.set_input_files("[data-recording]", file)
+        page.click("text=Play this recording")
+        playing = page.locator("[data-show=playing]")
+        expect(playing).to_contain_text("Recording, 0:00 of 0:02")
+        expect(playing).to_contain_text("Recording again, round 2")

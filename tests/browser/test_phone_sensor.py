@@ -92,6 +92,22 @@ def test_a_worn_phone_loses_no_stride(server: Server, browser: Browser, visit: V
         assert not any(is_valid for is_valid, _ in later)  # and so none is a missed goal
 
 
+def test_good_is_said_only_of_what_was_checked(server: Server, browser: Browser):
+    (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
+    with checking(browser, server, walk) as page:
+        verdict = page.locator("[data-show=verdict]")
+        phone = WornPhone(page, 40)
+        phone.walk(4, 20)  # nobody stood still before
+        expect(page.locator("[data-check=walk]")).to_have_class("done")
+        expect(page.locator("[data-check=still]")).to_have_class("now")
+        expect(verdict).to_have_text(
+            "Not checked yet: stand still for three seconds, then walk on."
+        )
+        phone.walk(20, 24.5, lambda part: part * (1, *6 * [0]) + (0, 0, 0, 9.81, 0, 0, 0))
+        phone.walk(24.5, 32)
+        expect(verdict).to_have_text("Good.")
+
+
 def slip(part: Floats) -> Floats:
     """Turn a phone by 25° on its leg."""
     matrix = np.eye(7)

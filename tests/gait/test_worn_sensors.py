@@ -14,6 +14,7 @@ from tests.support.simulated_leg import (
     SWING_S,
     random_mounting,
     stand,
+    stretch_a_swing,
     turn_foot,
     walk_foot,
 )
@@ -260,6 +261,37 @@ def test_a_turn_and_a_pause_do_not_count():
     assert [one.initial_contact_s for one in found if Doubt.INTERRUPTED in one.reasons] == [
         pytest.approx(20.8, abs=0.05)
     ]
+
+
+def test_a_contact_at_another_moment_than_usual_makes_both_its_strides_doubtful():
+    found = WearableDetector("foot").feed(*stretch_a_swing(24.0))
+    unclear = [one for one in found if Doubt.CONTACT_UNCLEAR in one.reasons]
+    assert [round(one.end_s, 1) for one in unclear] == [24.8, 26.0]
+    assert len([one for one in found if not one.reasons]) >= len(found) - 2
+
+
+@pytest.mark.parametrize("trial", ["pp01_000", "pp01_003"])
+def test_a_leg_that_turns_back_before_it_lands_has_no_jump_that_counts(trial):
+    """Its contacts jump by 0.2 to 0.4 s between two moments, which those of its foot do not."""
+    (walk,) = stroke_walks(f"{trial}_leftshank")
+    found, _ = measure(walk)
+    counts = np.array([not one.reasons for one in found])
+    jumps = np.abs(np.diff([one.stance_share for one in found]))
+    assert 0.4 < np.mean(counts) < 0.6
+    assert jumps.max() > 0.14
+    assert jumps[counts[1:] & counts[:-1]].max() < 0.1
+
+
+@pytest.mark.long
+def test_contacts_of_other_legs_are_not_called_unclear():
+    own, strides = 0, 0
+    for walk in stroke_walks():
+        if walk.place == "shank" and not walk.name.startswith("pp01"):
+            found, _ = measure(walk)
+            own += sum(Doubt.CONTACT_UNCLEAR in one.reasons for one in found)
+            strides += len(found)
+    assert strides > 3500
+    assert own <= 0.003 * strides
 
 
 @pytest.mark.parametrize("angle_deg", [25, 180])

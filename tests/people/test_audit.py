@@ -70,6 +70,7 @@ SILENT = {
         "confirm",
     ),
     *("check-recording", "add-recording-part", "first-steps", "first-steps-state"),
+    "trial-state",
     *("stations", "new-station", "edit-station", "new-device"),
     *("own-sign-ins", "end-sign-ins", "help"),
     *("studies", "new-study", "plan-study", "study-protocol", "study-protocol-pdf"),

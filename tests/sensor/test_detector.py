@@ -10,7 +10,13 @@ import pytest
 
 from rehab.gait.wearables import WearableDetector
 from tests.support.node import run_node
-from tests.support.simulated_leg import Floats, random_mounting, stand, walk_foot
+from tests.support.simulated_leg import (
+    Floats,
+    random_mounting,
+    stand,
+    stretch_a_swing,
+    walk_foot,
+)
 from tests.support.worn_sensors import captured_walks, stroke_walks, turning_walks
 
 Samples = tuple[Floats, Floats, Floats]
@@ -85,9 +91,19 @@ def in_doubt() -> Samples:
         ("foot", turned_over, 40),
         ("shank", stood_before, 25),
         ("foot", in_doubt, 1),
+        ("foot", lambda: stretch_a_swing(24.0), 30),
         ("foot", lambda: (np.arange(0, 9, 0.01), *stand(np.arange(0, 9, 0.01))), 0),
     ],
-    ids=["mounted one way", "another", "gaps", "turned over", "shank", "in doubt", "standing"],
+    ids=[
+        "mounted one way",
+        "another",
+        "gaps",
+        "turned over",
+        "shank",
+        "in doubt",
+        "unclear contact",
+        "standing",
+    ],
 )
 def test_simulated_legs(place: str, make: Callable[[], Samples], least: int) -> None:
     assert compare(place, make()) >= least
@@ -97,10 +113,11 @@ def test_simulated_legs(place: str, make: Callable[[], Samples], least: int) -> 
     ("walks", "least"),
     [
         (lambda: stroke_walks("pp03_002_right"), 121),
+        (lambda: stroke_walks("pp01_000_leftshank"), 58),
         (lambda: turning_walks("5-2", "7-1"), 14),
         (captured_walks, 29),
     ],
-    ids=["stroke", "turns", "healthy"],
+    ids=["stroke", "unclear contacts", "turns", "healthy"],
 )
 def test_real_legs(walks: Callable, least: int) -> None:  # type: ignore[type-arg]
     for walk in walks():

@@ -114,7 +114,7 @@ def test_first_steps_compares_as_well(world, station):
 
 
 def test_a_tablet_that_was_seen_reaches_the_server(world, station, settings):
-    asked, unreached = "/first-steps/?step=tablet", "Only this computer can open GARRY"
+    asked, unreached = "/first-steps/?step=tablet", "only this computer can open GARRY"
     Device.everywhere.update(last_seen_at=None)
     pt, code = world.pt, shown_code(Client())
     pt.post(asked, {"station": station.pk, "code": code, "compared": "yes"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from django.test import Client
@@ -50,12 +51,16 @@ def test_a_new_token_of_a_phone_ends_as_early_as_the_first(pt: Client, world: Wo
     assert first <= device.token_expires_at <= timezone.now() + WORN_LIFETIME
 
 
-WAYS = {"paired": "/phones/pair/", "tried": "/first-steps/phone/"}
+WAYS = {"paired": "/phones/pair/", "tried": "/first-steps/phone/open/"}
 
 
-def token_from(page: str) -> str:
-    """Return the token behind the square, or of the trial; empty where none is given."""
-    return page.partition("token=")[2].partition("&")[0]
+def ask_for_token(who: Client, way: str, wish: dict[str, object], **request: Any) -> str:
+    """Return the token that a way to one gives: behind the square, or in a trial's address."""
+    if way == "tried":
+        who.post("/first-steps/phone/", {"side": "left"}, **request)
+    answer = who.post(WAYS[way], wish, **request)
+    given = answer.headers.get("Location", "") + answer.content.decode()
+    return given.partition("token=")[2].partition("&")[0]
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -64,21 +69,21 @@ def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
     wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
     assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
     give_mark(running_study(world), assessor, Task.ASSESSOR, None, NOW)
-    page = signed_in(assessor).post(WAYS[way], wish, follow=True).content.decode()
-    assert "assessor" in page
-    assert not token_from(page)
+    client = signed_in(assessor)
+    assert not ask_for_token(client, way, wish)
     assert AuditEntry.everywhere.filter(act=Act.REFUSED, by=assessor).exists()
-    assert token_from(world.pt.post(WAYS[way], wish, follow=True).content.decode())
+    assert "assessor" in client.post(WAYS[way], wish, follow=True).content.decode()
+    assert ask_for_token(world.pt, way, wish)
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way):
     wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
     type(world.clinic).everywhere.update(networks="192.168.7.0/24")
-    answer = world.pt.post(WAYS[way], wish, follow=True, REMOTE_ADDR="203.0.113.9")
-    page = answer.content.decode()
+    afar: dict[str, Any] = {"REMOTE_ADDR": "203.0.113.9"}
+    assert not ask_for_token(world.pt, way, wish, **afar)
+    page = world.pt.post(WAYS[way], wish, follow=True, **afar).content.decode()
     assert "Connect it to the clinic’s network" in page
-    assert not token_from(page)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -86,7 +91,7 @@ def test_a_phones_token_ends_with_who_paired_it_and_after_a_day(world: World, wa
     """Also one that was only tried: it is the station's, whatever is walked there next."""
     station, who = world.add_station(), world.people[Role.PT]
     wish = {"station": station.pk, "place": "shank", "side": "left"}
-    token = token_from(world.pt.post(WAYS[way], wish).content.decode())
+    token = ask_for_token(world.pt, way, wish)
     now = timezone.now()
     assert find_device(token, now) is not None
     assert find_device(token, now + WORN_LIFETIME + timedelta(minutes=1)) is None

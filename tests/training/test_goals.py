@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -54,6 +55,18 @@ def test_the_goal_is_the_mean_of_fifty_valid_baseline_strides() -> None:
     assert (fold.goal, fold.phase_index, fold.obstacle) == (4.0, 1, "")
     (step,) = walk(fold, [4.0])
     assert (step.goal, step.hit, step.points) == (4.0, True, 1)
+
+
+def test_a_trials_goal_needs_fewer_baseline_strides() -> None:
+    rule = GoalRule(percent_of_baseline=100.0, baseline_strides=5)
+    plan = replace(make_plan(make_phase("baseline", strides=6), make_phase("training")), goal=rule)
+    fold = start(plan)
+    walk(fold, [4.0] * 4)
+    walk(fold, [19.0, 19.0], reasons=("flagged",))
+    assert (fold.goal, fold.phase_index) == (None, 0)
+    assert "needs 5 valid baseline strides and has 4" in fold.obstacle
+    walk(fold, [4.0])
+    assert (fold.goal, fold.phase_index) == (4.0, 1)
 
 
 @pytest.mark.parametrize("percent", [50.0, 85.0, 118.0, 200.0])

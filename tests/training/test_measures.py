@@ -15,6 +15,7 @@ from rehab.training.measures import (
     GAIN_MAX,
     GAIN_MIN,
     MEASURES,
+    PLATE_MEASURES,
     WORN,
     WORN_MEASURES,
     InvalidSetting,
@@ -142,3 +143,16 @@ def test_a_worn_sensor_measures_its_own_measures_and_never_a2(place: str) -> Non
     for other in (A2, dataclasses.replace(A2, channel="stride_s"), SWAY):
         with pytest.raises(InvalidSetting, match="does not measure .* one of its own measures"):
             check_worn(stride, other)
+
+
+@pytest.mark.parametrize("measure", [A2, *PLATE_MEASURES, *WORN_MEASURES], ids=lambda one: one.slug)
+def test_each_shipped_measure_says_which_way_is_better_and_why(measure):
+    way, _colon, why = measure.better.partition(": ")
+    assert way == ("More is better" if measure.higher_is_better else "Less is better")
+    assert why.endswith(".")
+
+
+def test_a_measure_of_a_clinics_own_says_which_way_is_better():
+    own = dataclasses.replace(A2, slug="own", higher_is_better=False)
+    assert own.better == "Less is better."
+    assert dataclasses.replace(A2, higher_is_better=False).better == "Less is better."

@@ -23,6 +23,11 @@ from rehab.gait.wearables.swings import GAP_S, Swing, SwingDetector
 
 STRIDES_JUDGED = 10
 INTERRUPTED = 1.6  # times the usual stride: the person paused, or a swing was not found
+# Times longer or shorter than the usual swing: the foot seems to land at another moment than usual.
+# A leg that turns back before it lands does so (stroke_imu, pp01: by 0.2 to 0.4 s, which its foot
+# does not); of 3,796 strides of the other shanks there 12 are marked.
+SWING_UNLIKE = 1.5
+SWINGS_MIN = 3  # from which on a swing is compared
 STRIDES_HELD = 200  # at most, until the sign is known
 # Of a stride; people after a stroke stand on a foot for up to 0.85 of it (stroke_imu).
 STANCE_MIN, STANCE_MAX = 0.45, 0.92
@@ -42,6 +47,8 @@ class Reading:
         self._motions: deque[float] = deque(maxlen=STRIDES_JUDGED)
         self._shares: deque[float] = deque(maxlen=STRIDES_JUDGED)
         self._lengths_s: deque[float] = deque(maxlen=STRIDES_JUDGED)
+        self._swings_s: deque[float] = deque(maxlen=STRIDES_JUDGED)
+        self._is_contact_unclear = False  # of the initial contact that ended the last stride
 
     @property
     def count(self) -> int:
@@ -62,6 +69,7 @@ class Reading:
         """Wait for a new stride, as after a gap."""
         self._swings.restart()
         self._contact_s = math.nan
+        self._is_contact_unclear = False
 
     def add(self, time_s: float, rate_rad_s: float, left: Vector, upright: Vector | None) -> None:
         """Add a sample that the history has been given; ``left`` is the axis with sign 1."""
@@ -115,4 +123,14 @@ class Reading:
         self._lengths_s.append(length_s)
         if history.find_mean_step(begin_s, swing.end_s) > SLOW_S:
             doubts.append(Doubt.LOW_RATE)
+        was_unclear, self._is_contact_unclear = self._is_contact_unclear, self._is_unlike(swing)
+        if was_unclear or self._is_contact_unclear:
+            doubts.append(Doubt.CONTACT_UNCLEAR)
         return tuple(doubts)
+
+    def _is_unlike(self, swing: Swing) -> bool:
+        """Return whether a swing is much longer or shorter than this leg's latest ones."""
+        swing_s = swing.end_s - swing.begin_s
+        usual_s = median(self._swings_s) if len(self._swings_s) >= SWINGS_MIN else swing_s
+        self._swings_s.append(swing_s)
+        return max(swing_s / usual_s, usual_s / swing_s) > SWING_UNLIKE

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-VERSION = 1  # of this algorithm, stored with each stride
+VERSION = 2  # of this algorithm, stored with each stride
 STRIDE_MIN_S, STRIDE_MAX_S = 0.5, 6.0
 TURN_RAD = math.radians(20)  # in a stride; 99.5 % of straight ones turn by less than 19°
 SLOW_S = 1 / 45  # between samples; contacts are known to 50 Hz
@@ -34,6 +34,7 @@ class Doubt(StrEnum):
     SENSOR_MOVED = "sensor_moved"
     SAMPLES_LOST = "samples_lost"
     LOW_RATE = "low_rate"
+    CONTACT_UNCLEAR = "contact_unclear"
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.patients.first_steps import STEPS
+from rehab.patients.first_steps import STEPS, FirstStep, Found, is_new, look_at_all
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.sign_in import step_up
@@ -21,7 +21,19 @@ from rehab.stations.models import Device, Station
 from rehab.stations.pages.pairing import let_in, tablet_address
 from rehab.stations.pages.stations import show_token
 
-SKIPPED = "skipped_first_steps"  # key of the browser session
+SKIPPED, HIDDEN = "skipped_first_steps", "hidden_first_steps"  # keys of the browser session
+
+
+def list_first_steps(request: HttpRequest) -> list[tuple[FirstStep, Found]]:
+    """Return the steps for the start page of a new clinic; none once all are done, or hidden."""
+    user = user_of(request)
+    if request.session.get(HIDDEN) or not is_new(user):
+        return []
+    found = look_at_all(user, timezone.now())
+    skipped = request.session.get(SKIPPED, [])
+    if all(one.is_done or slug in skipped for slug, one in found.items()):
+        return []
+    return [(step, found[step.slug]) for step in STEPS]
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)
@@ -31,7 +43,10 @@ def first_steps(request: HttpRequest) -> HttpResponse:
     """Show one step at a time; each can be done here, is looked at live, and can be skipped."""
     user = user_of(request)
     first_station(clinic_of(user))  # named anew in the first step, by who wants to
-    found = {step.slug: step.look(user, timezone.now()) for step in STEPS}
+    found = look_at_all(user, timezone.now())
+    if request.method == "POST" and "hide" in request.POST:
+        request.session[HIDDEN] = True
+        return redirect("start")
     skipped = set(request.session.get(SKIPPED, []))
     if request.method == "POST" and request.POST.get("skip") in found:
         request.session[SKIPPED] = sorted(skipped | {request.POST["skip"]})
@@ -87,6 +102,5 @@ def _act(request: HttpRequest, slug: str, context: dict[str, Any]) -> HttpRespon
 @require_safe
 def first_steps_state(request: HttpRequest) -> JsonResponse:
     """Return what is there of each step now."""
-    user, now = user_of(request), timezone.now()
-    found = {step.slug: step.look(user, now) for step in STEPS}
+    found = look_at_all(user_of(request), timezone.now())
     return JsonResponse({slug: [one.is_done, one.words] for slug, one in found.items()})

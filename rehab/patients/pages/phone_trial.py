@@ -1,76 +1,124 @@
-"""Try a phone as a sensor, without one: a simulated leg walks through the phone's real page."""
+"""Try a phone as a sensor, without one: a recording walks through the phone's real page."""
 
 from __future__ import annotations
 
+import segno
 from django.contrib import messages
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
-from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_POST
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.patients.pages.start import add_demo_patient
+from rehab.patients.phone_trial import begin_trial, find_trial, look_at_trial
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.services import SessionRequest, StationTaken, create_session
-from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.services import StationTaken
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.device_trust import NotTrusted, check_approval
-from rehab.stations.models import Device
-from rehab.stations.pages.phones import sensor_path
-from rehab.training.goals import GoalRule, Target
-from rehab.training.measures import MEASURES
-from rehab.training.phases import make_phase
+from rehab.stations.models import Device, Station
+from rehab.stations.pages.pairing import address_for_others, let_in, tablet_address
+from rehab.stations.pages.phones import LEGS, sensor_path
+from rehab.training.measures import InvalidSetting
 from rehab.training.steps import Side
-from rehab.training.valences import POSITIVE
 
-MEASURE, GOAL_PERCENT, MINUTES = MEASURES["shank_stance"], 60.0, 10
+
+@for_roles(Role.LEAD, Role.PT)
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def try_phone(request: HttpRequest) -> HttpResponse:
+    """Show the three screens of a trial, each with its way there; first choose the leg.
+
+    ``side`` opens a session of the demo patient; ``code`` lets a tablet in.
+    """
+    lets_in = "code" in request.POST
+    if lets_in and not step_up.is_confirmed(request, timezone.now()):
+        return step_up.ask(request)
+    side = request.POST.get("side", "")
+    if side in LEGS:
+        return _begin(request, Side(side))
+    trial = find_trial(user_of(request))
+    if trial is None:
+        return render(request, "patients/phone_trial.html", {"legs": LEGS.items()})
+    asked = let_in(request) if lets_in else {}
+    if asked is None:
+        return redirect("try-phone")
+    return _show(request, asked)
+
+
+def _begin(request: HttpRequest, side: Side) -> HttpResponse:
+    user = user_of(request)
+    patient, station = add_demo_patient(request), first_station(clinic_of(user))
+    if not patient.simulated:
+        return redirect("patient", patient_id=patient.pk)
+    try:
+        begin_trial(patient, station, side, user)
+    except StationTaken as taken:
+        messages.error(request, format_refusal(taken))
+        return redirect("monitor", session_id=taken.session.pk)
+    except InvalidSetting as refused:
+        messages.error(request, format_refusal(refused))
+        return redirect("start")
+    except (NotStored, OwnedElsewhere) as problem:
+        messages.error(request, str(problem))
+        return redirect("start")
+    return redirect("try-phone")
+
+
+def _show(request: HttpRequest, more: dict[str, object]) -> HttpResponse:
+    """Show the open trial, with what a form of it has answered."""
+    user, now = user_of(request), timezone.now()
+    trial = find_trial(user)
+    if trial is None:
+        return redirect("try-phone")
+    context = {
+        "session": trial,
+        "found": look_at_trial(trial, now),
+        "legs": LEGS.items(),
+        "stations": Station.objects.visible_to(user),
+        **tablet_address(request),
+        **more,
+    }
+    return render(request, "patients/phone_trial.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
 @never_cache
 @step_up.required
 @require_POST
-def try_phone(request: HttpRequest) -> HttpResponse:
-    """Open a session of the demo patient; show the ways to the phone's and the therapist's page."""
-    user = user_of(request)
-    clinic = clinic_of(user)
+def open_trial_phone(request: HttpRequest) -> HttpResponse:
+    """Open the phone's page of the trial here, or show its QR code; any earlier one is left out."""
+    user, now = user_of(request), timezone.now()
+    trial = find_trial(user)
+    if trial is None or trial.station is None:
+        return redirect("try-phone")
     try:
-        check_approval(user, client_address(request), "phone", timezone.now())
+        check_approval(user, client_address(request), "phone", now)
     except NotTrusted as refused:
         messages.error(request, str(refused))
         return redirect("first-steps")
-    patient, station = add_demo_patient(request), first_station(clinic)
-    if not patient.simulated:
-        return redirect("patient", patient_id=patient.pk)
-    try:
-        session = create_session(
-            SessionRequest(
-                patient=patient,
-                valence=POSITIVE.slug,
-                measure=MeasureDefinition.objects.visible_to(user).get(
-                    clinic=None, slug=MEASURE.slug
-                ),
-                goal=GoalRule(value=GOAL_PERCENT),
-                phases=[make_phase(kind="training")],
-                target=Target(duration_s=60 * MINUTES),
-                trained_side=Side.LEFT,
-                station=station,
-                created_by=user,
-                simulated=True,
-            )
-        )
-    except StationTaken as taken:
-        messages.error(request, format_refusal(taken))
-        return redirect("monitor", session_id=taken.session.pk)
-    token = issue_builtin_token(station, Device.Kind.SOURCE, by=user)
-    context = {
-        "phone": f"{sensor_path(clinic)}&trial#token={token}&place=shank&side=left",
-        "session": session,
-        "monitor": reverse("monitor", args=[session.pk]),
-    }
-    return render(request, "patients/phone_trial.html", context)
+    token = issue_builtin_token(trial.station, Device.Kind.SOURCE, by=user)
+    # Behind the # nothing of it reaches a server's log.
+    worn = f"#token={token}&place=shank&side={trial.trained_side}"
+    page = f"{sensor_path(clinic_of(user))}&trial{worn}"
+    server = address_for_others(request) if "qr" in request.POST else None
+    if server is None:
+        return redirect(page)
+    drawing = segno.make(server + page, micro=False)
+    return _show(request, {"phone_qr": drawing.svg_inline(omitsize=True, border=2)})
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)  # of the simulated one alone, every two seconds
+@never_cache
+@require_safe
+def trial_state(request: HttpRequest) -> JsonResponse:
+    """Return which screens of the trial are there now."""
+    trial = find_trial(user_of(request))
+    found = look_at_trial(trial, timezone.now()) if trial else {}
+    return JsonResponse({name: [one.is_done, one.words] for name, one in found.items()})

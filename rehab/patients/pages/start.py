@@ -15,6 +15,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.patients.forms import PatientForm, ScreenForm
+from rehab.patients.pages.first_steps import list_first_steps
 from rehab.patients.screen_check import LETTERS, propose
 from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
@@ -24,7 +25,7 @@ from rehab.people.roles import Role
 from rehab.sessions.alarms import Alarm, open_alarms
 from rehab.sessions.feedback_text_updates import change_language
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.forms.initial import initial_choices
+from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
@@ -80,7 +81,10 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     query = request.GET.get("q", "").strip()
-    context = start_context(user_of(request), query) | {"q": query}
+    context = start_context(user_of(request), query) | {
+        "q": query,
+        "first_steps": list_first_steps(request),
+    }
     return render(request, "patients/start.html", context)
 
 
@@ -101,6 +105,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         "open_here": open_sessions(user).filter(patient=patient),
         "form": SessionForm(initial=initial, patient=patient, by=user),
         "last": initial,
+        "is_repeated": last_session(patient, user) is not None,
         "has_tablet": has_tablet(initial["station"], timezone.now()),
         "visits": visits,
         "soon": [

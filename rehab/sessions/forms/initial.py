@@ -31,20 +31,22 @@ def _first_free_station(stations: QuerySet[Station]) -> Station | None:
     return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
 
 
+def last_session(patient: Patient, by: User) -> TrainingSession | None:
+    """Return a patient's last session that was set up here: no import and no trial."""
+    sessions = TrainingSession.objects.visible_to(by)
+    sessions = sessions.filter(patient=patient, protocol__isnull=False)
+    return sessions.order_by("-created_at", "-pk").first()
+
+
 def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
     """Return the set-up's initial values: those of the last session, or defaults."""
     stations = Station.objects.visible_to(by)
+    protocols = Protocol.objects.visible_to(by)
     sources = dict(source_choices())
-    last = (
-        TrainingSession.objects.visible_to(by)
-        .filter(patient=patient, protocol__isnull=False)
-        .order_by("-created_at", "-pk")
-        .first()
-    )
+    last = last_session(patient, by)
     offered = {option.name: option.default for option in OPTIONS.values()}
     if last is None:
         name = TRAINING_ONLY if patient.simulated else WITH_BASELINE
-        protocols = Protocol.objects.visible_to(by)
         protocol = protocols.filter(name=name, clinic=None).first() or protocols.first()
         source = "synthetic demo" if patient.simulated else LIVE
         station = _first_free_station(stations)
@@ -71,11 +73,15 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
     goal = rule.offered_goal if last.goal is None or measure != last.measure else last.goal
     changes = _read_last_changes(last, by)
     chosen = {o.name: o.read(plan, last.walking, changes) for o in OPTIONS.values()}
+    protocol = last.protocol
+    if measure != last.measure:  # a goal of another measure says nothing: a baseline does
+        protocol = protocols.filter(name=WITH_BASELINE, clinic=None).first() or protocol
+        chosen["goal_by"] = "percent"
     return chosen | {
         "measure": measure,
         "goal_value": round(goal, rule.goal_places),
         "goal_percent": chosen["goal_percent"] or offered["goal_percent"],
-        "protocol": last.protocol,
+        "protocol": protocol,
         "station": station,
         "source": source,
         "source_words": format_source(sources[source]),

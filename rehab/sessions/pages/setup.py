@@ -17,10 +17,9 @@ from rehab.feedback.clinic_valences import valences_of
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.forms.initial import initial_choices
+from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.session import SessionForm
-from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.option import Group
 from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.presets import Preset
@@ -85,7 +84,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     context = {
         "patient": patient,
         "has_tablet": has_tablet(form.chosen_station, timezone.now()),
-        "walked_before": TrainingSession.objects.visible_to(user).filter(patient=patient).exists(),
+        "is_repeated": last_session(patient, user) is not None,
         "protocols": [
             (choice, outlines[choice.data["value"].value]) for choice in form["protocol"]
         ],
@@ -102,6 +101,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
                 "unit": rule.unit,
                 "step": rule.goal_step,
                 "places": rule.goal_places,
+                "better": gettext(rule.better),
                 "goal": f"{rule.offered_goal:.{rule.goal_places}f}",
             }
             for key, rule in measures.items()

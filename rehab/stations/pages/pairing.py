@@ -76,19 +76,25 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
     return None
 
 
+def address_for_others(request: HttpRequest) -> str | None:
+    """Return where other devices open this server; None where only this computer can."""
+    secure = secure_host()
+    host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
+    return f"{'https' if secure else request.scheme}://{host}" if host else None
+
+
 def tablet_address(request: HttpRequest) -> dict[str, Any]:
     """Return the address that a tablet opens, and its drawing to scan.
 
     Without an address: whether a tablet reached the server all the same.
     """
-    secure = secure_host()
-    host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
-    if host is None:
+    server = address_for_others(request)
+    if server is None:
         tablets = Device.objects.visible_to(user_of(request)).filter(kind=Device.Kind.TABLET)
         return {"is_reached": tablets.exclude(last_seen_at=None).exists()}
-    address = f"{'https' if secure else request.scheme}://{host}{reverse('tablet')}"
+    address = server + reverse("tablet")
     drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
-    own_certificate = bool(secure) and not settings.CERTIFICATE
+    own_certificate = secure_host() is not None and not settings.CERTIFICATE
     return {"address": address, "qr": drawing, "own_certificate": own_certificate}
 
 

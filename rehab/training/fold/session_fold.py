@@ -18,7 +18,7 @@ from rehab.training.fold.feedback_delivery import FeedbackDelivery
 from rehab.training.fold.goal_following import GoalFollowing
 from rehab.training.fold.tallies import Block, Tally
 from rehab.training.fold.valence_course import ValenceCourse
-from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
+from rehab.training.goals import GoalRule
 from rehab.training.heart_rate_limit import is_above_limit
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
@@ -131,7 +131,8 @@ class SessionFold:
     def baseline_mean(self) -> float | None:
         """Mean of the valid baseline values; None before there are enough of them."""
         baseline = self.tally_of("baseline")
-        return baseline.mean_value if baseline.valid >= MIN_BASELINE_STRIDES else None
+        is_enough = baseline.valid >= self.plan.goal.baseline_strides
+        return baseline.mean_value if is_enough else None
 
     def step(self, measurement: Measurement) -> ScoredStep:
         """Score one stride and count it.
@@ -260,7 +261,7 @@ class SessionFold:
             raise NotAllowed(
                 "The goal needs {needed} valid baseline strides and has {had}. Walk on, or set the "
                 "goal as a value.",
-                needed=MIN_BASELINE_STRIDES,
+                needed=self.plan.goal.baseline_strides,
                 had=self.tally_of("baseline").valid,
             )
         return rule.resolve(self.plan.measure, self.baseline_mean)

@@ -45,10 +45,15 @@ function describeCompanion({ companion, companion_trouble: trouble, companion_cl
   return words.filter(Boolean).join(", ");
 }
 
+// What walks in a trial instead of a leg (rehab/sessions/live/protocol/messages.py).
+const PLAYED = { recording: _("recording"), simulated: _("simulated") };
+
 function describeAllSources(presence, strides, silent_s, isRunning) {
   const [sign, words] = describeSource(presence.source, strides, silent_s, isRunning, presence.source_trouble);
-  const others = [describeClock(presence.source_clock), describeCompanion(presence)].filter(Boolean);
-  return [presence.companion_trouble && sign === "✓" ? "!" : sign, [words, ...others].join(" · ")];
+  const played = presence.source && PLAYED[presence.source_plays];
+  const others = [describeClock(presence.source_clock), describeCompanion(presence)];
+  const all = [played, words, ...others].filter(Boolean);
+  return [presence.companion_trouble && sign === "✓" ? "!" : sign, all.join(" · ")];
 }
 
 function describeSource(isThere, strides, silent_s, isRunning, trouble) {
@@ -93,7 +98,8 @@ export function createConnections({ state, show, socket, robot }) {
       const { about, presence } = session;
       const isSeen = state.isTabletHeard && !socket.isStale();
       show("mirror", isSeen ? fill(_("%(name)s sees"), { name: about.nickname }) : _("Patient’s page"));
-      show("mirrored", isSeen ? _("now") : _("no tablet"));
+      show("mirrored", isSeen ? _("now") : _("no screen"));
+      if (presence.source_plays) show("played", PLAYED[presence.source_plays]);
       const described = describeAll(session);
       for (const row of document.querySelectorAll("[data-presence]")) {
         const [sign, words] = described[row.dataset.presence];

@@ -6,8 +6,8 @@ import { clockCures, phaseName, reasonName } from "garry/shared/labels";
 
 // By which sensor a stride was measured (rehab/training/measures.py).
 const WORN = {
-  wearable_foot: _("sensor on the foot, algorithm %(version)s"),
-  wearable_shank: _("sensor on the shin, algorithm %(version)s"),
+  wearable_foot: _("foot sensor, version %(version)s"),
+  wearable_shank: _("shin sensor, version %(version)s"),
 };
 
 // What a name ends with, and how it is read: "stance_s" as "stance 0.62 s".
@@ -25,9 +25,11 @@ const UNITS = {
 const NAMED = new RegExp(`^(.+?)_(${Object.keys(UNITS).join("|")})$`);
 
 export function createLastStride({ state, show }) {
+  const better = document.getElementById("monitor")?.dataset.better ?? "";
   const dot = document.querySelector(".verdict .dot");
 
-  function describeGoal({ goal, unit, obstacle }) {
+  function describeGoal({ goal, unit, obstacle, baseline }) {
+    if (baseline && baseline.count < baseline.needed) obstacle = ""; // its count is told beside it (goal_coach.js)
     if (goal !== null) return fill(_("goal %(goal)s"), { goal: `${number(goal, 2)} ${unit}` });
     return obstacle || _("The goal follows from the baseline.");
   }
@@ -62,7 +64,8 @@ export function createLastStride({ state, show }) {
       const stride = state.lastStride;
       dot.hidden = stride?.performance == null;
       if (!stride) {
-        for (const slot of ["number", "value", "extras", "verdict"]) show(slot, "");
+        for (const slot of ["number", "value", "verdict"]) show(slot, "");
+        show("extras", better); // which way is better, and why
         show("performance", "–");
         return;
       }
@@ -74,7 +77,9 @@ export function createLastStride({ state, show }) {
         "extras",
         [
           ...clockCures([...(stride.reasons ?? []), ...Object.keys(stride.extra ?? {})]),
-          ...Object.entries(stride.extra ?? {}).map(describeExtra),
+          ...Object.entries(stride.extra ?? {})
+            .filter(([, value]) => value !== stride.value) // told already
+            .map(describeExtra),
         ].join("\n"),
       );
       show("verdict", describeVerdict(stride, session.phase));

@@ -9,7 +9,7 @@ import { NOWHERE, Orientation, dot, isNowhere, scale } from "garry/sensor/orient
 import { Reading } from "garry/sensor/readings";
 import { GAP_S } from "garry/sensor/swings";
 
-export const VERSION = 1;
+export const VERSION = 2;
 const HELD_S = 60;
 const STRIDES_MIN = 3;
 const STRIDES_SURE = 5;

@@ -1,4 +1,5 @@
 // The page of a phone that is worn: strap, check, then a locked black page that measures strides and sends them.
+// In a trial a recording or a simulated leg walks instead.
 //
 // Samples stay here; only strides leave.
 
@@ -29,6 +30,8 @@ const STRAPS = {
   foot: _("On the shoe’s instep, under the laces, flat. Only a light sensor, never a phone."),
   shank: _("On the inner front of the shin, a hand’s width below the knee, screen outward. Tight, never over a wound."),
 };
+// A locked page's count, by the leg that is measured.
+const UNITS = { left: _("strides of the left leg"), right: _("strides of the right leg") };
 const LINKS = {
   connected: _("connected"),
   "other leg": _("connected, for the steps’ symmetry: the other leg is trained"),
@@ -54,6 +57,8 @@ const symmetry = new Symmetry();
 const recent = new RecentSamples();
 const lastPlace = new LastPlace(place, side);
 let elsewhere_deg = 0; // by how much it sits otherwise than last time
+let plays = ""; // instead of a leg: "recording" or "simulated"
+let findProgress = null; // of what plays
 let sender;
 let link = "no session";
 let count = 0;
@@ -116,38 +121,54 @@ function describeClock(stride) {
 let said = null;
 function tick() {
   const trouble = findTrouble();
-  if (trouble !== said) sender?.say({ trouble: (said = trouble), rate_hz: motion.rate_hz });
+  if (trouble !== said) sender?.say({ trouble: (said = trouble), rate_hz: motion.rate_hz, plays });
   if (body.dataset.step === "check") drawCheck();
   show("strides", String(count));
   const rate = motion.rate_hz === null ? "–" : Math.round(motion.rate_hz);
   const waiting = sender?.waiting ?? 0;
   show("state", fill(_("%(link)s · %(rate)s Hz · %(waiting)s waiting"), { link: LINKS[link], rate, waiting }));
+  if (plays) show("playing", describePlayed(findProgress()));
+}
+
+const toMinutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")}`;
+
+function describePlayed({ time, at_s, length_s }) {
+  if (plays === "simulated") return _("Simulated leg");
+  const values = { time, at: toMinutes(at_s), of: toMinutes(length_s) };
+  if (time === 1) return fill(_("Recording, %(at)s of %(of)s"), values);
+  return fill(_("Recording again, round %(time)s: %(at)s of %(of)s"), values);
 }
 
 function drawCheck() {
   const hasWalked = count >= STRIDES_CHECKED;
   const isDone = { still: still_s >= STILL_S, lift: hasLifted, walk: hasWalked };
-  const next = hasWalked ? null : Object.keys(isDone).find((name) => !isDone[name]);
+  const next = Object.keys(isDone).find((name) => !isDone[name]);
   for (const item of document.querySelectorAll("[data-check]")) {
     item.classList.toggle("done", isDone[item.dataset.check]);
     item.classList.toggle("now", item.dataset.check === next);
   }
-  if (!hasWalked && detector.upright) elsewhere_deg = lastPlace.compare(detector.upright);
-  const isCrooked = hasWalked && detector.axisShare < SHARE;
-  const verdict = slots.get("verdict");
-  const isAmber = isCrooked || detector.isInDoubt || elsewhere_deg;
-  verdict.dataset.sign = isAmber ? "amber" : hasWalked ? "green" : "";
-  if (detector.isInDoubt)
-    show("verdict", _("Stand still, lift the toes once (shin: swing the leg forward), stand still."));
-  else if (isCrooked) show("verdict", _("It sits crooked or slips round: tighten the strap, and walk again."));
-  else if (elsewhere_deg)
-    show(
-      "verdict",
-      fill(_("It is turned by %(angle)s° compared with last time. Strap it on as before, or take a new baseline."), {
-        angle: elsewhere_deg,
-      }),
+  if (!plays && !hasWalked && detector.upright) elsewhere_deg = lastPlace.compare(detector.upright);
+  const [sign, text] = judgeCheck(hasWalked, next);
+  slots.get("verdict").dataset.sign = sign;
+  show("verdict", text);
+}
+
+// What the check comes to: [green, amber or "" while it lasts, in words].
+function judgeCheck(hasWalked, next) {
+  if (detector.isInDoubt) {
+    return ["amber", _("Stand still, lift the toes once (shin: swing the leg forward), stand still.")];
+  }
+  if (hasWalked && detector.axisShare < SHARE) {
+    return ["amber", _("It sits crooked or slips round: tighten the strap, and walk again.")];
+  }
+  if (elsewhere_deg) {
+    const text = _(
+      "It is turned by %(angle)s° compared with last time. Strap it on as before, or take a new baseline.",
     );
-  else show("verdict", hasWalked ? _("Good.") : "");
+    return ["amber", fill(text, { angle: elsewhere_deg })];
+  }
+  if (hasWalked && next) return ["amber", _("Not checked yet: stand still for three seconds, then walk on.")];
+  return next ? ["", ""] : ["green", _("Good.")];
 }
 
 async function keepAwake() {
@@ -164,24 +185,37 @@ async function watchBattery() {
 }
 
 async function begin() {
-  const leg = isTrial && (await chooseLeg());
-  if (isTrial && !leg) return;
   // iOS asks the person, and only after a tap.
-  if (!isTrial && typeof DeviceMotionEvent.requestPermission === "function") {
+  if (typeof DeviceMotionEvent.requestPermission === "function") {
     const answer = await DeviceMotionEvent.requestPermission().catch(() => "denied");
     if (answer !== "granted") {
       refuse(_("The phone does not share its movement. Reload this page, and allow it when asked."));
       return;
     }
   }
+  await connect();
+  window.addEventListener("devicemotion", take);
+  step("check");
+}
+
+// Nobody stands or lifts a foot in a recording: it is not checked.
+async function play(what, leg) {
+  if (plays) return;
+  plays = what;
+  await connect();
+  findProgress = walkInstead(leg, take);
+  slots.get("playing").hidden = false;
+  tick();
+  step(what === "recording" ? "locked" : "check");
+}
+
+async function connect() {
   sender = new Sender(body.dataset.socket, token, side, await Journal.open(), (state, message) => {
     link = state;
     if (["unauthorized", "replaced", "refused"].includes(state)) refuse(message ?? LINKS[state]);
   });
   sender.onContact = (contact) => symmetry.note(contact);
   await sender.open();
-  if (leg) walkInstead(leg, take);
-  else window.addEventListener("devicemotion", take);
   setInterval(tick, TICK_MS);
   document.addEventListener("visibilitychange", () => {
     tick();
@@ -189,28 +223,46 @@ async function begin() {
   });
   keepAwake();
   watchBattery();
-  step("check");
 }
 
-// Who walks in a trial; null where a file was chosen that cannot.
-async function chooseLeg() {
-  const [file] = document.querySelector("[data-recording]").files;
-  const read = file ? readRecording(file) : fetchLeg(body.dataset.trial);
-  return read.catch(({ message }) => {
-    show("strap", message);
-    return null;
+// What plays in a trial: a file that a person chooses, or the simulated leg.
+function offerTrial() {
+  let leg = null;
+  const [recording, simulated] = document.querySelectorAll("[data-play]");
+  document.querySelector("[data-recording]").addEventListener("change", async ({ target }) => {
+    const [file] = target.files;
+    if (!file) return;
+    try {
+      leg = await readRecording(file);
+      show("problem", "");
+      show("file", `${file.name}, ${toMinutes(leg[0].length_s)}`);
+    } catch (problem) {
+      leg = null;
+      show("problem", problem.message);
+    }
+    recording.hidden = !leg;
   });
+  recording.addEventListener("click", () => play("recording", leg));
+  simulated.addEventListener("click", async () => play("simulated", await fetchLeg(body.dataset.trial)));
+  show("leg", fill(_("%(side)s %(place)s: try a recording"), { side: SIDES[side], place: PLACES[place] }));
+  step("trial");
 }
 
 function holdToLeave(button) {
   let holding;
   const release = () => clearTimeout(holding);
-  button.addEventListener("pointerdown", () => (holding = setTimeout(() => step("check"), HOLD_MS)));
+  button.addEventListener("pointerdown", () => (holding = setTimeout(leave, HOLD_MS)));
   for (const name of ["pointerup", "pointerleave", "pointercancel"]) button.addEventListener(name, release);
 }
 
+function leave() {
+  if (plays)
+    location.reload(); // where something else is chosen
+  else step("check");
+}
+
 function lock() {
-  if (detector.upright) lastPlace.keep(detector.upright);
+  if (!plays && detector.upright) lastPlace.keep(detector.upright);
   elsewhere_deg = 0;
   step("locked");
 }
@@ -225,11 +277,12 @@ if (!isTrial && (!window.isSecureContext || !("DeviceMotionEvent" in window))) {
   body.dataset.place = place;
   show("where", fill(_("%(side)s %(place)s"), { side: SIDES[side], place: PLACES[place] }));
   show("strap", STRAPS[place]);
-  document.querySelector("[data-trial-only]").hidden = !isTrial;
-  step("strap");
+  show("unit", UNITS[side]);
   const start = document.querySelector("[data-begin]");
   start.addEventListener("click", begin);
   start.disabled = false; // earlier, a tap would be lost
+  if (isTrial) offerTrial();
+  else step("strap");
   document.querySelector("[data-lock]").addEventListener("click", lock);
   document.querySelector("[data-save]").addEventListener("click", () => recent.save(`${side} ${place}.csv`));
   holdToLeave(document.querySelector("[data-leave]"));

@@ -12,6 +12,8 @@ const LOST_S = 0.04;
 const STRIDES_JUDGED = 10;
 const STRIDES_HELD = 200;
 const INTERRUPTED = 1.6;
+const SWING_UNLIKE = 1.5;
+const SWINGS_MIN = 3;
 const STANCE_MIN = 0.45;
 const STANCE_MAX = 0.92;
 
@@ -34,6 +36,8 @@ export class Reading {
   #motions = [];
   #shares = [];
   #lengths_s = [];
+  #swings_s = [];
+  #isContactUnclear = false;
   strides = [];
   total = 0;
 
@@ -60,6 +64,7 @@ export class Reading {
   restart() {
     this.#swings.restart();
     this.#contact_s = NaN;
+    this.#isContactUnclear = false;
   }
 
   add(time_s, rate, left, upright) {
@@ -109,6 +114,16 @@ export class Reading {
     if (this.#lengths_s.length && length_s > INTERRUPTED * median(this.#lengths_s)) doubts.push("interrupted");
     push(this.#lengths_s, length_s, STRIDES_JUDGED);
     if (history.findMeanStep(begin_s, swing.end_s) > SLOW_S) doubts.push("low_rate");
+    const wasUnclear = this.#isContactUnclear;
+    this.#isContactUnclear = this.#isUnlike(swing);
+    if (wasUnclear || this.#isContactUnclear) doubts.push("contact_unclear");
     return doubts;
+  }
+
+  #isUnlike({ begin_s, end_s }) {
+    const swing_s = end_s - begin_s;
+    const usual_s = this.#swings_s.length >= SWINGS_MIN ? median(this.#swings_s) : swing_s;
+    push(this.#swings_s, swing_s, STRIDES_JUDGED);
+    return Math.max(swing_s / usual_s, usual_s / swing_s) > SWING_UNLIKE;
   }
 }

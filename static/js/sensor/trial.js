@@ -3,6 +3,7 @@
 import { _ } from "garry/shared/language";
 
 const EVERY_MS = 10;
+const STARTS_S = 20; // in which a treadmill's belt comes up to speed: they pass at once
 const PAUSE_S = 0.2; // before a recording begins again: no stride reaches across
 const COUNT_HZ = 100;
 const COUNTS = 65_536; // from which packet counters begin again
@@ -17,10 +18,11 @@ export async function fetchLeg(address) {
 export async function readRecording(file) {
   const bytes = file.stream();
   const text = file.name.endsWith(".gz") ? bytes.pipeThrough(new DecompressionStream("gzip")) : bytes;
-  const [, ...lines] = (await new Response(text).text()).trim().split(/\r?\n/);
+  const read = await new Response(text).text().catch(() => ""); // no file of that kind
+  const [, ...lines] = read.trim().split(/\r?\n/);
   const table = lines.map((line) => line.split(",").map(Number));
   if (table.length < 2 || table.some((row) => row.length !== 7 || !row.every(Number.isFinite))) {
-    throw new Error(_("Choose a table with commas: time in seconds, three accelerations (m/s²), three rates (rad/s)."));
+    throw new Error(_("This file is no such recording. It needs the seven columns named below, with commas between."));
   }
   const first = table[0][0];
   const isCount = table.every(([at]) => Number.isInteger(at));
@@ -34,11 +36,14 @@ export async function readRecording(file) {
   return [walk, walk];
 }
 
+// Play both parts, the second one again and again. Return a function that says how far it is: which time, and seconds.
 export function walkInstead([first, again], take) {
-  const begin = performance.now();
-  let [part, start_s, next] = [first, 0, 0];
+  const skipped_s = first.length_s > 2 * STARTS_S ? STARTS_S : 0;
+  const begin = performance.now() - 1000 * skipped_s;
+  let [part, start_s, next, time] = [first, 0, 0, 1];
+  const played_s = () => (performance.now() - begin) / 1000;
   setInterval(() => {
-    const now_s = (performance.now() - begin) / 1000;
+    const now_s = played_s();
     while (start_s + part.rows[next][0] <= now_s) {
       const [at_s, ax, ay, az, gx, gy, gz] = part.rows[next];
       take({
@@ -49,7 +54,8 @@ export function walkInstead([first, again], take) {
       next += 1;
       if (next < part.rows.length) continue;
       start_s += part.length_s;
-      [part, next] = [again, 0];
+      [part, next, time] = [again, 0, time + 1];
     }
   }, EVERY_MS);
+  return () => ({ time, at_s: Math.max(0, played_s() - start_s), length_s: part.length_s });
 }

@@ -26,11 +26,12 @@ showGoal();
 // Another measure brings its unit, its steps and its first goal.
 const measures = JSON.parse(document.getElementById("measures").textContent);
 document.querySelector("select[name=measure]")?.addEventListener("change", ({ target }) => {
-  const { unit, step, places, goal } = measures[target.value];
+  const { unit, step, places, goal, better } = measures[target.value];
   const buttons = document.querySelector(".step[data-for=value]");
   Object.assign(buttons.dataset, { step, places });
   buttons.querySelector("input").value = goal;
   document.querySelector("[data-unit]").textContent = unit;
+  document.querySelector("[data-better]").textContent = better;
 });
 
 // Only the numbers that the chosen rule asks for.

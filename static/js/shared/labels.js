@@ -35,7 +35,7 @@ const REMARKS = {
   helping_hand: _("therapist’s hand"),
 };
 const SEVERITIES = [_("not hurt"), _("slightly hurt"), _("moderately hurt"), _("badly hurt")];
-// Why a stride does not count (rehab/training/steps.py, rehab/gait/strides.py).
+// Why a stride does not count (rehab/training/steps.py, rehab/gait/strides.py, rehab/gait/wearables/strides.py).
 const REASONS = {
   missing: _("no value"),
   not_finite: _("no number"),
@@ -66,6 +66,12 @@ const REASONS = {
   angle_out_of_step: _("the angle is out of step"),
   power_reversed: _("the power’s sign is turned"),
   no_push_off: _("no push-off"),
+  turning: _("the leg turned round"),
+  interrupted: _("a pause in the walk"),
+  samples_lost: _("samples are lost"),
+  low_rate: _("too few samples a second"),
+  contact_unclear: _("unclear when the foot lands"),
+  sensor_moved: _("the sensor has moved"),
   doubt_weight: _("the plates do not carry the body mass"),
   doubt_angle: _("the angle is not an ankle’s"),
   doubt_moment: _("the moment’s zero is off"),

@@ -17,7 +17,7 @@ from rehab.training.changes import NotAllowed
 from rehab.training.controls import Audience
 from rehab.training.phases import make_phase
 from rehab.training.valences import CueGestures
-from tests.support.callers import change, events_of, restart, turns
+from tests.support.callers import PatientPage, change, events_of, restart, turns
 from tests.support.world import NOW, set_owner
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
@@ -203,6 +203,19 @@ async def test_the_monitor_hears_how_long_sensor_and_tablet_are_silent(place, be
     )
     assert told["presence"]["stride_ago_s"] >= 0
     assert told["presence"]["tablet_ago_s"] >= 0
+
+
+async def test_a_patients_page_counts_wherever_it_is_open_and_its_copy_does_not(place, begun):
+    session = await begun(place)
+    monitor = await place.monitor(session).open()
+    copy = PatientPage(session.pk, "?mirror", user=place.pt)
+    await copy.watch()
+    page = PatientPage(session.pk, user=place.pt)
+    await page.watch()
+    await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["tablets"] == 1)
+    await page.hang_up()
+    await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["tablets"] == 0)
+    assert max(e["presence"]["tablets"] for e in monitor.events if e["kind"] == "presence") == 1
 
 
 # --- beside the socket ----------------------------------------------------------------------------

@@ -57,6 +57,18 @@ async def test_the_therapist_sees_what_is_wrong_with_a_sensor(place, sourced):
     assert (await source.sent_away())[0] == 4400
 
 
+async def test_the_therapist_sees_what_plays_instead_of_a_leg(place, sourced):
+    session, source = await sourced(place)
+    monitor = await place.monitor(session).open()
+    for what in ("recording", "simulated"):
+        await source.say({"type": "sensor", "trouble": "", "plays": what})
+        await monitor.until(
+            lambda e, it=what: e["kind"] == "presence" and e["presence"]["source_plays"] == it
+        )
+    await source.say({"type": "sensor", "trouble": "", "plays": "music"})
+    assert (await source.sent_away())[0] == 4400
+
+
 async def test_a_phone_asks_for_the_time(place, sourced):
     _, source = await sourced(place)
     before_s = time.monotonic()

@@ -23,6 +23,7 @@ from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder
 from rehab.sessions.live.protocol.backlog import read_backlog
 from rehab.sessions.live.protocol.messages import (
+    is_mirror,
     read_after,
     read_change,
     read_frame,
@@ -70,7 +71,7 @@ class ScreenConsumer(Socket):
             )
         self.live = live = await self.runtime.session(session_id)
         self.clinic_id = live.clinic_id
-        if isinstance(self.actor, Device):
+        if self.is_seen_by_patient:
             live.tablets += 1
             live.tablet_seen_at = timezone.now()
         self.language = live.aggregate.fold.valences.language  # what the patient reads
@@ -79,6 +80,14 @@ class ScreenConsumer(Socket):
             self.language = theirs or settings.LANGUAGE_CODE
         self.start(self._pump(live, read_after(self.scope["query_string"])))
         self.runtime.audit_queue.add(Act.VIEW, self.actor, session_id, self.scope, timezone.now())
+
+    @property
+    def is_seen_by_patient(self) -> bool:
+        """Whether it is the page that a patient looks at: on a tablet, or where one is signed in.
+
+        A therapist's page has a copy of it (`mirror`).
+        """
+        return self.audience is Audience.PATIENT and not is_mirror(self.scope["query_string"])
 
     @classmethod
     def is_allowed(cls, actor: Actor) -> bool:
@@ -94,7 +103,7 @@ class ScreenConsumer(Socket):
                 self.audience, self.send, timezone.now(), self.write
             )
             self.subscriber = subscriber
-            if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
+            if self.is_seen_by_patient or self.audience is Audience.MONITOR:
                 live.announce_presence(timezone.now())
             try:
                 await self.send_message(snapshot)
@@ -138,7 +147,7 @@ class ScreenConsumer(Socket):
     def _confirm(self, frame: int) -> None:
         if self.subscriber is not None:
             self.subscriber.confirm(frame)
-        if isinstance(self.actor, Device) and self.live is not None:
+        if self.is_seen_by_patient and self.live is not None:
             self.live.tablet_seen_at = timezone.now()
 
     async def on_frame(self, text: str | None) -> None:
@@ -245,7 +254,7 @@ class ScreenConsumer(Socket):
         if live is not None:
             if self.subscriber is not None:
                 live.feed.subscribers.discard(self.subscriber)
-            if isinstance(self.actor, Device):
+            if self.is_seen_by_patient:
                 live.tablets -= 1
                 live.announce_presence(timezone.now())
 

@@ -179,6 +179,11 @@ def read_after(query: bytes) -> int | None:
     return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None
 
 
+def is_mirror(query: bytes) -> bool:
+    """Return whether a patient's page is a copy on another page, by its address."""
+    return "mirror" in parse_qs(query.decode("latin-1"), keep_blank_values=True)
+
+
 def read_hello(message: Message) -> Hello:
     """Return a source's hello. Raises BadFrame."""
     if message.get("version") != PROTOCOL_VERSION:
@@ -202,10 +207,19 @@ class SensorTrouble(StrEnum):
     DOUBT = "doubt"
 
 
+class Played(StrEnum):
+    """What walks instead of a leg, where a sensor's page is only tried."""
+
+    NOTHING = ""
+    RECORDING = "recording"
+    SIMULATED = "simulated"
+
+
 class SensorState(Struct, frozen=True):
     """What a worn sensor says of itself: its trouble, its rate, its clock less ours."""
 
     trouble: SensorTrouble
+    plays: Played = Played.NOTHING
     rate_hz: Number | None = None
     clock_offset_s: Number | None = None
     clock_error_s: Positive | None = None

@@ -83,7 +83,7 @@ class LiveSession:
         self.companion_state: SensorState | None = None
         self.robot: ConnectedDevice | None = None
         self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
-        self.tablets = 0
+        self.tablets = 0  # pages that the patient looks at
         self.tablet_seen_at: datetime | None = None
         self.stride_at: datetime | None = recent[-1].received_at if recent else None
         self.committed = aggregate.fold.last_number
@@ -258,6 +258,7 @@ class LiveSession:
         return {
             "source": self.source is not None,
             "source_trouble": _trouble(self.source, self.source_state),
+            "source_plays": _plays(self.source, self.source_state),
             "source_clock": _clock(self.source, self.source_state),
             "companion": self.companion is not None,
             "companion_trouble": _trouble(self.companion, self.companion_state),
@@ -347,6 +348,11 @@ def _for_patient(about: Message) -> Message:
 
 def _trouble(device: ConnectedDevice | None, state: SensorState | None) -> str:
     return state.trouble.value if device and state else ""
+
+
+def _plays(device: ConnectedDevice | None, state: SensorState | None) -> str:
+    """Return what walks instead of a leg; empty where one does."""
+    return state.plays.value if device and state else ""
 
 
 def _clock(device: ConnectedDevice | None, state: SensorState | None) -> list[float | None] | None:

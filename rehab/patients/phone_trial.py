@@ -1,0 +1,87 @@
+"""A trial of a phone as a sensor: a session of the demo patient, into which a recording walks."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from django.utils.translation import gettext as _
+
+from rehab.patients.first_steps import Found
+from rehab.people.models import Patient, User
+from rehab.sessions.live import runtime
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.stations.models import Station
+from rehab.training.changes import OPEN_STATES, ChangeKind, State
+from rehab.training.goals import TRIAL_BASELINE_STRIDES, GoalRule, Target
+from rehab.training.measures import MEASURES
+from rehab.training.phases import make_phase
+from rehab.training.steps import Side
+from rehab.training.valences import POSITIVE
+
+MEASURE, GOAL_PERCENT, MINUTES = MEASURES["shank_stance"], 100.0, 10
+BASELINE_STRIDES = 10  # of which `TRIAL_BASELINE_STRIDES` have to be valid
+
+
+def find_trial(user: User) -> TrainingSession | None:
+    """Return the open trial of a user's clinic."""
+    return (
+        TrainingSession.objects.visible_to(user)
+        .filter(
+            patient__simulated=True,
+            measure__slug=MEASURE.slug,
+            protocol=None,
+            state__in=[state.value for state in OPEN_STATES],
+        )
+        .select_related("patient", "station", "measure")
+        .first()
+    )
+
+
+def begin_trial(patient: Patient, station: Station, side: Side, by: User) -> TrainingSession:
+    """Return the open trial of a leg, a new one where there is none.
+
+    One of the other leg that has not started ends. Raises StationTaken where any other session is
+    open at the station.
+    """
+    trial = find_trial(by)
+    if trial is not None and trial.trained_side == side:
+        return trial
+    if trial is not None and trial.state == State.READY:
+        change_session(trial, ChangeKind.ABORT, by=by)
+    return create_session(
+        SessionRequest(
+            patient=patient,
+            valence=POSITIVE.slug,
+            measure=MeasureDefinition.objects.visible_to(by).get(clinic=None, slug=MEASURE.slug),
+            goal=GoalRule(
+                percent_of_baseline=GOAL_PERCENT, baseline_strides=TRIAL_BASELINE_STRIDES
+            ),
+            phases=[
+                make_phase(kind="baseline", strides=BASELINE_STRIDES),
+                make_phase(kind="training"),
+            ],
+            target=Target(duration_s=60 * MINUTES),
+            trained_side=side,
+            station=station,
+            created_by=by,
+            simulated=True,
+        )
+    )
+
+
+def look_at_trial(trial: TrainingSession, now: datetime) -> dict[str, Found]:
+    """Return which of its screens are there: the patient's, and the phone's."""
+    running = runtime.peek()
+    live = running.sessions.get(trial.pk) if running else None
+    presence = live.presence(now) if live else {"tablets": 0, "source": False}
+    name = {"name": trial.patient.nickname}
+    return {
+        "screen": Found(True, _("A screen shows %(name)s") % name)
+        if presence["tablets"]
+        else Found(False, _("No screen shows %(name)s") % name),
+        "phone": Found(True, _("The phone’s page is connected."))
+        if presence["source"]
+        else Found(False, _("No phone’s page is connected yet.")),
+    }
