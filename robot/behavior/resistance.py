@@ -46,7 +46,7 @@ class Resistance:
             How long ago the last moment was [s].
         """
         span_s = max(span_s, 0.0)
-        is_, should = state.twist.wheels_m_s, ordered.wheels_m_s
+        is_, should = state.twist.sides_m_s, ordered.sides_m_s
         deviation_m_s = max(abs(one - other) for one, other in zip(should, is_, strict=True))
         speed_m_s = max(map(abs, should))
         limit_m_s = min(max(DEVIATION_SHARE * speed_m_s, DEVIATION_LEAST_M_S), DEVIATION_M_S)

@@ -73,6 +73,7 @@ class RosbridgeBase(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
+        self.abilities.check(twist)
         if self._bridge.is_dead:
             raise BaseLost(
                 "The thread that talks to the rosbridge has ended: see its messages above."

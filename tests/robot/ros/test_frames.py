@@ -29,7 +29,9 @@ from robot.ros.messages import (
     EVENTS,
     read_event,
     read_hazards,
+    read_joints,
     read_odometry,
+    read_stamp_s,
     read_twist,
     write_twist,
 )
@@ -47,9 +49,9 @@ CMD = Topic("/cmd_vel", "geometry_msgs/Twist")
             '"latch":false,"queue_size":1}',
         ),
         (
-            publish(CMD, write_twist(Twist(0.2, -1.5))),
+            publish(CMD, write_twist(Twist(0.2, -1.5, 0.1))),
             '{"op":"publish","topic":"/cmd_vel","msg":'
-            '{"linear":{"x":0.2,"y":0.0,"z":0.0},"angular":{"x":0.0,"y":0.0,"z":-1.5}}}',
+            '{"linear":{"x":0.2,"y":0.1,"z":0.0},"angular":{"x":0.0,"y":0.0,"z":-1.5}}}',
         ),
         (unadvertise(CMD), '{"op":"unadvertise","topic":"/cmd_vel"}'),
         (
@@ -133,12 +135,13 @@ def odometry(x=1.0, y=2.0, heading_rad=0.5, v=0.1, w=-0.2):
     half = heading_rad / 2
     turned = {"x": 0, "y": 0, "z": math.sin(half), "w": math.cos(half)}
     pose = {"position": {"x": x, "y": y, "z": 0}, "orientation": turned}
-    return {"pose": {"pose": pose}, "twist": {"twist": {"linear": {"x": v}, "angular": {"z": w}}}}
+    twist = {"linear": {"x": v, "y": 0.05}, "angular": {"z": w}}
+    return {"pose": {"pose": pose}, "twist": {"twist": twist}}
 
 
 def test_an_odometry_is_read():
     pose, twist = read_odometry(odometry())
-    assert (pose.x_m, pose.y_m, twist) == (1.0, 2.0, Twist(0.1, -0.2))
+    assert (pose.x_m, pose.y_m, twist) == (1.0, 2.0, Twist(0.1, -0.2, 0.05))
     assert pose.heading_rad == pytest.approx(0.5)
     assert isinstance(pose, Pose)
 
@@ -174,7 +177,7 @@ def test_an_orientation_of_length_0_is_none():
 
 @given(ANYTHING)
 def test_no_message_does_more_than_be_refused(message):
-    readers: list[Any] = [read_twist, read_odometry, read_hazards]
+    readers: list[Any] = [read_twist, read_odometry, read_hazards, read_joints, read_stamp_s]
     readers += [partial(read_event, kind) for kind in EVENTS]
     for read in readers:
         with suppress(BadRosFrame):

@@ -1,0 +1,279 @@
+"""The joints of a head or of arms: their poses, and how a topic or an action server moves them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from robot.bases.base import Answer
+from robot.ros.frames import ActionResult, Frame, Topic, cancel_goal, publish, send_goal
+from robot.ros.messages import FOLLOW, without_msg
+
+# The tip of an arm of 0.5 m then goes 0.25 m/s, the reduced speed of ISO 10218-1.
+FASTEST_RAD_S = 0.5
+PEAK = 1.5  # peak over mean speed of a cubic from rest to rest
+SHORTEST_S = 0.6
+LONGEST_S = 3.0  # ours: what a lost connection has begun ends by itself
+
+# A controller of ROS 1 stays where it is at a trajectory without points; one of ROS 2 refuses it
+# (docs/reference/rosbridge.md#head-arms-and-speech).
+HOLD: dict[str, Any] = {"joint_names": [], "points": []}
+
+# A Stretch rejects a goal that follows a running one within 0.2 s
+# (docs/reference/rosbridge.md#names-of-a-stretch). A goal to hold is sent so long after the one
+# before [s], or as soon as that one has ended, and so often at most.
+GOAL_EVERY_S = 0.25
+HOLD_TRIES = 4
+# A goal that has not ended so long after its motion should have [s] never will: bridges of before
+# 2026 do not tell that one was rejected (docs/reference/rosbridge.md#actions).
+OVERDUE_S = 1.0
+LATE_S = 0.5  # a motion that is late may last so much longer
+
+
+@dataclass(frozen=True, slots=True)
+class JointServer:
+    """What moves joints.
+
+    Parameters
+    ----------
+    topic
+        Takes a trajectory_msgs/JointTrajectory; or an action, FollowJointTrajectory.
+    names
+        Joints that may be named; empty for any.
+    takes_all
+        Whether all of them have to be named.
+    states
+        A sensor_msgs/JointState that says where they are, for a server that goes on with a motion
+        whose goal was canceled; None for one that holds them by itself.
+    end_rad_s
+        Velocity in the last point [rad/s]: 0, to end at rest; for a server that takes it for the
+        largest one on the way, that.
+    """
+
+    topic: Topic
+    names: tuple[str, ...] = ()
+    takes_all: bool = False
+    states: Topic | None = None
+    end_rad_s: float = 0.0
+
+    @property
+    def is_action(self) -> bool:
+        """Whether it is an action server."""
+        return without_msg(self.topic.kind) == FOLLOW
+
+
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """The joints of a head or of arms, and their angles [rad] at rest, glad and sad.
+
+    All of its motions take equally long (``takes_s``): long enough from any of its poses to any
+    other, wherever a motion before was broken off.
+    """
+
+    server: JointServer
+    names: tuple[str, ...]
+    rest_rad: tuple[float, ...]
+    glad_rad: tuple[float, ...]
+    sad_rad: tuple[float, ...]
+
+    @property
+    def takes_s(self) -> float:
+        """How long each motion takes [s], so that no joint is faster than ``FASTEST_RAD_S``."""
+        angles = zip(self.rest_rad, self.glad_rad, self.sad_rad, strict=True)
+        farthest_rad = max(max(joint) - min(joint) for joint in angles)
+        return max(SHORTEST_S, PEAK * farthest_rad / FASTEST_RAD_S)
+
+    def pose_rad(self, answer: Answer) -> list[float]:
+        """Return the angles of an answer [rad]: a gentle one goes only part of the way."""
+        goal_rad = self.glad_rad if answer.is_glad else self.sad_rad
+        return [
+            rest + answer.strength * (goal - rest)
+            for rest, goal in zip(self.rest_rad, goal_rad, strict=True)
+        ]
+
+    def write_trajectory(self, pose_rad: list[float]) -> dict[str, Any]:
+        """Return a trajectory_msgs/JointTrajectory that begins now and ends standing still.
+
+        Bridges of ROS 1 know a time by ``secs`` and ``nsecs`` alone; those of ROS 2 by these, too.
+        Actions are of ROS 2, and get its own names.
+        """
+        secs, rest_s = divmod(self.takes_s, 1)
+        names = ("sec", "nanosec") if self.server.is_action else ("secs", "nsecs")
+        point = {
+            "positions": pose_rad,
+            "velocities": [self.server.end_rad_s] * len(pose_rad),
+            "time_from_start": dict(zip(names, (int(secs), int(rest_s * 1e9)), strict=True)),
+        }
+        return {"joint_names": list(self.names), "points": [point]}
+
+
+class JointMover(Protocol):
+    """Moves joints by way of a rosbridge. Time is a parameter."""
+
+    counters: Counter[str]
+    problem: str  # why they did not move, or were not held; empty where they did
+
+    def move(self, pose_rad: list[float]) -> None:
+        """Move them to angles [rad], in place of what was begun before."""
+
+    def hold(self) -> None:
+        """Hold them where they are, if they may be moving."""
+
+    def due(self, now_s: float) -> Iterator[Frame]:
+        """Yield the frames to send now."""
+
+    def end(self, now_s: float) -> Iterator[Frame]:
+        """Yield the last frames, which hold them."""
+
+    def disconnect(self) -> None:
+        """Forget what was begun: nothing reaches them, and their motion ends by itself."""
+
+
+class TrajectoryTopic:
+    """Moves joints by a topic, whose controller reports nothing."""
+
+    def __init__(self, joints: Joints) -> None:
+        self.counters: Counter[str] = Counter()
+        self.problem = ""
+        self._joints = joints
+        self._next: dict[str, Any] | None = None
+        self._moves_until_s = -math.inf
+
+    def move(self, pose_rad: list[float]) -> None:
+        """Move them to angles [rad], in place of what was begun before."""
+        self._next = self._joints.write_trajectory(pose_rad)
+
+    def hold(self) -> None:
+        """Hold them where they are, if they may be moving."""
+        self._next = HOLD
+
+    def due(self, now_s: float) -> Iterator[Frame]:
+        """Yield the trajectory to send now."""
+        following, self._next = self._next, None
+        if following is None or (following is HOLD and now_s > self._moves_until_s):
+            return
+        is_moving = following is not HOLD
+        self._moves_until_s = now_s + self._joints.takes_s + LATE_S if is_moving else -math.inf
+        yield publish(self._joints.server.topic, following)
+
+    def end(self, now_s: float) -> Iterator[Frame]:
+        """Yield the last frames, which hold them."""
+        self.hold()
+        yield from self.due(now_s)
+
+    def disconnect(self) -> None:
+        """Forget what was begun."""
+        self._next, self._moves_until_s = None, -math.inf
+
+
+class TrajectoryAction:
+    """Moves joints by the goals of an action server, one at a time.
+
+    To hold them cancels the goal. Where the server's motion goes on all the same, a goal to where
+    they are follows, until one is reached.
+
+    Attributes
+    ----------
+    counters
+        How many goals were not reached (``goals_refused``): rejected, broken off, or without an
+        end in time. Those that were canceled here do not count.
+    problem
+        Why the last one was not, in the server's words; empty where it was.
+    """
+
+    def __init__(self, joints: Joints) -> None:
+        self.counters: Counter[str] = Counter(goals_refused=0)
+        self.problem = ""
+        self._joints = joints
+        self._there: Mapping[str, float] = {}  # where the joints are
+        self._next: list[float] | None = None  # the angles to move to
+        self._goals = 0
+        self._running = ""  # id of the newest goal, until it has ended
+        self._sent_s = self._moves_until_s = -math.inf
+        self._is_canceled = False
+        self._is_hold = False  # whether the newest goal holds them
+        self._holds_left = 0  # how often they may still be told to hold; 0 where they need not
+
+    def move(self, pose_rad: list[float]) -> None:
+        """Move them to angles [rad], in place of what was begun before."""
+        self._next, self._holds_left = pose_rad, 0
+
+    def hold(self) -> None:
+        """Hold them where they are, if they may be moving."""
+        self._next, self._holds_left = None, HOLD_TRIES
+
+    def handle_states(self, there: Mapping[str, float]) -> None:
+        """Store where the joints are [rad], by their names."""
+        self._there = there
+
+    def handle_result(self, result: ActionResult) -> None:
+        """Handle the end of a goal; that of an earlier one says nothing."""
+        if result.goal_id == self._running:
+            self._end(result.problem)
+
+    def due(self, now_s: float) -> Iterator[Frame]:
+        """Yield the frames to send now."""
+        action = self._joints.server.topic
+        if self._holds_left and now_s > self._moves_until_s:
+            self._holds_left = 0
+        if self._running and now_s - self._sent_s > self._joints.takes_s + OVERDUE_S:
+            yield cancel_goal(action, self._running)
+            self._end(f"no end of a goal of {action.name} was reported")
+        if self._holds_left and self._running and not (self._is_hold or self._is_canceled):
+            self._is_canceled = True
+            yield cancel_goal(action, self._running)
+        if self._running and now_s - self._sent_s < GOAL_EVERY_S:
+            return
+        if self._next is not None:
+            following, self._next = self._next, None
+            self._moves_until_s = now_s + self._joints.takes_s + LATE_S
+            yield self._send(following, now_s, is_hold=False)
+        elif self._holds_left and self._joints.server.states is not None:
+            yield from self._hold(now_s)
+
+    def end(self, now_s: float) -> Iterator[Frame]:
+        """Yield the last frames, which hold them."""
+        if now_s <= self._moves_until_s:
+            if self._running:
+                yield cancel_goal(self._joints.server.topic, self._running)
+            if self._joints.server.states is not None:
+                yield from self._hold(now_s)
+
+    def disconnect(self) -> None:
+        """Forget what was begun."""
+        self._next, self._running, self._holds_left = None, "", 0
+        self._there, self._moves_until_s = {}, -math.inf
+
+    def _hold(self, now_s: float) -> Iterator[Frame]:
+        self._holds_left -= 1
+        if all(name in self._there for name in self._joints.names):
+            yield self._send(
+                [self._there[name] for name in self._joints.names], now_s, is_hold=True
+            )
+        else:
+            self.problem = f"{self._joints.server.states} does not tell where its joints are"
+
+    def _send(self, pose_rad: list[float], now_s: float, *, is_hold: bool) -> Frame:
+        self._goals += 1
+        self._running, self._sent_s = f"garry_{self._goals}", now_s
+        self._is_canceled, self._is_hold = False, is_hold
+        goal = {"trajectory": self._joints.write_trajectory(pose_rad)}
+        return send_goal(self._joints.server.topic, goal, self._running)
+
+    def _end(self, problem: str) -> None:
+        """Store that the newest goal has ended, and why it was not reached."""
+        self._running = ""
+        if self._is_canceled:
+            return
+        if self._is_hold and not problem:
+            self._holds_left = 0
+        self.problem = problem
+        self.counters["goals_refused"] += bool(problem)
+
+
+def make_mover(joints: Joints) -> JointMover:
+    """Return what moves these joints."""
+    return TrajectoryAction(joints) if joints.server.is_action else TrajectoryTopic(joints)
