@@ -30,7 +30,7 @@ class FakeQuori:
         self.rolled = (0.0, 0.0, 0.0)
         self.at_rad = dict.fromkeys(NAMES, 0.0)
         self.motions, self.fastest_rad_s = {}, 0.0
-        self.orders = []
+        self.orders, self.is_turret_mute = [], False
         self._twist, self._ordered_s, self._looped_s = (0.0, 0.0, 0.0), -9.0, -9.0
         self._seen = None
         graph.subscribe(ORDER, TWIST, self.follow)
@@ -45,6 +45,18 @@ class FakeQuori:
     @property
     def are_joints_moving(self):
         return bool(self.motions)
+
+    def angles(self):
+        return dict(self.at_rad)
+
+    def push_aside(self, by_m):
+        """Drag it to its left; its wheels roll and turn as they would."""
+        heading = self.body.heading_rad
+        self.body.x_m -= by_m * math.sin(heading)
+        self.body.y_m += by_m * math.cos(heading)
+        x_m, y_m, axle_rad = self.rolled
+        told = heading - self.axle_rad + axle_rad
+        self.rolled = x_m - by_m * math.sin(told), y_m + by_m * math.cos(told), axle_rad
 
     def follow(self, message):
         linear, angular = message["linear"], message["angular"]
@@ -77,6 +89,8 @@ class FakeQuori:
             turned = (v * math.sin(angle) + vy * math.cos(angle)) / AHEAD_M
             assert abs(w - turned) <= TURRET_MAX_RAD_S, "the turret cannot follow"
             self.axle_rad += turned * span_s * (1 - self.body.slips)
+            along *= 1 + self.body.chance.gauss(0, 0.02)  # as its wheels tell
+            turned *= 1 + self.body.chance.gauss(0, 0.02)
             x_m, y_m, axle_rad = self.rolled
             midway = axle_rad + turned * span_s / 2
             x_m, y_m = (
@@ -103,11 +117,11 @@ class FakeQuori:
         x_m, y_m, axle_rad = self.rolled
         before, self._seen = self._seen or self.rolled, self.rolled
         velocity = [(now - then) / LOOP_S for now, then in zip(self._seen, before, strict=True)]
-        x_m, y_m = (one + body.chance.gauss(0, 2e-4) for one in (x_m, y_m))
         self.graph.publish(
             ODOM, write_odometry(x_m, y_m, axle_rad, velocity[:2], velocity[2], now_s)
         )
-        turret_rad = body.heading_rad - self.axle_rad + body.chance.gauss(0, 5e-4)
+        turret_rad = round(body.heading_rad - self.axle_rad, 3)  # of its encoder (assumed)
         names = ["turret", "l_wheel", "r_wheel", *NAMES]
         positions = [turret_rad, 0.0, 0.0, *self.at_rad.values()]
-        self.graph.publish("/joint_states", {"name": names, "position": positions})
+        if not self.is_turret_mute:
+            self.graph.publish("/joint_states", {"name": names, "position": positions})

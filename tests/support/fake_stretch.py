@@ -94,7 +94,7 @@ class FakeStretch:
         self.joints = {name: Servo() for name in TOLERANCE_RAD}
         self.goals, self.goal, self.rejects = [], None, False
         self.is_run_stopped = self.is_charging = self.waits_for_goal = False
-        self.orders = []
+        self.orders, self.fastest_rad_s = [], 0.0
         self._twist, self._ordered_s, self._looped_s, self._goal_s = (0.0, 0.0), -9.0, -9.0, -9.0
         graph.subscribe("/stretch/cmd_vel", TWIST, self.follow)
         for topic, kind in (
@@ -114,6 +114,9 @@ class FakeStretch:
     @property
     def are_joints_moving(self):
         return any(abs(servo.v_rad_s) > 0.01 for servo in self.joints.values())
+
+    def angles(self):
+        return {name: servo.at_rad for name, servo in self.joints.items()}
 
     def follow(self, message):
         twist = message["linear"]["x"], message["angular"]["z"]
@@ -136,20 +139,26 @@ class FakeStretch:
             self.goal.begin()
         return self.goal
 
+    def switch(self, mode):
+        """Bring its driver into a mode; in that of positions the wheels stand."""
+        self.mode = mode
+        self.body.order(0.0, 0.0)
+
     def press_run_stop(self, is_pressed):
         self.is_run_stopped = is_pressed
         for servo in self.joints.values():
             servo.is_limp = is_pressed
-        if is_pressed:  # the motors' boards stop by themselves
-            self.body.order(0.0, 0.0)
+        self.body.is_braked = is_pressed  # by the boards of its motors
 
     def tell(self):
         """Let time pass, and run the driver's loop, 30 times a second."""
         for span_s in self.body.move():
-            v, _, w = (one * span_s for one in self.body.velocity)
+            noise = 1 + self.body.chance.gauss(0, 0.02)
+            v, _, w = (one * span_s * noise for one in self.body.velocity)
             self._roll(v, w)
             for servo in self.joints.values():
                 servo.step(span_s)
+                self.fastest_rad_s = max(self.fastest_rad_s, abs(servo.v_rad_s))
         for goal in self.goals:
             goal.step()
         self.goals = [goal for goal in self.goals if goal.is_active]
@@ -166,15 +175,12 @@ class FakeStretch:
         self.rolled = (x_m, y_m, heading_rad + w_rad)
 
     def _loop(self):
-        now_s, publish, chance = self.clock(), self.graph.publish, self.body.chance
+        now_s, publish = self.clock(), self.graph.publish
         is_fresh = now_s - self._ordered_s < TIMEOUT_S
         if self.mode == "navigation":
             self.body.order(*(self._twist if is_fresh else (0.0, 0.0)))
-        x_m, y_m, heading_rad = self.rolled
-        noisy = (x_m + chance.gauss(0, 2e-4), y_m + chance.gauss(0, 2e-4))
         v, _, w = self.body.velocity
-        heading_rad += chance.gauss(0, 5e-4)
-        publish("/odom", write_odometry(*noisy, heading_rad, (v, 0.0), w, now_s, ros=2))
+        publish("/odom", write_odometry(*self.rolled, (v, 0.0), w, now_s, ros=2))
         publish("/battery", {"voltage": 12.4, "present": self.is_charging})
         publish("/is_runstopped", {"data": self.is_run_stopped})
         publish("/mode", {"data": self.mode})

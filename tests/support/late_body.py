@@ -18,6 +18,7 @@ class LateBody:
         self.x_m, self.y_m, self.heading_rad = 3.0, -2.0, 3.0
         self.velocity = self._target = (0.0, 0.0, 0.0)
         self._orders = deque()
+        self.is_braked = False  # by itself, whatever is ordered
         self._now_s = clock()
         self.chance = random.Random(1)
 
@@ -35,7 +36,8 @@ class LateBody:
             while self._orders and self._orders[0][0] <= self._now_s:
                 self._target = self._orders.popleft()[1]
             share = 1 - math.exp(-STEP_S / self.lag_s)
-            pairs = zip(self.velocity, self._target, strict=True)
+            target = (0.0, 0.0, 0.0) if self.is_braked else self._target
+            pairs = zip(self.velocity, target, strict=True)
             self.velocity = tuple(now + share * (to - now) for now, to in pairs)
             ahead, aside, turn = (STEP_S * (1 - self.slips) * one for one in self.velocity)
             along = self.heading_rad + turn / 2

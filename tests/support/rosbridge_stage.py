@@ -4,7 +4,7 @@ import json
 import math
 from argparse import ArgumentParser
 from collections import deque
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from unittest.mock import patch
 
@@ -54,11 +54,28 @@ class Stage:
 
     def open(self):
         """Open the base as a program does, which may order motion from then on."""
+        with self._patched():
+            RosbridgeBase.open(self.base)
+
+    def close(self):
+        """Close it as a program does."""
+        with self._patched():
+            RosbridgeBase.close(self.base)
+
+    @contextmanager
+    def _patched(self):
+        bridge = self.base._bridge
         with (
-            patch.object(self.base._bridge, "open", lambda url: self.connect()),
+            patch.object(bridge, "open", lambda url: self.connect()),
+            patch.object(bridge, "close", self.end),
             patch("robot.bases.rosbridge.base.time", SimpleNamespace(sleep=self.sleep)),
         ):
-            RosbridgeBase.open(self.base)
+            yield
+
+    def end(self):
+        for frame in self.base_client.end(self.now_s):
+            self.client.take(to_text(frame))
+        self.lose()
 
     def sleep(self, span_s):
         self.now_s += span_s

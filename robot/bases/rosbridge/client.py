@@ -122,6 +122,16 @@ class BaseClient:
         if self._is_open:
             self._voice_and_joints.answer(answer)
 
+    def hold_joints(self) -> None:
+        """Hold head and arms."""
+        if self._is_open:
+            self._voice_and_joints.hold()
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether head and arms were told to hold, and that is not done yet."""
+        return self._voice_and_joints.is_holding
+
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
         twist = self.orders.due(now_s)
@@ -195,7 +205,8 @@ class BaseClient:
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames: stand still, unsubscribe, unadvertise."""
-        last_pose = list(self._voice_and_joints.end(now_s))
+        self._voice_and_joints.hold()
+        last_pose = list(self._voice_and_joints.due(now_s))
         self.disconnect(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):

@@ -23,10 +23,9 @@ LONGEST_S = 3.0  # ours: what a lost connection has begun ends by itself
 HOLD: dict[str, Any] = {"joint_names": [], "points": []}
 
 # A Stretch rejects a goal that follows a running one within 0.2 s
-# (docs/reference/rosbridge.md#names-of-a-stretch). A goal to hold is sent so long after the one
-# before [s], or as soon as that one has ended, and so often at most.
+# (docs/reference/rosbridge.md#names-of-a-stretch). The next one is sent so long after it [s], or as
+# soon as it has ended; a goal to hold that was refused is sent again so often.
 GOAL_EVERY_S = 0.25
-HOLD_TRIES = 4
 # A goal that has not ended so long after its motion should have [s] never will: bridges of before
 # 2026 do not tell that one was rejected (docs/reference/rosbridge.md#actions).
 OVERDUE_S = 1.0
@@ -122,11 +121,12 @@ class JointMover(Protocol):
     def hold(self) -> None:
         """Hold them where they are, if they may be moving."""
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether they were told to hold, and that is not done yet."""
+
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
-
-    def end(self, now_s: float) -> Iterator[Frame]:
-        """Yield the last frames, which hold them."""
 
     def disconnect(self) -> None:
         """Forget what was begun: nothing reaches them, and their motion ends by itself."""
@@ -150,6 +150,11 @@ class TrajectoryTopic:
         """Hold them where they are, if they may be moving."""
         self._next = HOLD
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether they were told to hold, and that is not done yet."""
+        return self._next is HOLD
+
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the trajectory to send now."""
         following, self._next = self._next, None
@@ -158,11 +163,6 @@ class TrajectoryTopic:
         is_moving = following is not HOLD
         self._moves_until_s = now_s + self._joints.takes_s + LATE_S if is_moving else -math.inf
         yield publish(self._joints.server.topic, following)
-
-    def end(self, now_s: float) -> Iterator[Frame]:
-        """Yield the last frames, which hold them."""
-        self.hold()
-        yield from self.due(now_s)
 
     def disconnect(self) -> None:
         """Forget what was begun."""
@@ -195,15 +195,15 @@ class TrajectoryAction:
         self._sent_s = self._moves_until_s = -math.inf
         self._is_canceled = False
         self._is_hold = False  # whether the newest goal holds them
-        self._holds_left = 0  # how often they may still be told to hold; 0 where they need not
+        self.is_holding = False  # they were told to hold, and that is not done yet
 
     def move(self, pose_rad: list[float]) -> None:
         """Move them to angles [rad], in place of what was begun before."""
-        self._next, self._holds_left = pose_rad, 0
+        self._next, self.is_holding = pose_rad, False
 
     def hold(self) -> None:
         """Hold them where they are, if they may be moving."""
-        self._next, self._holds_left = None, HOLD_TRIES
+        self._next, self.is_holding = None, True
 
     def handle_states(self, there: Mapping[str, float]) -> None:
         """Store where the joints are [rad], by their names."""
@@ -217,44 +217,38 @@ class TrajectoryAction:
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
         action = self._joints.server.topic
-        if self._holds_left and now_s > self._moves_until_s:
-            self._holds_left = 0
+        if now_s > self._moves_until_s:
+            self.is_holding = False
         if self._running and now_s - self._sent_s > self._joints.takes_s + OVERDUE_S:
             yield cancel_goal(action, self._running)
             self._end(f"no end of a goal of {action.name} was reported")
-        if self._holds_left and self._running and not (self._is_hold or self._is_canceled):
+        if self.is_holding and self._running and not (self._is_hold or self._is_canceled):
             self._is_canceled = True
             yield cancel_goal(action, self._running)
-        if self._running and now_s - self._sent_s < GOAL_EVERY_S:
+        if (self._running or self._is_hold) and now_s - self._sent_s < GOAL_EVERY_S:
             return
         if self._next is not None:
             following, self._next = self._next, None
             self._moves_until_s = now_s + self._joints.takes_s + LATE_S
             yield self._send(following, now_s, is_hold=False)
-        elif self._holds_left and self._joints.server.states is not None:
+        elif self.is_holding and self._joints.server.states is not None:
             yield from self._hold(now_s)
-
-    def end(self, now_s: float) -> Iterator[Frame]:
-        """Yield the last frames, which hold them."""
-        if now_s <= self._moves_until_s:
-            if self._running:
-                yield cancel_goal(self._joints.server.topic, self._running)
-            if self._joints.server.states is not None:
-                yield from self._hold(now_s)
+        elif self.is_holding and not self._running:  # what was canceled holds by itself
+            self.is_holding = False
 
     def disconnect(self) -> None:
         """Forget what was begun."""
-        self._next, self._running, self._holds_left = None, "", 0
+        self._next, self._running, self.is_holding = None, "", False
         self._there, self._moves_until_s = {}, -math.inf
 
     def _hold(self, now_s: float) -> Iterator[Frame]:
-        self._holds_left -= 1
         if all(name in self._there for name in self._joints.names):
             yield self._send(
                 [self._there[name] for name in self._joints.names], now_s, is_hold=True
             )
         else:
-            self.problem = f"{self._joints.server.states} does not tell where its joints are"
+            self.problem = "nobody tells where its joints are, so they were not held"
+            self.is_holding = False
 
     def _send(self, pose_rad: list[float], now_s: float, *, is_hold: bool) -> Frame:
         self._goals += 1
@@ -269,7 +263,7 @@ class TrajectoryAction:
         if self._is_canceled:
             return
         if self._is_hold and not problem:
-            self._holds_left = 0
+            self.is_holding = False
         self.problem = problem
         self.counters["goals_refused"] += bool(problem)
 

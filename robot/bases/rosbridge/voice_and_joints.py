@@ -92,10 +92,14 @@ class VoiceAndJoints:
             self._mover.handle_result(incoming)
         return True
 
-    def end(self, now_s: float) -> Iterator[Frame]:
-        """Yield the last frames, which hold it as it is."""
-        if self._mover is not None:
-            yield from self._mover.end(now_s)
+    def hold(self) -> None:
+        """Hold it as it is."""
+        self.show("stopped")
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether it was told to hold, and that is not done yet."""
+        return self._mover is not None and self._mover.is_holding
 
     def disconnect(self) -> None:
         """Forget the answer: nothing reaches it, and its motion ends by itself."""

@@ -12,14 +12,17 @@ from hypothesis import given
 from robot.motion.pose import Pose
 from robot.motion.twist import Twist
 from robot.ros.frames import (
+    ActionResult,
     BadRosFrame,
     Publication,
     ServiceResponse,
     Topic,
     advertise,
     call_service,
+    cancel_goal,
     publish,
     read_frame,
+    send_goal,
     subscribe,
     to_text,
     unadvertise,
@@ -184,3 +187,42 @@ def test_no_message_does_more_than_be_refused(message):
             read(message if isinstance(message, dict) else {"twist": message, "pose": message})
     with suppress(BadRosFrame):
         read_frame(json.dumps(message))
+
+
+ACTION = Topic("/head/follow_joint_trajectory", "control_msgs/action/FollowJointTrajectory")
+
+
+def test_a_goal_is_sent_and_canceled():
+    assert json.loads(to_text(send_goal(ACTION, {"trajectory": {}}, "garry_1"))) == {
+        "op": "send_action_goal",
+        "action": ACTION.name,
+        "action_type": ACTION.kind,
+        "args": {"trajectory": {}},
+        "feedback": False,
+        "id": "garry_1",
+    }
+    assert cancel_goal(ACTION, "garry_1") == {
+        "op": "cancel_action_goal",
+        "action": ACTION.name,
+        "id": "garry_1",
+    }
+
+
+@pytest.mark.parametrize(
+    ("told", "problem"),
+    [
+        ({"values": {"error_string": "there"}, "status": 4, "result": True}, ""),
+        ({"values": {"status": 4, "result": {}}, "result": True}, ""),  # of early 2024
+        ({"values": {"error_string": "no"}, "status": 6, "result": True}, "no"),
+        ({"values": {}, "status": 5, "result": True}, "it ended with the status 5"),
+        ({"values": {}, "result": True}, "it ended with the status None"),
+        ({"values": "Action goal was rejected", "status": 0, "result": False}, "rejected"),
+        ({"values": None}, "refused"),
+    ],
+)
+def test_the_end_of_a_goal_says_why_it_was_not_reached(told, problem):
+    frame = {"op": "action_result", "action": ACTION.name, "id": "garry_1"}
+    result = read_frame(json.dumps(frame | told))
+    assert isinstance(result, ActionResult)
+    assert (result.goal_id, problem in result.problem) == ("garry_1", True)
+    assert bool(result.problem) == bool(problem)
