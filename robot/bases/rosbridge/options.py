@@ -181,8 +181,9 @@ def _read_joints(options: Namespace, profile: Topics) -> Joints | None:
     is_posed = any(getattr(options, f"pose_{one}") for one in POSES)
     if server is None or not (options.joints_topic or options.joints or is_posed):
         return profile.joints
-    whole = ",".join(server.names) if server.takes_all else ""
-    names = tuple((options.joints or whole).split(","))
+    usual = profile.joints.names if profile.joints is not None else ()
+    named = options.joints or ",".join(server.names if server.takes_all else usual)
+    names = tuple(named.split(","))
     if not all(NAME.fullmatch(name) for name in names):
         raise BadOption("--joints: name the joints, like --joints head_pan,head_tilt.")
     unknown = set(names) - set(server.names) if server.names else ()
