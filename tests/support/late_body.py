@@ -16,8 +16,9 @@ class LateBody:
     def __init__(self, clock, dead_time_s, lag_s, slips=0.005):
         self.clock, self.dead_time_s, self.lag_s, self.slips = clock, dead_time_s, lag_s, slips
         self.x_m, self.y_m, self.heading_rad = 3.0, -2.0, 3.0
-        self.velocity = self._target = (0.0, 0.0, 0.0)
-        self._orders = deque()
+        self.velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+        self._target: tuple[float, ...] = self.velocity
+        self._orders = deque[tuple[float, tuple[float, ...]]]()
         self.is_braked = False  # by itself, whatever is ordered
         self._now_s = clock()
         self.chance = random.Random(1)

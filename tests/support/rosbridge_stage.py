@@ -48,7 +48,7 @@ class Stage:
         self.base_client = self.base._client
         self.is_frozen = False  # nothing passes any more, and nobody is told; later it does
         self.inbox, self.outbox, self.client = [], [], None
-        self.late_in, self.late_out = deque(), deque()
+        self.late_in, self.late_out = (deque[tuple[float, str]]() for _ in range(2))
         self.performer = None
         self.open()
 

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
+from uuid import uuid4
 
 from robot.bases.base import Answer
 from robot.ros.frames import ActionResult, Frame, Topic, cancel_goal, publish, send_goal
@@ -172,8 +173,8 @@ class TrajectoryTopic:
 class TrajectoryAction:
     """Moves joints by the goals of an action server, one at a time.
 
-    To hold them cancels the goal. Where the server's motion goes on all the same, a goal to where
-    they are follows, until one is reached.
+    To hold them cancels the goal, again until it has ended. Where the server's motion goes on all
+    the same, a goal to where they are follows, until one is reached.
 
     Attributes
     ----------
@@ -190,10 +191,10 @@ class TrajectoryAction:
         self._joints = joints
         self._there: Mapping[str, float] = {}  # where the joints are
         self._next: list[float] | None = None  # the angles to move to
-        self._goals = 0
+        self._name, self._goals = uuid4().hex, 0  # a bridge has one list of ids for all its clients
         self._running = ""  # id of the newest goal, until it has ended
         self._sent_s = self._moves_until_s = -math.inf
-        self._is_canceled = False
+        self._canceled_s: float | None = None  # when the newest goal was canceled last
         self._is_hold = False  # whether the newest goal holds them
         self.is_holding = False  # they were told to hold, and that is not done yet
 
@@ -222,8 +223,9 @@ class TrajectoryAction:
         if self._running and now_s - self._sent_s > self._joints.takes_s + OVERDUE_S:
             yield cancel_goal(action, self._running)
             self._end(f"no end of a goal of {action.name} was reported")
-        if self.is_holding and self._running and not (self._is_hold or self._is_canceled):
-            self._is_canceled = True
+        is_canceled = self._canceled_s is not None and now_s - self._canceled_s < GOAL_EVERY_S
+        if self.is_holding and self._running and not (self._is_hold or is_canceled):
+            self._canceled_s = now_s
             yield cancel_goal(action, self._running)
         if (self._running or self._is_hold) and now_s - self._sent_s < GOAL_EVERY_S:
             return
@@ -252,15 +254,15 @@ class TrajectoryAction:
 
     def _send(self, pose_rad: list[float], now_s: float, *, is_hold: bool) -> Frame:
         self._goals += 1
-        self._running, self._sent_s = f"garry_{self._goals}", now_s
-        self._is_canceled, self._is_hold = False, is_hold
+        self._running, self._sent_s = f"{self._name}_{self._goals}", now_s
+        self._canceled_s, self._is_hold = None, is_hold
         goal = {"trajectory": self._joints.write_trajectory(pose_rad)}
         return send_goal(self._joints.server.topic, goal, self._running)
 
     def _end(self, problem: str) -> None:
         """Store that the newest goal has ended, and why it was not reached."""
         self._running = ""
-        if self._is_canceled:
+        if self._canceled_s is not None:
             return
         if self._is_hold and not problem:
             self.is_holding = False

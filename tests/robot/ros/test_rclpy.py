@@ -1,5 +1,7 @@
 """What a Stretch and a Quori are sent and tell, as messages of real ROS 2."""
 
+from typing import Any
+
 import pytest
 
 from robot.bases.rosbridge.topics import PROFILES
@@ -20,7 +22,7 @@ def pass_through():
         there, back = ros.node("there"), ros.node("back")
 
         def pass_through(kind, message):
-            topic, heard = f"/{kind.rpartition('/')[2].lower()}", []
+            topic, heard = f"/{kind.rpartition('/')[2].lower()}", list[dict[str, Any]]()
             back.subscribe(topic, kind, heard.append)
             there.advertise(topic, kind)
 

@@ -6,17 +6,17 @@ import pytest
 
 from robot.bases.rosbridge.joints import FASTEST_RAD_S, LONGEST_S, Joints
 from robot.bases.rosbridge.topics import PROFILES
-from robot.motion.gestures import BUILT_IN
+from robot.motion.gestures import BUILT_IN, GESTURES, ORIGINALS
 from robot.motion.limits import TICK_S
 from robot.play_gesture import play_gesture
 from robot.wire.cue_limits import VARIED
 from tests.support.fake_quori import ORDER
 from tests.support.robot_stage import CUE
 from tests.support.ros_robots import NAMES, TOPICS, RobotStage
-from tests.support.variants import cases
 
 each_robot = pytest.mark.parametrize("name", NAMES)
 STRETCH = PROFILES["stretch"].joint_server
+QUICK = {*GESTURES, *ORIGINALS, "near_miss_3", "effort_1", "greeting_9"}  # the others: `long`
 # Looks aside: a goal that its driver does not take for reached at once.
 ASIDE = Joints(STRETCH, ("joint_head_pan",), (0.0,), (0.8,), (-0.8,))
 
@@ -40,9 +40,10 @@ def test_each_gesture_of_a_session_ends_at_home(name, minutes):
     assert not stage.base_client.problem(stage.now_s)
 
 
-@pytest.mark.matrix
 @each_robot
-@pytest.mark.parametrize("gesture", cases(BUILT_IN))
+@pytest.mark.parametrize(
+    "gesture", [pytest.param(g, marks=[pytest.mark.long] * (g not in QUICK)) for g in BUILT_IN]
+)
 def test_every_gesture_ends_at_home(name, gesture):
     stage = RobotStage(name)
     played = play_gesture(BUILT_IN[gesture], stage.base, lambda: stage.now_s, stage.sleep)
