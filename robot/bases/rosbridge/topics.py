@@ -36,8 +36,16 @@ RELAY_ALIVE = Topic("/garry/watchdog", STRING)
 
 @dataclass(frozen=True, slots=True)
 class TurretTopic:
-    """Where the angle of a base's turret is told: a JointState, the joint's name in it, and how far
-    the turret is ahead of the axle [m].
+    """Where the angle of a base's turret is told.
+
+    Parameters
+    ----------
+    topic
+        Publishes sensor_msgs/JointState.
+    joint
+        The turret's name there.
+    ahead_m
+        How far the turret is ahead of the wheels' axle [m].
     """
 
     topic: Topic

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robot.bases.base import Answer
-from robot.bases.rosbridge.joints import JointMover, Joints, TrajectoryAction, make_mover
+from robot.bases.rosbridge.joint_mover import JointMover, TrajectoryAction, make_mover
+from robot.bases.rosbridge.joints import Joints
 from robot.ros.frames import ActionResult, Frame, Publication, Topic, publish
 from robot.ros.messages import read_joints
 

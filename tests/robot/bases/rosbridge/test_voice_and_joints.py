@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from robot.bases import Answer, BadOption
-from robot.bases.rosbridge.joints import FASTEST_RAD_S, HOLD, LONGEST_S, Joints, JointServer
+from robot.bases.rosbridge.joint_mover import HOLD
+from robot.bases.rosbridge.joints import FASTEST_RAD_S, LONGEST_S, Joints, JointServer
 from robot.bases.rosbridge.voice_and_joints import Voice
 from robot.ros.frames import Topic
 from tests.support.robot_stage import CUE

@@ -4,13 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from robot.bases.rosbridge.joints import (
-    GOAL_EVERY_S,
-    OVERDUE_S,
-    Joints,
-    JointServer,
-    TrajectoryAction,
-)
+from robot.bases.rosbridge.joint_mover import GOAL_EVERY_S, OVERDUE_S, TrajectoryAction
+from robot.bases.rosbridge.joints import Joints, JointServer
 from robot.ros.frames import ActionResult, Topic
 
 ACTION = Topic("/arm/follow_joint_trajectory", "control_msgs/action/FollowJointTrajectory")
