@@ -25,7 +25,7 @@ from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.motion.limits import TICK_S
 from robot.motion.pose import Pose, wrap
 from robot.motion.twist import Twist
-from robot.wire.incident import TICK, read_lines
+from robot.wire.incident import TICK, read_aside, read_lines
 
 SETTLE_S = 0.3  # of a base that was just opened
 
@@ -45,7 +45,8 @@ def read_ticks(text: str) -> list[tuple[float, Twist, Pose]]:
         numbers: Any = record.get("tick")
         if isinstance(numbers, list) and len(numbers) == len(TICK):
             v_m_s, w_rad_s, *pose, _, _ = map(float, numbers)
-            ticks.append((float(record["at_s"]), Twist(v_m_s, w_rad_s), Pose(*pose)))
+            twist = Twist(v_m_s, w_rad_s, read_aside(record)[0])
+            ticks.append((float(record["at_s"]), twist, Pose(*pose)))
     return ticks
 
 
@@ -101,6 +102,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     monotonic, sleep = clock_of(options.base)
     try:
         with make_base(options, monotonic) as base:
+            if any(order.vy_m_s for _, order, _ in ticks) and not base.abilities.holonomic:
+                raise BadOption(
+                    "The recording is of a base that moves sideways: take --base kinematic "
+                    "--holonomic."
+                )
             printed_s = -math.inf
             for compared in replay(ticks, base, monotonic, sleep):
                 if compared.at_s - printed_s >= 1.0:

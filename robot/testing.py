@@ -74,7 +74,8 @@ class Stage:
 
 def is_still(there: Any) -> bool:
     """Whether a base stands, as far as its sensors tell."""
-    return bool(abs(there.twist.v_m_s) < 0.003 and abs(there.twist.w_rad_s) < 0.02)
+    twist = there.twist
+    return bool(twist.speed_m_s < 0.003 and abs(twist.w_rad_s) < 0.02)
 
 
 class BaseContract:
@@ -120,6 +121,23 @@ class BaseContract:
         stage.drive(Twist(0, 1.0), TAKES_S)
         heading_rad = stage.base.read().pose.heading_rad
         assert heading_rad > 0.05 or not stage.base.abilities.moves
+
+    def test_to_the_left_it_moves_or_refuses_to(self, stage: Stage) -> None:
+        base, aside = stage.base, Twist(0.0, 0.0, 0.1)
+        if not base.abilities.holonomic:
+            with pytest.raises(ValueError, match="sideways"):
+                base.drive(aside)
+            stage.drive(STILL, 0.2)
+            assert base.read().pose.distance_m(HOME) < 1e-3
+            return
+        assert stage.drive(aside, TAKES_S).vy_m_s > 0.05
+        there = base.read()
+        assert there.pose.y_m > 0.02
+        assert abs(there.pose.x_m) < there.pose.y_m / 4
+        assert abs(there.pose.heading_rad) < 0.05
+        assert there.twist.vy_m_s > 0.05
+        stage.drive(STILL, TAKES_S)
+        assert is_still(base.read())
 
     @pytest.mark.parametrize("bad", [Twist(math.nan, 0), Twist(0.1, math.inf)], ids=["nan", "inf"])
     def test_an_order_that_is_not_finite_stops_it(self, stage: Stage, bad: Twist) -> None:

@@ -37,6 +37,7 @@ class Wagon(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; one that is not finite is an order to stand still."""
+        self.abilities.check(twist)
         self._move()
         self._twist = WHEEL_LIMITS.clip(twist)
         self._until_s = self._moved_s + ORDER_HOLDS_S

@@ -45,6 +45,8 @@ class Abilities:
         Whether it reports where it is. Without that its pose is dead reckoning by its orders.
     bumpers
         Whether it has bumpers.
+    holonomic
+        Whether it also moves sideways, whichever way it faces.
     """
 
     simulated: bool
@@ -55,6 +57,15 @@ class Abilities:
     real_time: bool = False
     closed_loop: bool = True
     bumpers: bool = False
+    holonomic: bool = False
+
+    def check(self, twist: Twist) -> None:
+        """Raise ValueError for a velocity to the left, unless the base is holonomic.
+
+        Whoever orders that expects it to come about; to drop it would move the base elsewhere.
+        """
+        if twist.vy_m_s and not self.holonomic:
+            raise ValueError("This base does not move sideways: order 0 m/s to the left.")
 
 
 class Indication(StrEnum):
@@ -149,7 +160,7 @@ class GroundTruth:
 
 
 class MobileBase(ABC):
-    """A base that drives and turns.
+    """A base that drives and turns; a holonomic one moves sideways, too.
 
     As a context manager it is opened, and left standing still however the block ends.
     """
@@ -229,6 +240,8 @@ class MobileBase(ABC):
         ------
         BaseLost
             Where the base does not answer any more.
+        ValueError
+            For a velocity that it cannot have (``Abilities.check``).
         """
 
     @abstractmethod

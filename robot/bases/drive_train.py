@@ -23,12 +23,20 @@ MASS_KG = 6.0
 
 SHORTEST_S = 0.001  # from less than that no acceleration is computed
 
-Wheels = tuple[float, float]  # speeds, left and right [m/s]
-STANDING: Wheels = (0.0, 0.0)
+# Speeds [m/s]: of the left and right wheel; of a holonomic base, of its left and right side, and to
+# the left (``Twist.sides_m_s``).
+Wheels = tuple[float, ...]
 
 
 class DriveTrain:
-    """Two wheels that answer late, gradually, and not at all to the smallest orders.
+    """Wheels that answer late, gradually, and not at all to the smallest orders.
+
+    Parameters
+    ----------
+    dead_time_s, lag_s, stiction_m_s
+        See the attributes.
+    count
+        How many: two, or three of a holonomic base.
 
     Attributes
     ----------
@@ -47,20 +55,26 @@ class DriveTrain:
     """
 
     def __init__(
-        self, dead_time_s: float = 0.0, lag_s: float = 0.0, stiction_m_s: float = 0.0
+        self,
+        dead_time_s: float = 0.0,
+        lag_s: float = 0.0,
+        stiction_m_s: float = 0.0,
+        count: int = 2,
     ) -> None:
         self.dead_time_s, self.lag_s, self.stiction_m_s = dead_time_s, lag_s, stiction_m_s
         self.held = 0.0
-        self.wheels_m_s = STANDING
+        self.wheels_m_s: Wheels = (0.0,) * count
         self.force_n = 0.0
         self._orders: deque[tuple[float, Wheels]] = deque()  # when each arrives at the motors
-        self._target = self._free = STANDING  # as ordered, and as it would be if nothing held it
+        self._target = self._free = (
+            self.wheels_m_s
+        )  # as ordered, and as it would be if nothing held it
         self._resisted_s = 0.0
 
     @property
     def is_at_rest(self) -> bool:
         """Whether it stands and nothing is on its way to it."""
-        return not self._orders and self._target == self._free == STANDING
+        return not (self._orders or any(self._target) or any(self._free))
 
     def order(self, wheels: Wheels, now_s: float) -> None:
         """Order speeds of the wheels, which the motors hear after the dead time.
@@ -68,7 +82,7 @@ class DriveTrain:
         Parameters
         ----------
         wheels
-            Speeds, left and right [m/s].
+            Their speeds [m/s].
         now_s
             The time [s].
         """
@@ -91,10 +105,10 @@ class DriveTrain:
         while self._orders and self._orders[0][0] <= now_s + 1e-9:
             self._target = self._orders.popleft()[1]
         share = 1.0 if self.lag_s <= 0 else 1 - math.exp(-elapsed_s / self.lag_s)
-        (left, right), (to_left, to_right) = self._free, self._target
-        self._free = self._move(left, to_left, share), self._move(right, to_right, share)
+        speeds = zip(self._free, self._target, strict=True)
+        self._free = tuple(self._move(speed, target, share) for speed, target in speeds)
         was, loses = self.wheels_m_s, 1 - self.held
-        self.wheels_m_s = self._free[0] * loses, self._free[1] * loses
+        self.wheels_m_s = tuple(speed * loses for speed in self._free)
         self._push(was, elapsed_s)
         return self.wheels_m_s
 
@@ -111,8 +125,8 @@ class DriveTrain:
         missed = max(abs(t - s) for t, s in zip(self._target, self.wheels_m_s, strict=True))
         is_held = self.held > 0 and missed > self.stiction_m_s
         self._resisted_s = self._resisted_s + elapsed_s if is_held else 0.0
-        rolling_n = ROLLING_N if self.wheels_m_s != STANDING else 0.0
-        before, after = sum(was) / 2, sum(self.wheels_m_s) / 2
-        inertia_n = MASS_KG * abs(after - before) / elapsed_s
+        rolling_n = ROLLING_N if any(self.wheels_m_s) else 0.0
+        left, right, *aside = (b - a for a, b in zip(was, self.wheels_m_s, strict=True))
+        inertia_n = MASS_KG * math.hypot((left + right) / 2, *aside) / elapsed_s
         pushing_n = self.held * FORCE_MAX_N * min(self._resisted_s / BUILD_UP_S, 1.0)
         self.force_n = min(rolling_n + inertia_n + pushing_n, FORCE_MAX_N)

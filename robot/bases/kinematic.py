@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import random
+from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from robot.bases.base import Abilities, BaseState, GroundTruth, MobileBase, SensorState
@@ -76,7 +77,7 @@ class KinematicBase(MobileBase):
 
     def __init__(self, monotonic: Callable[[], float], faults: Imperfections = ORDINARY) -> None:
         self._monotonic, self._faults = monotonic, faults
-        self._drive_train = DriveTrain(faults.dead_time_s, faults.lag_s, faults.stiction_m_s)
+        self._drive_train = DriveTrain(faults.dead_time_s, faults.lag_s, faults.stiction_m_s, 3)
         self.held = faults.held
         self.response = Response(
             faults.dead_time_s,
@@ -86,10 +87,22 @@ class KinematicBase(MobileBase):
         self._odometry = Odometry()
         self._chance = random.Random(1)  # noqa: S311 (nothing here is a secret)
         self._truth, self._farthest_m = HOME, 0.0
-        self._rolled_m, self._turned_rad = [0.0, 0.0], 0.0  # as its sensors count
+        self._rolled_m, self._turned_rad = [0.0, 0.0, 0.0], 0.0  # as its sensors count
         self._turn_rad_s, self._twist, self._drives = 0.0, STILL, False
         self._time_s = self._ordered_s = monotonic()
         self._sample()
+
+    @classmethod
+    def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
+        """Add the option of a base that moves sideways."""
+        group.add_argument(
+            "--holonomic", action="store_true", help="it moves sideways, too, as a Quori does"
+        )
+
+    def configure(self, options: Namespace) -> None:
+        """Apply the options."""
+        super().configure(options)
+        self.abilities = replace(self.abilities, holonomic=getattr(options, "holonomic", False))
 
     @property
     def held(self) -> float:
@@ -108,6 +121,7 @@ class KinematicBase(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
+        self.abilities.check(twist)
         self._move()
         ordered, self._ordered_s = WHEEL_LIMITS.clip(twist), self._time_s
         self._order(ordered)
@@ -133,7 +147,7 @@ class KinematicBase(MobileBase):
         """Put it back to where it began, standing still."""
         self._move()
         train = self._drive_train
-        self._drive_train = DriveTrain(train.dead_time_s, train.lag_s, train.stiction_m_s)
+        self._drive_train = DriveTrain(train.dead_time_s, train.lag_s, train.stiction_m_s, 3)
         self._drive_train.held = train.held
         self._order(STILL)
         self._sample()
@@ -146,7 +160,7 @@ class KinematicBase(MobileBase):
         return GroundTruth(self._truth, self._farthest_m)
 
     def _order(self, twist: Twist) -> None:
-        self._drive_train.order(twist.wheels_m_s, self._time_s)
+        self._drive_train.order(twist.sides_m_s, self._time_s)
         self._drives = not twist.is_still
         self._roll(0.0)  # without a dead time it counts at once
 
@@ -172,24 +186,25 @@ class KinematicBase(MobileBase):
     def _roll(self, span_s: float) -> None:
         """Roll for a span, true and as its sensors see it."""
         faults = self._faults
-        left_m_s, right_m_s = self._drive_train.step(self._time_s, span_s)
-        self._twist = Twist.of_wheels(left_m_s, right_m_s)
+        left_m_s, right_m_s, aside_m_s = self._drive_train.step(self._time_s, span_s)
+        self._twist = replace(Twist.of_wheels(left_m_s, right_m_s), vy_m_s=aside_m_s)
         true = Twist.of_wheels(left_m_s * faults.left_scale, right_m_s * faults.right_scale)
+        true = replace(true, vy_m_s=aside_m_s * (faults.left_scale + faults.right_scale) / 2)
         self._truth = advance(self._truth, true, span_s)
         self._farthest_m = max(self._farthest_m, self._truth.distance_m(HOME))
-        self._rolled_m[0] += left_m_s * span_s
-        self._rolled_m[1] += right_m_s * span_s
+        for wheel, speed_m_s in enumerate((left_m_s, right_m_s, aside_m_s)):
+            self._rolled_m[wheel] += speed_m_s * span_s
         drift_rad_s = math.radians(faults.drift_deg_min / 60)
         self._turned_rad += (true.w_rad_s + drift_rad_s) * span_s
         self._turn_rad_s = true.w_rad_s + drift_rad_s
 
     def _sample(self) -> None:
         """Read wheels and gyro into the odometry."""
-        left_m, right_m = self._rolled_m
+        left_m, right_m, aside_m = self._rolled_m
         turned_rad, turn_rad_s = self._turned_rad, self._turn_rad_s
         if self._faults.has_noise:
-            left_m, right_m = (TICK_M * round(rolled / TICK_M) for rolled in (left_m, right_m))
+            left_m, right_m, aside_m = (TICK_M * round(m / TICK_M) for m in self._rolled_m)
             turned_rad = GYRO_DIGIT_RAD * round(turned_rad / GYRO_DIGIT_RAD)
             turn_rad_s += self._chance.gauss(0.0, math.radians(GYRO_NOISE_DEG_S))
-        self._odometry.add(left_m, right_m, turned_rad, turn_rad_s, self._time_s)
+        self._odometry.add(left_m, right_m, turned_rad, turn_rad_s, self._time_s, aside_m)
         self._sampled_s = self._time_s

@@ -169,6 +169,7 @@ class KobukiBase(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
+        self.abilities.check(twist)
         client = self._running_client()
         if self.face is not None:
             self.face.tick(HOME)  # the base itself moves, not what its screen shows

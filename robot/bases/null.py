@@ -21,6 +21,7 @@ class NullBase(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order nothing."""
+        self.abilities.check(twist)
         return STILL
 
     def stop(self) -> None:

@@ -48,7 +48,7 @@ class Odometry:
     def __init__(self, drift_rad_s: float = 0.0, wheel_scale: float = 1.0) -> None:
         self._wheel_scale = wheel_scale
         self.drift_rad_s = drift_rad_s
-        self._last: tuple[float, float, float] | None = None
+        self._last: tuple[float, float, float, float] | None = None
         self._last_s = 0.0
         self._still_s = 0.0  # for how long the wheels have stood
         self._rest_s = self._rest_rad = 0.0  # what the gyro turned at rest, and in what time
@@ -68,7 +68,13 @@ class Odometry:
         return max(abs(self.slip_rad) - explained_rad, 0.0)
 
     def add(
-        self, left_m: float, right_m: float, heading_rad: float, turn_rad_s: float, at_s: float
+        self,
+        left_m: float,
+        right_m: float,
+        heading_rad: float,
+        turn_rad_s: float,
+        at_s: float,
+        aside_m: float = 0.0,
     ) -> None:
         """Add what wheels and gyro have measured since the last call.
 
@@ -82,15 +88,17 @@ class Odometry:
             Turning rate by the gyro [rad/s].
         at_s
             When that was [s].
+        aside_m
+            What a holonomic base has moved to the left so far [m].
         """
-        last, self._last = self._last, (left_m, right_m, heading_rad)
+        last, self._last = self._last, (left_m, right_m, heading_rad, aside_m)
         elapsed_s, self._last_s = max(0.0, at_s - self._last_s), at_s
         if last is None:
             return
-        by_left_m, by_right_m, by_rad = (
+        by_left_m, by_right_m, by_rad, by_aside_m = (
             now - then for now, then in zip(self._last, last, strict=True)
         )
-        are_still = max(abs(by_left_m), abs(by_right_m)) < WHEEL_STILL_M
+        are_still = max(map(abs, (by_left_m, by_right_m, by_aside_m))) < WHEEL_STILL_M
         if are_still and abs(turn_rad_s) < DRIFT_RAD_S:
             self._learn_drift(by_rad, elapsed_s)
             by_rad = 0.0
@@ -100,7 +108,8 @@ class Odometry:
         by_wheels = Twist.of_wheels(by_left_m / self._wheel_scale, by_right_m / self._wheel_scale)
         self._rolled_m += by_wheels.v_m_s
         self.slip_rad += by_wheels.w_rad_s - by_rad
-        self.pose = advance(self.pose, replace(by_wheels, w_rad_s=by_rad), 1.0)
+        by_all = replace(by_wheels, w_rad_s=by_rad, vy_m_s=by_aside_m / self._wheel_scale)
+        self.pose = advance(self.pose, by_all, 1.0)
 
     def _learn_drift(self, by_rad: float, elapsed_s: float) -> None:
         """Add what the gyro turned while the wheels stood."""

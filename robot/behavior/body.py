@@ -47,7 +47,8 @@ class Body:
         # Since the last safety check, so that nothing is lost to another reader in between.
         self._hazards, self._stop_pressed = frozenset[str](), False
         # Without odometry its pose is what was ordered, which is never late.
-        self.player = Player(limits, base.response if base.abilities.closed_loop else AT_ONCE)
+        response = base.response if base.abilities.closed_loop else AT_ONCE
+        self.player = Player(limits, response, is_holonomic=base.abilities.holonomic)
         self.status = StatusReporter(base)
         self.expression = Expression(base)
         self.safety = Safety(base.abilities)

@@ -46,17 +46,17 @@ class Resistance:
             How long ago the last moment was [s].
         """
         span_s = max(span_s, 0.0)
-        is_, should = state.twist.wheels_m_s, ordered.wheels_m_s
-        deviation_m_s = max(abs(one - other) for one, other in zip(should, is_, strict=True))
-        speed_m_s = max(map(abs, should))
+        *wheels, aside = zip(ordered.sides_m_s, state.twist.sides_m_s, strict=True)
+        pairs = [*wheels, aside] if any(aside) else wheels
+        deviation_m_s = max(abs(should - is_) for should, is_ in pairs)
+        speed_m_s = max(abs(should) for should, _ in pairs)
         limit_m_s = min(max(DEVIATION_SHARE * speed_m_s, DEVIATION_LEAST_M_S), DEVIATION_M_S)
         if deviation_m_s <= limit_m_s:
             self._deviated_s = None
         else:
             self._deviated_s = 0.0 if self._deviated_s is None else self._deviated_s + span_s
         missing_m_s = max(
-            math.copysign(1.0, want) * (want - have) if want else -abs(have)
-            for want, have in zip(should, is_, strict=True)
+            math.copysign(1.0, want) * (want - have) if want else -abs(have) for want, have in pairs
         )
         self._missed_m *= math.exp(-span_s / MISSED_FADES_S)
         # One that is later than expected makes up for it afterwards.

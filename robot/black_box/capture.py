@@ -56,7 +56,9 @@ class Capture:
             pose, twist = state.pose, state.twist
             numbers = (*(ordered.v_m_s, ordered.w_rad_s), *(pose.x_m, pose.y_m, pose.heading_rad))
             tick = [round(one, 4) for one in (*numbers, twist.v_m_s, twist.w_rad_s)]
-            self._box.note(tick=tick, **({"hazards": hazards} if hazards else {}))
+            aside = [round(one, 4) for one in (ordered.vy_m_s, twist.vy_m_s)]
+            more = {"hazards": hazards} if hazards else {}
+            self._box.note(tick=tick, **more, **({"aside": aside} if any(aside) else {}))
         self._look_for_stop()
 
     def record_loss(self, reason: str) -> None:

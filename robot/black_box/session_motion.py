@@ -83,8 +83,9 @@ class MotionParts:
                     self._records.append({"at_s": at_s, "sent": report})
                 case {"tick": tick} if at_s - self._ticked_s >= TICK_EVERY_S - 0.005:
                     self._ticked_s = at_s
-                    self._records.append({"at_s": at_s, "tick": tick})
-                    self._has_moved = self._has_moved or any(tick[:2])
+                    aside = {"aside": record["aside"]} if "aside" in record else {}
+                    self._records.append({"at_s": at_s, "tick": tick} | aside)
+                    self._has_moved = self._has_moved or any(tick[:2]) or bool(aside)
             is_over = self._ends_s > 0 and at_s >= self._ends_s
             if self._records and (is_over or at_s - self._records[0]["at_s"] >= PART_S):
                 yield from self.take()

@@ -54,13 +54,15 @@ class DelayMeter:
         elapsed_s = now_s - last[0]
         before, turned_rad = last[1], pose.heading_rad - last[1].heading_rad
         midway = replace(before, heading_rad=(before.heading_rad + pose.heading_rad) / 2)
-        v_m_s = pose.seen_from(midway).x_m / elapsed_s
+        moved = pose.seen_from(midway)
+        v_m_s, vy_m_s = moved.x_m / elapsed_s, moved.y_m / elapsed_s
         turn_m_s = WHEEL_M * turned_rad / elapsed_s
         fading = math.exp(-elapsed_s / FADES_S)
-        self._energy = self._energy * fading + (v_m_s**2 + turn_m_s**2) * elapsed_s
+        self._energy = self._energy * fading + (v_m_s**2 + vy_m_s**2 + turn_m_s**2) * elapsed_s
         self._moved_s = self._moved_s * fading + elapsed_s
         for ticks, order in enumerate(self._orders):
-            error = (order.v_m_s - v_m_s) ** 2 + (WHEEL_M * order.w_rad_s - turn_m_s) ** 2
+            error = (order.v_m_s - v_m_s) ** 2 + (order.vy_m_s - vy_m_s) ** 2
+            error += (WHEEL_M * order.w_rad_s - turn_m_s) ** 2
             self._costs[ticks] = self._costs[ticks] * fading + error * elapsed_s
 
     @property

@@ -40,10 +40,10 @@ class Limits:
     Parameters
     ----------
     v_m_s, w_rad_s
-        Largest speeds [m/s, rad/s]. Default: the original's 0.2 m/s; 1.5 rad/s, within what a
-        Kobuki's gyro is calibrated for (the original's 1.8 is not).
+        Largest speeds [m/s, rad/s], the first one in any direction. Default: the original's 0.2
+        m/s; 1.5 rad/s, within what a Kobuki's gyro is calibrated for (the original's 1.8 is not).
     speed_up_m_s2, slow_down_m_s2
-        Largest changes of ``v`` [m/s²]. Default: a Kobuki's smoother and driver.
+        Largest changes of that velocity [m/s²]. Default: a Kobuki's smoother and driver.
     speed_up_rad_s2, slow_down_rad_s2
         Largest changes of ``w`` [rad/s²]. Default: the same.
 
@@ -90,8 +90,8 @@ class Limits:
         """Return a twist within the speeds, on the same curve; ``STILL`` where not finite."""
         if not twist.is_finite:
             return STILL
-        too_fast = max(abs(twist.v_m_s) / self.v_m_s, abs(twist.w_rad_s) / self.w_rad_s, 1.0)
-        return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
+        too_fast = max(twist.speed_m_s / self.v_m_s, abs(twist.w_rad_s) / self.w_rad_s, 1.0)
+        return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast, twist.vy_m_s / too_fast)
 
     def approach(self, now: Twist, wanted: Twist, elapsed_s: float) -> Twist:
         """Return what may be ordered next, on the way from one twist to another.
@@ -107,20 +107,19 @@ class Limits:
         """
         elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S) if math.isfinite(elapsed_s) else 0.0
         wanted = self.clip(wanted)
-        return Twist(
-            _ramp(
-                now.v_m_s,
-                wanted.v_m_s,
-                self.speed_up_m_s2 * elapsed_s,
-                self.slow_down_m_s2 * elapsed_s,
-            ),
-            _ramp(
-                now.w_rad_s,
-                wanted.w_rad_s,
-                self.speed_up_rad_s2 * elapsed_s,
-                self.slow_down_rad_s2 * elapsed_s,
-            ),
+        more_m_s, less_m_s = self.speed_up_m_s2 * elapsed_s, self.slow_down_m_s2 * elapsed_s
+        w_rad_s = _ramp(
+            now.w_rad_s,
+            wanted.w_rad_s,
+            self.speed_up_rad_s2 * elapsed_s,
+            self.slow_down_rad_s2 * elapsed_s,
         )
+        if not (now.vy_m_s or wanted.vy_m_s):
+            return Twist(_ramp(now.v_m_s, wanted.v_m_s, more_m_s, less_m_s), w_rad_s)
+        v_m_s, vy_m_s = _ramp_way(
+            (now.v_m_s, now.vy_m_s), (wanted.v_m_s, wanted.vy_m_s), more_m_s, less_m_s
+        )
+        return Twist(v_m_s, w_rad_s, vy_m_s)
 
 
 DEFAULT_LIMITS = Limits()
@@ -136,6 +135,18 @@ def _ramp(now: float, wanted: float, more: float, less: float) -> float:
     if abs(wanted) >= abs(now):
         return math.copysign(min(abs(wanted), abs(now) + more), wanted)
     return math.copysign(max(abs(wanted), abs(now) - less), now)
+
+
+def _ramp_way(
+    now: tuple[float, float], wanted: tuple[float, float], more: float, less: float
+) -> tuple[float, float]:
+    """Return the same for a velocity ahead and to the left, whose change has any direction."""
+    if now[0] * wanted[0] + now[1] * wanted[1] < 0:
+        wanted = (0.0, 0.0)
+    change = (wanted[0] - now[0], wanted[1] - now[1])
+    may_change = more if math.hypot(*wanted) >= math.hypot(*now) else less
+    share = min(1.0, may_change / math.hypot(*change)) if any(change) else 0.0
+    return now[0] + share * change[0], now[1] + share * change[1]
 
 
 def min_time_s(distance: float, speed: float, speed_up: float, slow_down: float) -> float:

@@ -43,6 +43,9 @@ class Player:
     answered the orders on their way, as if there were no delay (a Smith predictor); odometry then
     corrects what the prediction missed. How late it is, is measured on while it moves.
 
+    A holonomic base goes the same ways, for turns are what is seen; only what it is beside its way,
+    or beside home, it corrects sideways, without a turn.
+
     ``step`` is to be called some 50 times a second, whether a gesture is played or not; it never
     exceeds the limits, and slows down by itself after the last waypoint.
 
@@ -52,10 +55,14 @@ class Player:
         Speeds and accelerations that every order keeps to.
     response
         How late the base answers, as far as is known before it moves.
+    is_holonomic
+        Whether it moves sideways, too.
     """
 
-    def __init__(self, limits: Limits, response: Response = AT_ONCE) -> None:
-        self.limits = limits
+    def __init__(
+        self, limits: Limits, response: Response = AT_ONCE, *, is_holonomic: bool = False
+    ) -> None:
+        self.limits, self._is_holonomic = limits, is_holonomic
         self._least = Twist(response.stiction_m_s, 2 * response.stiction_m_s / WHEELBASE_M)
         # One that does not creep comes nearer to its places in the same time.
         creeps = response.stiction_m_s <= CLOSING_PER_S * NEAR_M
@@ -200,8 +207,17 @@ class Player:
     def _lift(self, ramped: Twist, wanted: Twist) -> Twist:
         """Return an order that no wheel ignores: at its least speed, or still.
 
-        While it drives, it is steered by as much as leaves both wheels at that speed.
+        While it drives, it is steered by as much as leaves both wheels at that speed; a holonomic
+        base keeps its direction instead.
         """
+        if self._is_holonomic:
+            along = ramped if ramped.speed_m_s else wanted
+            to_wanted = ramped.v_m_s * wanted.v_m_s + ramped.vy_m_s * wanted.vy_m_s
+            left_m_s = math.copysign(wanted.speed_m_s, to_wanted)
+            lifted_m_s = _lift(ramped.speed_m_s, left_m_s, self._least.v_m_s)
+            if lifted_m_s:
+                share = lifted_m_s / along.speed_m_s
+                return Twist(share * along.v_m_s, ramped.w_rad_s, share * along.vy_m_s)
         v_m_s = _lift(ramped.v_m_s, wanted.v_m_s, self._least.v_m_s)
         if v_m_s:
             most_rad_s = math.inf
@@ -213,11 +229,13 @@ class Player:
     def _rest_of_the_way(self, here: Pose, heading_rad: float) -> list[Segment]:
         """Return what is left at home, once the base has come to rest: ahead or back, and a turn.
 
-        One that answers sooner than was assumed has stopped too early; it drives the rest once.
+        A holonomic base goes what it is beside home, too. One that answers sooner than was assumed
+        has stopped too early; it drives the rest once.
         """
         rest: list[Segment] = []
         left_m = HOME.seen_from(Pose(here.x_m, here.y_m)).x_m
-        if abs(left_m) > NEAR_M and not self._is_corrected:
+        away_m = here.distance_m(HOME) if self._is_holonomic else abs(left_m)
+        if away_m > NEAR_M and not self._is_corrected:
             self._is_corrected = True
             rest.append(Drive(HOME.x_m, HOME.y_m, heading_rad, left_m))
         if rest or abs(heading_rad - here.heading_rad) > NEAR_RAD:
@@ -234,6 +252,14 @@ class Player:
                 return Twist(
                     w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2)
                 )
+            case Drive() if self._is_holonomic:
+                left = Pose(segment.x_m, segment.y_m).seen_from(pose)
+                away_m = left.distance_m(HOME)
+                if away_m <= self._near_m:
+                    return None
+                share = _approach_speed(away_m, limits.v_m_s, limits.slow_down_m_s2) / away_m
+                turn_rad = wrap(segment.heading_rad - pose.heading_rad)
+                return Twist(share * left.x_m, turn_rad * CLOSING_PER_S / 2, share * left.y_m)
             case Drive():
                 goal = Pose(segment.x_m, segment.y_m)
                 left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))

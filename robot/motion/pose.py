@@ -71,10 +71,11 @@ def advance(pose: Pose, twist: Twist, elapsed_s: float) -> Pose:
     # heading.
     half_rad = turn_rad / 2
     straight = math.sin(half_rad) / half_rad if abs(half_rad) > 1e-9 else 1.0
-    chord_m = twist.v_m_s * elapsed_s * straight
+    chord_m, aside_m = (speed * elapsed_s * straight for speed in (twist.v_m_s, twist.vy_m_s))
     along_rad = pose.heading_rad + half_rad
+    cos, sin = math.cos(along_rad), math.sin(along_rad)
     return Pose(
-        pose.x_m + chord_m * math.cos(along_rad),
-        pose.y_m + chord_m * math.sin(along_rad),
+        pose.x_m + chord_m * cos - aside_m * sin,
+        pose.y_m + chord_m * sin + aside_m * cos,
         pose.heading_rad + turn_rad,
     )

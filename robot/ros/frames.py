@@ -1,4 +1,4 @@
-"""Frames of rosbridge v2: the six operations that are sent, and the two that are received.
+"""Frames of rosbridge v2: the eight operations that are sent, and the three that are received.
 
 A bridge reports no errors (docs/reference/rosbridge.md#behavior), so what matters is confirmed by
 its echo. So that nothing waits in a queue, publishers and subscriptions hold one message.
@@ -22,7 +22,7 @@ class BadRosFrame(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A ROS topic: its name, and the type of its messages, as in ``std_msgs/Bool``."""
+    """A ROS topic or action: its name, and the type of its messages, as in ``std_msgs/Bool``."""
 
     name: str
     kind: str
@@ -44,7 +44,20 @@ class ServiceResponse:
     values: Mapping[str, Any] | None
 
 
-Incoming = Publication | ServiceResponse
+@dataclass(frozen=True, slots=True)
+class ActionResult:
+    """The end of the goal of that id; ``problem`` says why it was not reached, empty where it was.
+
+    A goal that was canceled is one that was not reached.
+    """
+
+    goal_id: str
+    problem: str = ""
+
+
+Incoming = Publication | ServiceResponse | ActionResult
+
+SUCCEEDED = 4  # action_msgs/GoalStatus
 
 
 def advertise(topic: Topic, *, latch: bool = False) -> Frame:
@@ -116,13 +129,40 @@ def call_service(service: str, arguments: Mapping[str, Any], call_id: str) -> Fr
     return {"op": "call_service", "service": service, "args": dict(arguments), "id": call_id}
 
 
+def send_goal(action: Topic, goal: Mapping[str, Any], goal_id: str) -> Frame:
+    """Return the frame that sends a goal to an action server of ROS 2, without feedback.
+
+    Parameters
+    ----------
+    action
+        Its name, and its type, as in ``control_msgs/action/FollowJointTrajectory``.
+    goal
+        The goal's fields.
+    goal_id
+        Its id, which its result has too.
+    """
+    return {
+        "op": "send_action_goal",
+        "action": action.name,
+        "action_type": action.kind,
+        "args": dict(goal),
+        "feedback": False,
+        "id": goal_id,
+    }
+
+
+def cancel_goal(action: Topic, goal_id: str) -> Frame:
+    """Return the frame that cancels a goal."""
+    return {"op": "cancel_action_goal", "action": action.name, "id": goal_id}
+
+
 def to_text(frame: Frame) -> str:
     """Return a frame's text. Raises ValueError for a number that is not finite."""
     return json.dumps(frame, separators=(",", ":"), allow_nan=False)
 
 
 def read_frame(text: str | bytes) -> Incoming:
-    """Return a publication or a service response. Raises BadRosFrame for anything else."""
+    """Return a publication, a service response or a result. Raises BadRosFrame for others."""
     try:
         frame = json.loads(text)
     except (ValueError, RecursionError):
@@ -135,4 +175,19 @@ def read_frame(text: str | bytes) -> Incoming:
             # (docs/reference/rosbridge.md#messages).
             values = rest.get("values") if rest.get("result") is True else None
             return ServiceResponse(call_id, values if isinstance(values, dict) else None)
-    raise BadRosFrame('A received frame has the "op" publish or service_response.')
+        case {"op": "action_result", "id": str(goal_id), **rest}:
+            return ActionResult(goal_id, _read_problem(rest))
+    raise BadRosFrame('A received frame has the "op" publish, service_response or action_result.')
+
+
+def _read_problem(result: Mapping[Any, Any]) -> str:
+    """Return why a goal was not reached, in its server's or bridge's words."""
+    values, status = result.get("values"), result.get("status")
+    if result.get("result") is not True:  # it was rejected, or there is no server
+        return values if isinstance(values, str) and values else "it was refused"
+    if isinstance(values, dict) and "status" in values:  # bridges of early 2024
+        status, values = values["status"], values.get("result")
+    if status == SUCCEEDED:
+        return ""
+    text = values.get("error_string") if isinstance(values, dict) else None
+    return text if isinstance(text, str) and text else f"it ended with the status {status}"

@@ -111,7 +111,7 @@ class Holder:
         is_held = now_s < max(self._held_until_s, self._moved_until_s)
         if isinstance(incoming, Publication) and incoming.topic in self.topics and is_held:
             _, twist = read_odometry(incoming.message)
-            if max(map(abs, twist.wheels_m_s)) > STILL_M_S:
+            if twist.fastest_wheel_m_s > STILL_M_S:
                 self._moved_until_s = now_s + STILL_S
 
     def end(self) -> Iterator[Frame]:

@@ -25,6 +25,13 @@ BOOL = "std_msgs/Bool"
 STRING = "std_msgs/String"
 HAZARDS = "irobot_create_msgs/HazardDetectionVector"
 DOCK = "irobot_create_msgs/DockStatus"
+BATTERY = "sensor_msgs/BatteryState"
+# The flag of a message that says whether it stands at a charger. A Stretch's ``present`` does, not
+# whether it has a battery (docs/reference/rosbridge.md#names-of-a-stretch).
+AT_CHARGER = {DOCK: "is_docked", BATTERY: "present"}
+JOINT_STATE = "sensor_msgs/JointState"
+TRAJECTORY = "trajectory_msgs/JointTrajectory"
+FOLLOW = "control_msgs/action/FollowJointTrajectory"
 # Type of an event: the name of its field that identifies the sensor. Its field ``state`` is 1
 # while it is pressed, sees an edge, or hangs free (kobuki_msgs, kobuki_ros_interfaces).
 EVENT_FIELDS = {"BumperEvent": "bumper", "CliffEvent": "sensor", "WheelDropEvent": "wheel"}
@@ -39,6 +46,7 @@ CREATE_HAZARDS = {1: "bump", 2: "cliff", 3: "over_current", 4: "wheel_drop"}
 
 # Larger distances [m] and speeds [m/s, rad/s] are impossible for our bases, and refused.
 FARTHEST_M = 1e6
+LATEST_S = 1e11
 FASTEST = 100.0
 
 Message = Mapping[str, Any]
@@ -61,7 +69,7 @@ def write_twist(twist: Twist, kind: str = TWIST) -> dict[str, Any]:
         base takes as now.
     """
     message = {
-        "linear": {"x": twist.v_m_s, "y": 0.0, "z": 0.0},
+        "linear": {"x": twist.v_m_s, "y": twist.vy_m_s, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": twist.w_rad_s},
     }
     return {"twist": message} if without_msg(kind) == TWIST_STAMPED else message
@@ -78,10 +86,7 @@ def read_twist(message: Message, kind: str = TWIST) -> Twist:
         Its type, as ROS 1 or 2 writes it.
     """
     path = ("twist",) if without_msg(kind) == TWIST_STAMPED else ()
-    return Twist(
-        _number(message, FASTEST, *path, "linear", "x"),
-        _number(message, FASTEST, *path, "angular", "z"),
-    )
+    return _read_velocity(message, *path)
 
 
 def read_odometry(message: Message) -> tuple[Pose, Twist]:
@@ -91,11 +96,28 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
         raise BadRosFrame("An orientation is a unit quaternion.")
     heading_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     x_m, y_m = (_number(message, FARTHEST_M, "pose", "pose", "position", axis) for axis in "xy")
-    twist = Twist(
-        _number(message, FASTEST, "twist", "twist", "linear", "x"),
-        _number(message, FASTEST, "twist", "twist", "angular", "z"),
+    return Pose(x_m, y_m, heading_rad), _read_velocity(message, "twist", "twist")
+
+
+def read_stamp_s(message: Message) -> float:
+    """Read when a message of ROS 1 was made, by its header [s]. Raises BadRosFrame."""
+    seconds, rest_ns = (
+        _number(message, LATEST_S, "header", "stamp", name) for name in ("secs", "nsecs")
     )
-    return Pose(x_m, y_m, heading_rad), twist
+    return seconds + 1e-9 * rest_ns
+
+
+def read_joints(message: Message) -> dict[str, float]:
+    """Read where joints are, by their names [rad, m], of a JointState. Raises BadRosFrame."""
+    names, positions = message.get("name"), message.get("position")
+    if not (isinstance(names, list) and isinstance(positions, list)):
+        raise BadRosFrame('"name" and "position" are lists.')
+    there = {
+        name: to_number(position, -FARTHEST_M, FARTHEST_M)
+        for name, position in zip(names, positions, strict=False)
+        if isinstance(name, str)
+    }
+    return {name: position for name, position in there.items() if position is not None}
 
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
@@ -134,6 +156,11 @@ def read_flag(message: Message, name: str) -> bool:
     if not isinstance(value, bool):
         raise BadRosFrame(f'"{name}" is true or false.')
     return value
+
+
+def _read_velocity(message: Message, *path: str) -> Twist:
+    parts = (("linear", "x"), ("angular", "z"), ("linear", "y"))
+    return Twist(*(_number(message, FASTEST, *path, *part) for part in parts))
 
 
 def _number(message: Any, most: float, *path: str) -> float:

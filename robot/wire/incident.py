@@ -4,7 +4,8 @@ A recording is a list of records, oldest first, each a JSON object with ``at_s``
 robot's clock [s], and one of:
 
 ``tick``
-    What was ordered and how it moved, by ``TICK``; with ``hazards`` where the base felt any.
+    What was ordered and how it moved, by ``TICK``; with ``hazards`` where the base felt any, and
+    with ``aside``, by ``ASIDE``, where a holonomic one was ordered to the left, or moved there.
 ``received``, ``sent``
     A message of the server, a report to it.
 ``bytes``
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -31,6 +33,8 @@ Record = Mapping[str, Any]
 
 # The columns of a tick: the order [m/s, rad/s], the pose from home [m, m, rad], the velocity.
 TICK = ("order_m_s", "order_rad_s", "x_m", "y_m", "heading_rad", "speed_m_s", "turn_rad_s")
+# What goes to the left: the order and the velocity [m/s].
+ASIDE = ("order_left_m_s", "left_m_s")
 
 # The reason of a recording that nothing stopped: a part of its session's motion, of these reports
 # and of fewer ticks.
@@ -58,6 +62,16 @@ def read_lines(text: str) -> list[dict[str, Any]]:
         if isinstance(record, dict) and isinstance(record.get("at_s"), int | float):
             records.append(record)
     return records
+
+
+def read_aside(record: Record) -> tuple[float, float]:
+    """Return what of a tick goes to the left, by ``ASIDE``; 0 where it says nothing of that."""
+    match record.get("aside"):
+        case [int() | float() as order_m_s, int() | float() as speed_m_s] if all(
+            map(math.isfinite, (order_m_s, speed_m_s))
+        ):
+            return float(order_m_s), float(speed_m_s)
+    return 0.0, 0.0
 
 
 def pack(records: Sequence[Record]) -> str:

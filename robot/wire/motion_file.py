@@ -10,14 +10,14 @@ from __future__ import annotations
 import json
 from typing import Any, BinaryIO
 
-from robot.wire.incident import MOTION_TOPICS, TICK, Record
+from robot.wire.incident import ASIDE, MOTION_TOPICS, TICK, Record, read_aside
 
 CHUNK_BYTES = 64 * 1024  # so much may be lost where the power is
 ORDER, ODOMETRY = "/order", "/odometry"
 # Topics of what a robot reported and received, by their kind.
 REPORTS = {kind: f"/{kind}" for kind in MOTION_TOPICS}
 RECEIVED = {kind: f"/{kind}" for kind in ("welcome", "cue", "state")}
-_NUMBERS = {ORDER: TICK[:2], ODOMETRY: TICK[2:]}
+_NUMBERS = {ORDER: (*TICK[:2], ASIDE[0]), ODOMETRY: (*TICK[2:], ASIDE[1])}
 
 
 class MotionFile:
@@ -56,7 +56,7 @@ class MotionFile:
             case {"sent": {"kind": str(kind)} as report} if kind in REPORTS:
                 self._write(REPORTS[kind], at_s, report)
             case {"tick": tick}:
-                columns = dict(zip(TICK, tick, strict=True))
+                columns = dict(zip((*TICK, *ASIDE), (*tick, *read_aside(record)), strict=True))
                 for topic, names in _NUMBERS.items():
                     self._write(topic, at_s, {name: columns[name] for name in names})
 

@@ -73,7 +73,7 @@ def test_the_robot_s_motion_is_exported_as_it_was_sent(files, tmp_path):
     (file,) = (files / "robot").iterdir()
     topics = read(file)
     assert [tuple(message.values()) for _, message in topics["/odometry"]] == [
-        tuple(tick[2:]) for tick in ticks
+        (*tick[2:], 0.0) for tick in ticks
     ]
     assert [message["gesture"] for _, message in topics["/decision"]] == [
         one["sent"]["gesture"] for one in sent if one.get("sent", {}).get("kind") == "decision"

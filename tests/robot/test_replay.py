@@ -1,5 +1,7 @@
 """An incident's orders on a simulated base: it comes to where it was recorded, unless pushed."""
 
+from argparse import Namespace
+
 import pytest
 
 from robot.base_options import VirtualClock
@@ -9,6 +11,7 @@ from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
+from robot.motion.twist import Twist
 from robot.replay import main, read_ticks, replay
 from robot.wire.incident import read_lines, to_lines
 
@@ -43,6 +46,40 @@ def test_orders_explain_where_it_was(recorded, capsys):
     assert max(apart_mm) <= 10
     moved = [one for one in read_ticks(recorded.read_text()) if not one[1].is_still]
     assert len(moved) > 20
+
+
+def test_what_goes_sideways_is_recorded_and_replayed(tmp_path, capsys):
+    clock = VirtualClock()
+    base = KinematicBase(clock.monotonic)
+    base.configure(Namespace(port="", holonomic=True))
+    box = BlackBox(tmp_path / "box", clock.monotonic)
+    box.begin()
+    performer = Performer(base)
+    capture = Capture(box, performer, base)
+    base.drive(Twist(0.0, 0.0, 0.2))  # set aside, as a person might
+    for _ in range(10):
+        clock.sleep(TICK_S)
+        base.drive(Twist(0.0, 0.0, 0.2))
+    base.stop()
+    clock.sleep(0.5)
+    base.read()
+    assert not performer.play_alone(GESTURES["nod"], clock.now_s)
+    for tick in range(600):
+        performer.tick(clock.now_s)
+        capture.record_tick(clock.now_s)
+        if tick == 300:
+            performer.handle({"type": "stop"}, clock.now_s)
+            capture.record_message({"type": "stop"})
+        clock.sleep(TICK_S)
+    box.write()
+    (file,) = (tmp_path / "box").glob("incident-*-stopped.jsonl")
+    ordered = [order.vy_m_s for _, order, _ in read_ticks(file.read_text())]
+    assert min(ordered) < -0.03  # back from what it was beside
+    assert main([str(file), "--base", "kinematic"]) == 2
+    assert "take --base kinematic --holonomic" in capsys.readouterr().err
+    assert main([str(file), "--base", "kinematic", "--holonomic"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert float(last.rsplit(maxsplit=2)[1]) <= 10
 
 
 def test_what_orders_do_not_explain_shows(recorded):

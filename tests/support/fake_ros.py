@@ -35,6 +35,7 @@ class FakeGraph:
         self.hearers = defaultdict(list)
         self.publishers = defaultdict(set)
         self.latched = {}
+        self.actions = {}  # servers by name: see ``do_send_action_goal``
 
     def advertise(self, topic, kind, who, latch=False):
         if self.types.setdefault(topic, kind) != kind:
@@ -64,6 +65,7 @@ class FakeRosbridge:
         self.graph = graph or FakeGraph()
         self.has_rosapi = has_rosapi
         self.said, self.log = [], []
+        self.is_old = False  # one of before 2026, which does not tell that a goal was rejected
         self.loses = 0  # so many messages of each new publisher are lost, as ROS may
 
     def join(self, send):
@@ -77,6 +79,7 @@ class Client:
         self.bridge, self.send = bridge, send
         self.is_there = True
         self.advertised, self.heard = {}, set()
+        self.goals = {}
 
     def take(self, text):
         frame = json.loads(text)
@@ -127,6 +130,30 @@ class Client:
             there = sorted(graph.publishers[topic])
             answer |= {"values": {"publishers": there}, "result": True}
         self.send(json.dumps(answer))
+
+    def do_send_action_goal(self, frame):
+        """Pass a goal on to its server, which calls back with its end, and can cancel it.
+
+        As the capability send_action_goal does (docs/reference/rosbridge.md#actions).
+        """
+        assert frame["action_type"].count("/") == 2
+
+        def respond(values, status, result=True):
+            told = {"op": "action_result", "action": frame["action"], "id": frame["id"]}
+            if self.is_there and not (self.bridge.is_old and not result):
+                told |= {"values": values, "status": status, "result": result}
+                self.send(json.dumps(told))
+
+        server = self.bridge.graph.actions.get(frame["action"])
+        if server is None:
+            respond("No action server available", 0, result=False)
+        else:
+            self.goals[frame["id"]] = server.send(frame["args"], respond)
+
+    def do_cancel_action_goal(self, frame):
+        goal = self.goals.get(frame["id"])
+        if goal is not None:
+            goal.cancel()
 
 
 class FakeBase:
@@ -312,7 +339,7 @@ def twist_message(v_m_s, w_rad_s):
 
 
 def is_still_message(message):
-    return not (message["linear"]["x"] or message["angular"]["z"])
+    return not any((*message["linear"].values(), *message["angular"].values()))
 
 
 @cache

@@ -24,7 +24,10 @@ from typing import Any
 
 PYTHON = "/usr/bin/python3"
 PACKAGES = "python3-rospy python3-rosmaster python3-geometry-msgs python3-nav-msgs python3-std-msgs"
-PACKAGES_2 = "ros-rclpy ros-geometry-msgs ros-nav-msgs ros-std-msgs ros-rmw-fastrtps-cpp"
+PACKAGES_2 = (
+    "ros-rclpy ros-geometry-msgs ros-nav-msgs ros-std-msgs ros-sensor-msgs ros-trajectory-msgs "
+    "ros-rmw-fastrtps-cpp"
+)
 USER_DATA = "float32 a2\nfloat32 goal\n"  # garry_ros/UserData, which ROS users have to build
 START_S = 20.0
 
@@ -104,7 +107,7 @@ class Ros2:
 @cache
 def why_ros2_missing() -> str:
     """Return why there is no ROS 2 here; empty where there is."""
-    look = "import rclpy, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg"
+    look = "import rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, trajectory_msgs.msg"
     done = subprocess.run([Ros2.python, "-c", look], capture_output=True)
     return "" if done.returncode == 0 else f"no ROS 2: pip install {PACKAGES_2}"
 
@@ -218,6 +221,10 @@ def fill(message, value):
             continue
         if isinstance(part, dict):
             fill(getattr(message, name), part)
+        elif isinstance(part, list) and part and isinstance(part[0], dict):
+            kind = message.get_fields_and_field_types()[name]
+            one = class_of_2(kind.removeprefix("sequence<").removesuffix(">"))
+            setattr(message, name, [fill(one(), value) for value in part])
         else:
             setattr(message, name, part)
     return message
@@ -227,19 +234,23 @@ def read(value):
     """Return a message of ROS 2, or a part of one, as JSON has it."""
     if hasattr(value, "get_fields_and_field_types"):
         return {name: read(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, list):
+        return [read(part) for part in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def class_of_2(kind):
+    """Return the class of a type of ROS 2."""
+    from importlib import import_module
+
+    package, *_, name = kind.split("/")
+    return getattr(import_module(f"{package}.msg"), name)
 
 
 def run_node_2(name: str) -> None:
     """Be a node of ROS 2 until standard input ends."""
-    from importlib import import_module
-
     import rclpy
     from rclpy.executors import ExternalShutdownException
-
-    def class_of(kind):
-        package, *_, name = kind.split("/")
-        return getattr(import_module(f"{package}.msg"), name)
 
     def say(**said):
         with lock:
@@ -266,9 +277,9 @@ def run_node_2(name: str) -> None:
             def hear(message, topic=topic):
                 say(topic=topic, message=read(message))
 
-            node.create_subscription(class_of(order["kind"]), topic, hear, 10)
+            node.create_subscription(class_of_2(order["kind"]), topic, hear, 10)
         elif topic not in publishers:
-            kind = class_of(order["kind"])
+            kind = class_of_2(order["kind"])
             publishers[topic] = node.create_publisher(kind, topic, 1), kind
     rclpy.shutdown()
 

@@ -3,7 +3,8 @@
 import json
 import math
 from argparse import ArgumentParser
-from contextlib import suppress
+from collections import deque
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from unittest.mock import patch
 
@@ -25,33 +26,56 @@ WATCHED = Topics(CMD, ODOM, {"bump": BUMPER})
 
 
 class Stage:
-    """A base, a bridge and what it drives; ``wait`` lets time pass, a tick after the other."""
+    """A base, a bridge and what it drives; ``wait`` lets time pass, a tick after the other.
 
-    def __init__(self, topics=CLOSED, has_rosapi=True):
-        self.now_s = 100.0
+    ``make_robot`` gets the graph and the clock; a frame takes ``late_s`` to the bridge, and back.
+    """
+
+    def __init__(self, topics=CLOSED, has_rosapi=True, make_robot=None, late_s=0.0):
+        self.now_s, self.late_s = 100.0, late_s
         self.bridge = FakeRosbridge(has_rosapi=has_rosapi)
         # A base that is watched has no timeout of its own.
         timeout_s = topics.own_timeout_s or math.inf
         order = topics.order
-        self.robot = FakeBase(
-            self.bridge.graph, lambda: self.now_s, order.name, timeout_s=timeout_s, kind=order.kind
-        )
+
+        def make_base(graph, clock):
+            return FakeBase(graph, clock, order.name, timeout_s=timeout_s, kind=order.kind)
+
+        self.robot = (make_robot or make_base)(self.bridge.graph, lambda: self.now_s)
         self.relay = FakeRelay(self.bridge.graph, lambda: self.now_s) if topics.relay else None
         self.bridge.graph.advertise(BUMPER.name, BUMPER.kind, "/base")
         self.base = RosbridgeBase(lambda: self.now_s, topics)
         self.base_client = self.base._client
         self.is_frozen = False  # nothing passes any more, and nobody is told; later it does
         self.inbox, self.outbox, self.client = [], [], None
+        self.late_in, self.late_out = (deque[tuple[float, str]]() for _ in range(2))
         self.performer = None
         self.open()
 
     def open(self):
         """Open the base as a program does, which may order motion from then on."""
+        with self._patched():
+            RosbridgeBase.open(self.base)
+
+    def close(self):
+        """Close it as a program does."""
+        with self._patched():
+            RosbridgeBase.close(self.base)
+
+    @contextmanager
+    def _patched(self):
+        bridge = self.base._bridge
         with (
-            patch.object(self.base._bridge, "open", lambda url: self.connect()),
+            patch.object(bridge, "open", lambda url: self.connect()),
+            patch.object(bridge, "close", self.end),
             patch("robot.bases.rosbridge.base.time", SimpleNamespace(sleep=self.sleep)),
         ):
-            RosbridgeBase.open(self.base)
+            yield
+
+    def end(self):
+        for frame in self.base_client.end(self.now_s):
+            self.client.take(to_text(frame))
+        self.lose()
 
     def sleep(self, span_s):
         self.now_s += span_s
@@ -64,8 +88,8 @@ class Stage:
 
     def lose(self):
         self.client.is_there, self.client = False, None
-        self.inbox.clear()
-        self.outbox.clear()
+        for box in (self.inbox, self.outbox, self.late_in, self.late_out):
+            box.clear()
         self.base_client.disconnect(self.now_s)
 
     def wait(self, span_s, order=STILL):
@@ -81,14 +105,23 @@ class Stage:
     def pass_on(self):
         if self.client is not None:
             self.outbox += map(to_text, self.base_client.due(self.now_s))
-        while self.outbox and not self.is_frozen:
-            self.client.take(self.outbox.pop(0))
+        for text in self._arrived(self.outbox, self.late_out):
+            self.client.take(text)
         self.robot.tell()
         if self.relay is not None:
             self.relay.tell()
-        while self.inbox and not self.is_frozen:
+        for text in self._arrived(self.inbox, self.late_in):
             with suppress(BadRosFrame):
-                self.base_client.handle(read_frame(self.inbox.pop(0)), self.now_s)
+                self.base_client.handle(read_frame(text), self.now_s)
+
+    def _arrived(self, box, late):
+        """Give the frames that have been on their way for long enough; an order may add more."""
+        while not self.is_frozen:
+            late.extend((self.now_s + self.late_s, text) for text in box)
+            box.clear()
+            if not late or late[0][0] > self.now_s + 1e-9:
+                return
+            yield late.popleft()[1]
 
     def tell(self, topic, message):
         self.inbox.append(json.dumps({"op": "publish", "topic": topic, "msg": message}))

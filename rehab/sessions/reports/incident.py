@@ -11,7 +11,7 @@ from typing import Any
 from django.utils.translation import gettext
 
 from rehab.sessions.formatting import format_number
-from robot.wire.incident import TICK
+from robot.wire.incident import TICK, read_aside
 
 Record = dict[str, Any]
 
@@ -67,15 +67,17 @@ def _is_tick(record: Record) -> bool:
 
 def _figures(ticks: Sequence[Record], stopped_s: float) -> list[tuple[str, str]]:
     """Return how it moved at the stop and how soon it stood, as labels with values."""
-    before = [one["tick"] for one in ticks if one["at_s"] <= stopped_s]
+    before = [one for one in ticks if one["at_s"] <= stopped_s]
     after = [one for one in ticks if one["at_s"] >= stopped_s]
     if not before or not after:
         return []
-    *_, x_m, y_m, _heading, speed_m_s, turn_rad_s = before[-1]
+    *_, x_m, y_m, _heading, speed_m_s, turn_rad_s = before[-1]["tick"]
+    if left_m_s := read_aside(before[-1])[1]:
+        speed_m_s = math.hypot(speed_m_s, left_m_s)
     moving = [
         one["at_s"] - stopped_s
         for one in after
-        if abs(one["tick"][5]) > 0.01 or abs(one["tick"][6]) > 0.05
+        if max(abs(one["tick"][5]), abs(read_aside(one)[1])) > 0.01 or abs(one["tick"][6]) > 0.05
     ]
     way_m = sum(
         math.hypot(two["tick"][2] - one["tick"][2], two["tick"][3] - one["tick"][3])
@@ -97,7 +99,7 @@ def _entries(records: Sequence[Record], stopped_s: float) -> Iterator[Entry]:
     for record in records:
         at_s = record["at_s"] - stopped_s
         if _is_tick(record):
-            is_moving = any(record["tick"][ORDERED])
+            is_moving = any((*record["tick"][ORDERED], read_aside(record)[0]))
             if was_moving is not None and is_moving != was_moving:
                 words = gettext("ordered to move") if is_moving else gettext("ordered to stand")
                 yield Entry(at_s, words)

@@ -29,7 +29,7 @@ def slow_to_wheels(twist: Twist) -> Twist:
     """
     if not twist.is_finite:
         return STILL
-    too_fast = max(twist.fastest_wheel_m_s / WHEEL_MAX_M_S, 1.0)
+    too_fast = max(max(map(abs, twist.wheels_m_s)) / WHEEL_MAX_M_S, 1.0)
     return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
 
 

@@ -17,6 +17,7 @@ from robot.motion.twist import STILL, Twist
 from robot.ros.bridge import Bridge, find_bridge
 
 GREETING_S = 3.0  # a bridge that is there has sent odometry by then
+HOLD_WITHIN_S = 0.6  # how long the end waits for head and arms to be held, at most
 
 
 class RosbridgeBase(MobileBase):
@@ -56,7 +57,12 @@ class RosbridgeBase(MobileBase):
         self.stop()
 
     def close(self) -> None:
-        """Send the last frames, which are stops, and close the connection."""
+        """Hold head and arms, send the last frames, which are stops, and close the connection."""
+        until_s = self._monotonic() + HOLD_WITHIN_S
+        with self._bridge.sending():
+            self._client.hold_joints()
+        while self._client.is_holding and self._monotonic() < until_s:
+            time.sleep(TICK_S)
         self._bridge.close()
 
     @property
@@ -73,6 +79,7 @@ class RosbridgeBase(MobileBase):
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
+        self.abilities.check(twist)
         if self._bridge.is_dead:
             raise BaseLost(
                 "The thread that talks to the rosbridge has ended: see its messages above."

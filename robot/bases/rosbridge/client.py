@@ -8,12 +8,18 @@ from collections.abc import Iterator
 
 from robot.bases.base import Answer, BaseState, SensorState
 from robot.bases.rosbridge.orders import Orders
-from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
-from robot.bases.rosbridge.topics import ALL_HAZARDS, RELAY_ALIVE, Topics
+from robot.bases.rosbridge.perception import (
+    DeadReckoning,
+    HazardSensors,
+    ReportedOdometry,
+    Turret,
+)
+from robot.bases.rosbridge.topics import ALL_HAZARDS, RELAY_ALIVE, STOP_BUTTON, Topics
 from robot.bases.rosbridge.voice_and_joints import VoiceAndJoints
 from robot.bases.unordered_motion import UNORDERED, UnorderedMotion
 from robot.motion.twist import STILL, Twist
 from robot.ros.frames import (
+    ActionResult,
     BadRosFrame,
     Frame,
     Incoming,
@@ -27,12 +33,16 @@ from robot.ros.frames import (
     unsubscribe,
 )
 from robot.ros.messages import (
+    AT_CHARGER,
     ODOMETRY,
     read_event,
     read_flag,
     read_hazards,
+    read_joints,
     read_odometry,
+    read_stamp_s,
     read_twist,
+    without_msg,
     write_twist,
 )
 from robot.ros.signals import write_light, write_sound
@@ -50,6 +60,7 @@ RELAY_SILENT_S = 0.5  # the relay reports every 0.1 s
 NOBODY_LISTENS = "nobody_listens"
 SENSOR_MISSING = "feeler_missing"
 NOT_WATCHED = "nobody_watches"
+WRONG_MODE = "wrong_mode"
 # Hazards of its own.
 RESTARTED = "restarted"
 OTHER_DRIVER = "other_driver"
@@ -66,6 +77,8 @@ class BaseClient:
         )
         self.sensors = HazardSensors()
         self._voice_and_joints = VoiceAndJoints(topics.voice, topics.joints)
+        self._turret = None if topics.turret is None else Turret(topics.turret.ahead_m)
+        self._mode = ""  # of its driver; empty where it has not told yet
         self._unordered = UnorderedMotion()
         self._is_open = False
         self._opened_s = now_s
@@ -78,7 +91,7 @@ class BaseClient:
     @property
     def counters(self) -> Counter[str]:
         """How often something went wrong."""
-        return self.orders.counters + self.sensors.counters
+        return self.orders.counters + self.sensors.counters + self._voice_and_joints.counters
 
     def open(self, now_s: float) -> Iterator[Frame]:
         """Yield the first frames of a new connection. Its first order is to stand still."""
@@ -88,8 +101,8 @@ class BaseClient:
         for topic in topics.published:
             yield advertise(topic)
         for topic in topics.subscribed:
-            is_odometry = topic is topics.odometry
-            yield subscribe(topic, newest_every_ms=ODOMETRY_EVERY_MS if is_odometry else 0)
+            is_motion = topic in (topics.odometry, topics.turret and topics.turret.topic)
+            yield subscribe(topic, newest_every_ms=ODOMETRY_EVERY_MS if is_motion else 0)
         self.show(self._state, aloud=False)
 
     def show(self, state: str, *, aloud: bool) -> None:
@@ -102,12 +115,22 @@ class BaseClient:
             if sound is not None:
                 self._signals.append(publish(topics.sound, sound))
         if self._is_open:
-            self._signals += self._voice_and_joints.show(state)
+            self._voice_and_joints.show(state)
 
     def answer(self, answer: Answer) -> None:
         """Begin to answer; one that finds no connection is left out."""
         if self._is_open:
-            self._signals += self._voice_and_joints.answer(answer)
+            self._voice_and_joints.answer(answer)
+
+    def hold_joints(self) -> None:
+        """Hold head and arms."""
+        if self._is_open:
+            self._voice_and_joints.hold()
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether head and arms were told to hold, and that is not done yet."""
+        return self._voice_and_joints.is_holding
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
@@ -119,6 +142,7 @@ class BaseClient:
             yield from self._order(twist)
         while self._signals:
             yield self._signals.pop(0)
+        yield from self._voice_and_joints.due(now_s)
         if self.orders.sent.is_still and now_s - self._called_s >= CALL_EVERY_S:
             self._called_s = now_s
             name = self.topics.order.name
@@ -132,7 +156,7 @@ class BaseClient:
         Parameters
         ----------
         incoming
-            A message on one of the topics, or a response of rosapi.
+            A message on one of the topics, a response of rosapi, or the end of a goal.
         now_s
             When it came, on a monotonic clock [s].
 
@@ -144,24 +168,26 @@ class BaseClient:
         if isinstance(incoming, ServiceResponse):
             self._handle_response(incoming)
             return
-        odometry = self.topics.odometry
+        if self._voice_and_joints.handle(incoming) or isinstance(incoming, ActionResult):
+            return
+        topics, odometry = self.topics, self.topics.odometry
         if incoming.topic == self.topics.order.name:
             if self.orders.handle_echo(read_twist(incoming.message, self.topics.order.kind)):
                 self.sensors.record(OTHER_DRIVER)
         elif odometry is not None and incoming.topic == odometry.name:
-            pose, twist = read_odometry(incoming.message)
-            if self._unordered.update(twist.fastest_wheel_m_s, now_s):
-                self.sensors.record(UNORDERED)
-            if isinstance(self.odometry, ReportedOdometry) and self.odometry.update(
-                pose, twist, now_s
-            ):
-                self.sensors.counters["jumped"] += 1
-                self.sensors.record(RESTARTED)
+            self._handle_odometry(incoming, now_s)
+        elif topics.turret is not None and incoming.topic == topics.turret.topic.name:
+            angle_rad = read_joints(incoming.message).get(topics.turret.joint)
+            if angle_rad is not None and self._turret is not None:
+                self._turret.turn(angle_rad, now_s)
         elif incoming.topic == RELAY_ALIVE.name:
             if incoming.message.get("data") == self.topics.order.name:
                 self._relay_s = now_s
-        elif self.topics.dock is not None and incoming.topic == self.topics.dock.name:
-            self._is_docked = read_flag(incoming.message, "is_docked")
+        elif topics.dock is not None and incoming.topic == topics.dock.name:
+            flag = AT_CHARGER[without_msg(topics.dock.kind)]
+            self._is_docked = read_flag(incoming.message, flag)
+        elif topics.mode is not None and incoming.topic == topics.mode[0].name:
+            self._mode = str(incoming.message.get("data"))
         else:
             self._handle_event(incoming)
 
@@ -175,10 +201,12 @@ class BaseClient:
         self._missing.clear()
         self._signals.clear()
         self._relay_s = -math.inf
+        self._mode = ""
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames: stand still, unsubscribe, unadvertise."""
-        last_pose = list(self._voice_and_joints.show("stopped"))
+        self._voice_and_joints.hold()
+        last_pose = list(self._voice_and_joints.due(now_s))
         self.disconnect(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):
@@ -192,9 +220,11 @@ class BaseClient:
     def state(self, now_s: float) -> BaseState:
         """Return the state of the base now."""
         self.odometry.move(now_s)
+        hazards = self.sensors.hazards()
         sensors = SensorState(
-            hazards=self.sensors.hazards(),
+            hazards=hazards - {STOP_BUTTON},
             refusal=self._refusal(now_s),
+            stop_pressed=STOP_BUTTON in hazards,
             is_charging=self._is_docked,
             silent_s=self.silent_s(now_s),
         )
@@ -220,13 +250,18 @@ class BaseClient:
                 f"for {order} (deploy/ros/garry_watchdog.py), or say --own-timeout-s "
                 f"of a base that stops by itself."
             )
+        if self._refusal(now_s) == WRONG_MODE and self.topics.mode is not None:
+            return (
+                f"Its driver is in {self._mode!r} mode, in which it is not driven: bring it to "
+                f"{self.topics.mode[1]!r} mode."
+            )
         if odometry is not None and now_s - self.odometry.seen_s > LATE_S:
             return f"No {ODOMETRY} comes on {odometry.name}: does its driver run?"
         for topic, reason in self._missing.items():
             if reason == NOBODY_LISTENS:
                 return f"No driver listens on {topic}: start it, or choose another --cmd-topic."
             return f"Nobody publishes on {topic}: start its driver, or give none for that topic."
-        return ""
+        return self._voice_and_joints.problem
 
     def _order(self, twist: Twist) -> Iterator[Frame]:
         """Yield an order: a motion by way of the relay, a stop also past it."""
@@ -240,7 +275,22 @@ class BaseClient:
     def _refusal(self, now_s: float) -> str:
         if self.topics.relay is not None and now_s - self._relay_s > RELAY_SILENT_S:
             return NOT_WATCHED
+        if self.topics.mode is not None and self._mode not in ("", self.topics.mode[1]):
+            return WRONG_MODE
         return min(self._missing.values(), default="")
+
+    def _handle_odometry(self, incoming: Publication, now_s: float) -> None:
+        pose, twist = read_odometry(incoming.message)
+        if self._turret is not None:
+            body = self._turret.locate(pose, read_stamp_s(incoming.message), now_s)
+            if body is None:
+                return
+            pose, twist = body
+        if self._unordered.update(twist.fastest_wheel_m_s, now_s):
+            self.sensors.record(UNORDERED)
+        if isinstance(self.odometry, ReportedOdometry) and self.odometry.update(pose, twist, now_s):
+            self.sensors.counters["jumped"] += 1
+            self.sensors.record(RESTARTED)
 
     def _handle_event(self, incoming: Publication) -> None:
         for hazard, topic in self.topics.sensors.items():

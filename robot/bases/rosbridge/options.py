@@ -9,17 +9,38 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from robot.bases.base import BadOption
-from robot.bases.rosbridge.topics import BUMP, DEFAULT_PROFILE, PROFILES, RELAY_INPUT, Topics
-from robot.bases.rosbridge.voice_and_joints import LONGEST_S, Joints, Voice
+from robot.bases.rosbridge.joints import LONGEST_S, Joints, JointServer
+from robot.bases.rosbridge.topics import (
+    BUMP,
+    DEFAULT_PROFILE,
+    PROFILES,
+    RELAY_INPUT,
+    STOP_BUTTON,
+    Topics,
+)
+from robot.bases.rosbridge.voice_and_joints import Voice
 from robot.ros.frames import Topic
-from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, STRING, TWISTS, without_msg
+from robot.ros.messages import (
+    BOOL,
+    FOLLOW,
+    ODOMETRY,
+    SENSOR_TYPES,
+    STRING,
+    TRAJECTORY,
+    TWISTS,
+    without_msg,
+)
 from robot.ros.signals import LIGHT_TYPES, SOUND_TYPES
 
 NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
 NONE = "none"
-TRAJECTORY = "trajectory_msgs/JointTrajectory"
 POSES = {"rest": "at rest", "glad": "after a strong window", "sad": "after a weak one"}
-SENSOR_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
+SENSOR_OPTIONS = {
+    BUMP: "bumper",
+    "cliff": "cliff",
+    "wheel_drop": "wheel_drop",
+    STOP_BUTTON: "stop",
+}
 
 # A base that goes on for longer than this [s] without orders is not watched by its own timeout.
 LONGEST_TIMEOUT_S = 1.0
@@ -31,8 +52,8 @@ def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
         "--ros-robot",
         choices=sorted(PROFILES),
         default=DEFAULT_PROFILE,
-        help="which topics it has: a Kobuki's (of ROS 1 or 2), a TurtleBot 4's, or /cmd_vel and "
-        f"/odom alone (default: {DEFAULT_PROFILE})",
+        help="which topics it has: a Kobuki's (of ROS 1 or 2), a TurtleBot 4's, a Stretch's, a "
+        f"Quori's, or /cmd_vel and /odom alone (default: {DEFAULT_PROFILE})",
     )
     group.add_argument(
         "--cmd-topic", metavar="TOPIC[:TYPE]", help="that takes Twists, or TwistStamped"
@@ -59,8 +80,8 @@ def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
     )
     group.add_argument(
         "--joints-topic",
-        metavar="TOPIC",
-        help=f"that moves its head or arms ({TRAJECTORY})",
+        metavar="TOPIC[:TYPE]",
+        help=f"that moves its head or arms ({TRAJECTORY}, or an action {FOLLOW}); {NONE}: has none",
     )
     group.add_argument("--joints", default="", metavar="NAME,…", help="the names of these joints")
     for pose, when in POSES.items():
@@ -112,6 +133,12 @@ def read_topics(options: Namespace) -> Topics:
             f"--own-timeout-s: a base that goes on for {timeout_s:g} s is not watched; up to "
             f"{LONGEST_TIMEOUT_S:g} s is. Leave it out, and start the watchdog relay."
         )
+    if timeout_s is None and not profile.takes_relay:
+        raise BadOption(
+            f"--own-timeout-s: a {options.ros_robot} takes orders of one program alone, so no "
+            f"relay can watch it. Try with its wheels off the floor how soon it stands by itself "
+            f"(0.25 s by its driver's settings), and give that."
+        )
     return replace(
         profile,
         order=order,
@@ -120,7 +147,7 @@ def read_topics(options: Namespace) -> Topics:
         light=light,
         sound=sound,
         voice=_read_voice(options),
-        joints=_read_joints(options),
+        joints=_read_joints(options, profile),
         own_timeout_s=timeout_s,
     )
 
@@ -143,15 +170,28 @@ def _read_voice(options: Namespace) -> Voice | None:
     return Voice(topic, options.say_glad, options.say_sad)
 
 
-def _read_joints(options: Namespace) -> Joints | None:
-    if not options.joints_topic:
+def _read_joints(options: Namespace, profile: Topics) -> Joints | None:
+    server = profile.joint_server
+    if options.joints_topic == NONE:
         return None
-    topic = _read_topic("--joints-topic", options.joints_topic, (TRAJECTORY,), TRAJECTORY)
-    names = tuple(options.joints.split(","))
+    if options.joints_topic:
+        kinds = (TRAJECTORY, FOLLOW)
+        topic = _read_topic("--joints-topic", options.joints_topic, kinds, TRAJECTORY)
+        server = JointServer(topic)
+    is_posed = any(getattr(options, f"pose_{one}") for one in POSES)
+    if server is None or not (options.joints_topic or options.joints or is_posed):
+        return profile.joints
+    usual = profile.joints.names if profile.joints is not None else ()
+    named = options.joints or ",".join(server.names if server.takes_all else usual)
+    names = tuple(named.split(","))
     if not all(NAME.fullmatch(name) for name in names):
         raise BadOption("--joints: name the joints, like --joints head_pan,head_tilt.")
+    unknown = set(names) - set(server.names) if server.names else ()
+    if unknown or (server.takes_all and len(names) < len(server.names)):
+        what = "all of" if server.takes_all else "some of"
+        raise BadOption(f"--joints: name {what} {', '.join(server.names)}.")
     rest, glad, sad = (_read_pose(f"--pose-{one}", options, len(names)) for one in POSES)
-    joints = Joints(topic, names, rest, glad, sad)
+    joints = Joints(server, names, rest, glad, sad)
     if joints.takes_s > LONGEST_S:
         raise BadOption(
             f"--pose-glad, --pose-sad: from one pose to another it takes {joints.takes_s:.1f} s, "

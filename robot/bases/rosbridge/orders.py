@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
+from dataclasses import astuple
 
 from robot.motion.limits import ORDER_HOLDS_S, WHEEL_LIMITS
 from robot.motion.twist import STILL, Twist
@@ -63,7 +64,8 @@ class Orders:
             The time [s].
         """
         clipped = WHEEL_LIMITS.clip(twist)
-        twist = Twist(round(clipped.v_m_s, DIGITS), round(clipped.w_rad_s, DIGITS))
+        speeds = (clipped.v_m_s, clipped.w_rad_s, clipped.vy_m_s)
+        twist = Twist(*(round(speed, DIGITS) for speed in speeds))
         if twist.is_still and self._is_stop_confirmed:
             self._is_held = False
         if self._is_held and not twist.is_still:
@@ -122,4 +124,5 @@ class Orders:
 
 
 def _are_same(one: Twist, other: Twist) -> bool:
-    return abs(one.v_m_s - other.v_m_s) < SAME and abs(one.w_rad_s - other.w_rad_s) < SAME
+    ours, theirs = astuple(one), astuple(other)
+    return all(abs(a - b) < SAME for a, b in zip(ours, theirs, strict=True))

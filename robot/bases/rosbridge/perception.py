@@ -1,9 +1,9 @@
-"""State of a base that ROS drives: odometry, dead reckoning, hazards."""
+"""State of a base that ROS drives: odometry, also below a turret, dead reckoning, hazards."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import replace
 
 from robot.motion.limits import ORDER_HOLDS_S
@@ -13,6 +13,9 @@ from robot.motion.twist import STILL, Twist
 # From one odometry message to the next a base moves no further [m, rad], at our ceilings and with a
 # second between them. Beyond that it was restarted, or another program has set its odometry.
 JUMP_M, JUMP_RAD = 0.3, 1.8
+# Angles of a turret that are older [s] say nothing: they come 50 times a second. The velocity of
+# its body is that over the last moments [s]. (Ours.)
+TURRET_SILENT_S, TURRET_SPAN_S = 0.2, 0.1
 
 
 class ReportedOdometry:
@@ -69,6 +72,58 @@ class ReportedOdometry:
     def _update_pose(self) -> None:
         here = replace(self._last, heading_rad=self._heading_rad)
         self.pose = here.seen_from(self._home or HOME)
+
+
+class Turret:
+    """Where the body of a base is that stands on a turret, ahead of its wheels' axle.
+
+    Such a base moves as a holonomic one: its axle turns to where the body is to go, and the turret
+    turns against it. Its odometry is the axle's.
+
+    Parameters
+    ----------
+    ahead_m
+        From the middle of the axle to the turret's [m].
+    """
+
+    def __init__(self, ahead_m: float) -> None:
+        self._ahead_m = ahead_m
+        self._angle_rad, self._turned_s = 0.0, -math.inf
+        self._poses: deque[tuple[float, Pose]] = deque()
+
+    def turn(self, angle_rad: float, now_s: float) -> None:
+        """Store the turret's angle from the axle's heading [rad], seen at ``now_s`` [s]."""
+        self._angle_rad, self._turned_s = angle_rad, now_s
+
+    def locate(self, axle: Pose, stamp_s: float, now_s: float) -> tuple[Pose, Twist] | None:
+        """Return pose and velocity of the body; None where the turret's angle is not known.
+
+        Parameters
+        ----------
+        axle
+            Pose of the axle, by its odometry.
+        stamp_s
+            When that was, by the base's clock [s].
+        now_s
+            The time [s].
+        """
+        if now_s - self._turned_s > TURRET_SILENT_S:
+            self._poses.clear()
+            return None
+        there = advance(axle, Twist(self._ahead_m), 1.0)
+        body = replace(there, heading_rad=axle.heading_rad + self._angle_rad)
+        if self._poses and not 0 < stamp_s - self._poses[-1][0] <= TURRET_SPAN_S:
+            self._poses.clear()
+        while self._poses and stamp_s - self._poses[0][0] > TURRET_SPAN_S:
+            self._poses.popleft()
+        self._poses.append((stamp_s, body))
+        from_s, before = self._poses[0]
+        if from_s == stamp_s:
+            return body, STILL
+        turned_rad = wrap(body.heading_rad - before.heading_rad)
+        midway = replace(before, heading_rad=before.heading_rad + turned_rad / 2)
+        moved, span_s = body.seen_from(midway), stamp_s - from_s
+        return body, Twist(moved.x_m / span_s, turned_rad / span_s, moved.y_m / span_s)
 
 
 class DeadReckoning:

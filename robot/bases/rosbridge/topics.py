@@ -5,11 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from robot.bases.base import Abilities
-from robot.bases.rosbridge.voice_and_joints import Joints, Voice
+from robot.bases.rosbridge.joints import FASTEST_RAD_S, Joints, JointServer
+from robot.bases.rosbridge.voice_and_joints import Voice
 from robot.ros.frames import Topic
-from robot.ros.messages import DOCK, HAZARDS, ODOMETRY, STRING, TWIST, TWIST_STAMPED
+from robot.ros.messages import (
+    BATTERY,
+    BOOL,
+    DOCK,
+    FOLLOW,
+    HAZARDS,
+    JOINT_STATE,
+    ODOMETRY,
+    STRING,
+    TRAJECTORY,
+    TWIST,
+    TWIST_STAMPED,
+)
 
 BUMP = "bump"
+# The code of a button that stops it, which a person's hand has pressed.
+STOP_BUTTON = "stop_button"
 # The code of a Create 3's topic of hazards: all of them come on one.
 ALL_HAZARDS = "hazards"
 
@@ -17,6 +32,25 @@ ALL_HAZARDS = "hazards"
 # to, and where it reports, ten times a second, which topic it serves.
 RELAY_INPUT = "/garry/cmd_vel"
 RELAY_ALIVE = Topic("/garry/watchdog", STRING)
+
+
+@dataclass(frozen=True, slots=True)
+class TurretTopic:
+    """Where the angle of a base's turret is told.
+
+    Parameters
+    ----------
+    topic
+        Publishes sensor_msgs/JointState.
+    joint
+        The turret's name there.
+    ahead_m
+        How far the turret is ahead of the wheels' axle [m].
+    """
+
+    topic: Topic
+    joint: str
+    ahead_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +69,16 @@ class Topics:
         Show and sound its state.
     dock
         Reports whether it stands at its charger.
+    mode
+        Reports which mode its driver is in, and the one in which it is driven.
+    turret
+        Reports how its body stands on its wheels, where that turns; its odometry is its axle's.
+    holonomic
+        Whether it takes a velocity to the left, too.
+    takes_relay
+        Whether it takes orders while another program publishes on their topic, too.
+    joint_server
+        What moves its head or arms, where that is known.
     voice, joints
         By which it answers beside its motion.
     own_timeout_s
@@ -48,6 +92,11 @@ class Topics:
     light: Topic | None = None
     sound: Topic | None = None
     dock: Topic | None = None
+    mode: tuple[Topic, str] | None = None
+    turret: TurretTopic | None = None
+    holonomic: bool = False
+    takes_relay: bool = True
+    joint_server: JointServer | None = None
     voice: Voice | None = None
     joints: Joints | None = None
     own_timeout_s: float | None = None
@@ -61,14 +110,20 @@ class Topics:
     def published(self) -> list[Topic]:
         """All that we publish on."""
         topics = [self.order, self.relay, self.light, self.sound]
-        topics += [one.topic for one in (self.voice, self.joints) if one is not None]
+        topics += [self.voice.topic] if self.voice is not None else []
+        if self.joints is not None and not self.joints.server.is_action:
+            topics.append(self.joints.server.topic)
         return [topic for topic in topics if topic is not None]
 
     @property
     def subscribed(self) -> list[Topic]:
         """All that we listen to."""
         alive = RELAY_ALIVE if self.relay is not None else None
+        mode = None if self.mode is None else self.mode[0]
+        turret = None if self.turret is None else self.turret.topic
+        joints = None if self.joints is None else self.joints.server.states
         topics = (self.order, self.odometry, *self.sensors.values(), self.dock, alive)
+        topics += (mode, turret, joints)
         return [topic for topic in topics if topic is not None]
 
     @property
@@ -82,6 +137,7 @@ class Topics:
             real_time=True,
             closed_loop=self.odometry is not None,
             bumpers=BUMP in self.sensors or ALL_HAZARDS in self.sensors,
+            holonomic=self.holonomic,
         )
 
 
@@ -100,6 +156,19 @@ def _kobuki(root: str, package: str) -> Topics:
     )
 
 
+# A Stretch's driver takes the velocity of a point for the largest on the way, and 0 for none; it
+# moves the head on after a goal was canceled (docs/reference/rosbridge.md#names-of-a-stretch). Its
+# lift and arm, which go by meters, are left out.
+_STRETCH = JointServer(
+    Topic("/stretch_controller/follow_joint_trajectory", FOLLOW),
+    (
+        *("joint_head_pan", "joint_head_tilt"),
+        *("joint_wrist_yaw", "joint_wrist_pitch", "joint_wrist_roll"),
+    ),
+    states=Topic("/stretch/joint_states", JOINT_STATE),
+    end_rad_s=FASTEST_RAD_S,
+)
+
 PROFILES = {
     # What kobuki_node has without remappings, and the original's nodes publish on
     # (docs/reference/original.md#robot); on ROS 2 it is kobuki_ros
@@ -114,6 +183,32 @@ PROFILES = {
         light=Topic("/cmd_lightring", "irobot_create_msgs/LightringLeds"),
         sound=Topic("/cmd_audio", "irobot_create_msgs/AudioNoteVector"),
         dock=Topic("/dock_status", DOCK),
+    ),
+    # A Stretch (docs/reference/rosbridge.md#names-of-a-stretch): it looks up a little, or down.
+    "stretch": Topics(
+        Topic("/stretch/cmd_vel", TWIST),
+        Topic("/odom", ODOMETRY),
+        {STOP_BUTTON: Topic("/is_runstopped", BOOL)},
+        dock=Topic("/battery", BATTERY),
+        mode=(Topic("/mode", STRING), "navigation"),
+        joint_server=_STRETCH,
+        joints=Joints(_STRETCH, _STRETCH.names[:2], (0.0, 0.0), (0.0, 0.25), (0.0, -0.5)),
+    ),
+    # A Quori (docs/reference/rosbridge.md#names-of-a-quori).
+    "quori": Topics(
+        Topic("/quori/base_controller/cmd_vel", TWIST),
+        Topic("/quori/base_controller/odom", ODOMETRY),
+        turret=TurretTopic(Topic("/joint_states", JOINT_STATE), "turret", 0.1),
+        holonomic=True,
+        takes_relay=False,
+        joint_server=JointServer(
+            Topic("/quori/joint_trajectory_controller/command", TRAJECTORY),
+            (
+                *("r_shoulder_pitch", "r_shoulder_roll"),
+                *("l_shoulder_pitch", "l_shoulder_roll", "waist_pitch"),
+            ),
+            takes_all=True,
+        ),
     ),
     "plain": Topics(Topic("/cmd_vel", TWIST), Topic("/odom", ODOMETRY)),
 }

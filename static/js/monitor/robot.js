@@ -26,6 +26,7 @@ const NOTABLE = new Set([
   "nobody_listens",
   "feeler_missing",
   "nobody_watches",
+  "wrong_mode",
   "other_driver",
   "unordered_motion",
 ]);

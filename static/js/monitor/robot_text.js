@@ -37,6 +37,7 @@ const REASONS = {
   nobody_listens: _("its driver program does not run"),
   feeler_missing: _("a sensor that protects it is missing"),
   nobody_watches: _("nothing would stop it if the connection were lost"),
+  wrong_mode: _("its driver does not let it drive"),
   other_driver: _("another program drives it"),
   unordered_motion: _("something moved it"),
   open_loop: _("too far for a robot that does not know where it is"),
@@ -91,6 +92,7 @@ const CURES = {
   nobody_listens: _("Start its driver."),
   feeler_missing: _("Start its driver."),
   nobody_watches: _("Start the watchdog relay beside its driver."),
+  wrong_mode: _("Switch its driver to navigation mode."),
   other_driver: _("Stop the other program."),
   unordered_motion: _("Stop other programs that drive it, and do not push it."),
 };

@@ -1,5 +1,6 @@
 """What every base promises: a new one is added to ``STAGES``, and passes."""
 
+from argparse import Namespace
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,6 +15,7 @@ from robot.simulation import SIMULATED_BASES
 from robot.testing import BaseContract, Clock, RealClock, Stage
 from tests.support.fake_kobuki import FakeKobuki
 from tests.support.robot_stage import IdealBase
+from tests.support.ros_robots import RobotStage
 from tests.support.rosbridge_stage import Stage as RosStage
 
 SIMULATED = ["null", "kinematic"]
@@ -67,20 +69,46 @@ def rosbridge():
     yield Stage(base, RosClock(ros))
 
 
+@contextmanager
+def holonomic():
+    clock = Clock()
+    base = IdealBase(clock)
+    base.configure(Namespace(port="", holonomic=True))
+    yield Stage(base, clock)
+
+
+@contextmanager
+def robot(name):
+    ros = RobotStage(name)
+    ros.lose()
+    base: Any = ros.base
+    base.open, base.close = ros.open, lambda: None
+    yield Stage(base, RosClock(ros))
+
+
 STAGES: dict[str, Any] = {
     **{name: lambda name=name: simulated(name) for name in (*SIMULATED, "avatar")},
     "twin": twin,
     "kobuki": kobuki,
     "rosbridge": rosbridge,
 }
+# The same bases with other options.
+VARIED: dict[str, Any] = {
+    "holonomic": holonomic,
+    "stretch": lambda: robot("stretch"),
+    "quori": lambda: robot("quori"),
+}
 REAL_TIME = ("twin", "kobuki")
-NAMES = [pytest.param(name, marks=[pytest.mark.realtime] * (name in REAL_TIME)) for name in STAGES]
+NAMES = [
+    pytest.param(name, marks=[pytest.mark.realtime] * (name in REAL_TIME))
+    for name in (*STAGES, *VARIED)
+]
 
 
 class TestBases(BaseContract):
     @pytest.fixture(params=NAMES)
     def closed(self, request):
-        with STAGES[request.param]() as stage:
+        with (STAGES | VARIED)[request.param]() as stage:
             yield stage
 
     def test_no_program_arms_a_real_one(self, closed):

@@ -167,7 +167,9 @@ def test_a_base_that_is_held_is_noticed_at_any_speed(share, ordered, follows, fo
     assert after_s <= 0.54
 
 
-@pytest.mark.parametrize("pushed", [Twist(0.15, 0), Twist(0.05, 0), Twist(0, 0.5)], ids=str)
+@pytest.mark.parametrize(
+    "pushed", [Twist(0.15, 0), Twist(0.05, 0), Twist(0, 0.5), Twist(0, 0, -0.1)], ids=str
+)
 def test_a_base_that_moves_unordered_is_noticed(pushed):
     watch = Watch()
     state = replace(FINE, twist=pushed)
@@ -185,6 +187,14 @@ def test_way_that_it_misses_is_bounded_however_slow_it_is():
         found, after_s = watch.look(state, Twist(speed_m_s, 0), for_s=3)
         assert found == "stalled"
         assert speed_m_s * 0.4 * after_s <= 2 * MISSED_M
+
+
+def test_a_holonomic_base_that_is_held_on_its_way_aside_is_noticed():
+    found, after_s = Watch().look(FINE, Twist(0, 0, 0.1), for_s=0.54)
+    assert found == "stalled"
+    assert 0.1 * after_s <= 2 * MISSED_M
+    aside = replace(FINE, twist=Twist(0, 0, 0.1))
+    assert Watch().look(aside, Twist(0, 0, 0.1), for_s=2.0) == ("", 2.0)
 
 
 def test_a_late_base_makes_up_for_it():

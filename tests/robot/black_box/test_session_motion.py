@@ -32,9 +32,9 @@ def test_its_odometry_is_the_log_s_and_its_decisions_are_those_reported(tmp_path
     ticks = [one for one in logged if "tick" in one]
     odometry = topics["/odometry"] + read(eighth)["/odometry"]
     assert [tuple(message.values()) for _, message in odometry] == [
-        tuple(one["tick"][2:]) for one in ticks
+        (*one["tick"][2:], 0.0) for one in ticks
     ]
-    assert set(odometry[0][1]) == set(TICK[2:])
+    assert set(odometry[0][1]) == {*TICK[2:], "left_m_s"}
     assert max(message["order_m_s"] for _, message in topics["/order"]) > 0.05
     decisions = [message for _, message in topics["/decision"]]
     assert decisions == stage.of("decision")[: len(decisions)]

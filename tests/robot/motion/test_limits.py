@@ -23,21 +23,25 @@ limits = st.builds(
 )
 
 
-@given(limits, st.lists(st.tuples(anything, anything, anything), max_size=30))
+aside = st.just(0.0) | anything
+
+
+@given(limits, st.lists(st.tuples(anything, anything, aside, anything), max_size=30))
 def test_every_order_keeps_the_limits(limit, wishes):
     now = STILL
-    for v, w, elapsed_s in wishes:
-        after = limit.approach(now, Twist(v, w), elapsed_s)
+    for v, w, vy, elapsed_s in wishes:
+        after = limit.approach(now, Twist(v, w, vy), elapsed_s)
         assert after.is_finite
-        assert abs(after.v_m_s) <= limit.v_m_s * (1 + 1e-12)
+        assert after.speed_m_s <= limit.v_m_s * (1 + 1e-12)
         assert abs(after.w_rad_s) <= limit.w_rad_s * (1 + 1e-12)
         dt = min(max(elapsed_s, 0), LONGEST_STEP_S) if math.isfinite(elapsed_s) else 0
         most_m_s2 = max(limit.speed_up_m_s2, limit.slow_down_m_s2)
         most_rad_s2 = max(limit.speed_up_rad_s2, limit.slow_down_rad_s2)
-        assert abs(after.v_m_s - now.v_m_s) <= most_m_s2 * dt + 1e-9
+        changed_m_s = math.hypot(after.v_m_s - now.v_m_s, after.vy_m_s - now.vy_m_s)
+        assert changed_m_s <= most_m_s2 * dt + 1e-9
         assert abs(after.w_rad_s - now.w_rad_s) <= most_rad_s2 * dt + 1e-9
-        if abs(after.v_m_s) > abs(now.v_m_s):
-            assert abs(after.v_m_s) - abs(now.v_m_s) <= limit.speed_up_m_s2 * dt + 1e-9
+        if after.speed_m_s > now.speed_m_s + 1e-9:
+            assert after.speed_m_s - now.speed_m_s <= limit.speed_up_m_s2 * dt + 1e-9
         now = after
 
 
@@ -49,7 +53,10 @@ def test_clipping_keeps_the_curve_and_never_speeds_up(limit, v, w):
     assert v * clipped.v_m_s >= 0
 
 
-@pytest.mark.parametrize("bad", [Twist(math.nan, 0), Twist(0, math.inf), Twist(-math.inf, 1)])
+@pytest.mark.parametrize(
+    "bad",
+    [Twist(math.nan, 0), Twist(0, math.inf), Twist(-math.inf, 1), Twist(0.1, 0, math.nan)],
+)
 def test_what_is_not_finite_stands_still(bad):
     assert Limits().clip(bad) == STILL
 
@@ -123,3 +130,18 @@ def test_the_shortest_time_of_a_trapezoid(distance, time_s):
     elif distance:
         time_s = 0.5 + 1 + (abs(distance) - 0.75)
     assert min_time_s(distance, 1.0, 2.0, 1.0) == pytest.approx(time_s)
+
+
+def test_a_base_that_goes_sideways_faces_where_it_turns_to():
+    beside = advance(HOME, Twist(0.0, 0.0, 0.1), 2.0)
+    assert (beside.x_m, beside.y_m, beside.heading_rad) == pytest.approx((0.0, 0.2, 0.0))
+    # A quarter turn to the left, always sideways to the left: a circle around what lies there.
+    round_ = advance(HOME, Twist(0.0, math.pi / 2, 0.1), 1.0)
+    radius_m = 0.1 / (math.pi / 2)
+    assert (round_.x_m, round_.y_m) == pytest.approx((-radius_m, radius_m))
+
+
+def test_two_wheels_have_no_speed_to_the_left():
+    assert Twist(0.1, 0.0).wheels_m_s == (0.1, 0.1)
+    with pytest.raises(ValueError, match="holonomic"):
+        _ = Twist(0.1, 0.0, 0.01).wheels_m_s

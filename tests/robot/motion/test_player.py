@@ -1,6 +1,7 @@
 """Gestures on a simulated floor: home at the end, within limits always, interruptible anywhere."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -32,7 +33,8 @@ class Floor:
         while player.is_busy and not until(self):
             self.orders.append(player.step(self.time_s, self.pose))
             sent = self.orders[-1 - self.lag]
-            real = Twist(sent.v_m_s * self.grip[0], sent.w_rad_s * self.grip[1])
+            v, w = self.grip
+            real = Twist(sent.v_m_s * v, sent.w_rad_s * w, sent.vy_m_s * v)
             self.pose = advance(self.pose, real, dt_s)
             self.time_s += dt_s
             self.farthest_m = max(self.farthest_m, self.pose.distance_m(HOME))
@@ -192,3 +194,30 @@ def test_twenty_gestures_do_not_walk_away():
         floor.play(player)
         assert player.outcome == DONE
         assert is_at_home(floor.pose)
+
+
+@pytest.mark.parametrize("beside_m", [0.03, -0.045])
+def test_only_a_holonomic_base_corrects_what_it_is_beside_home(beside_m):
+    ends = {}
+    for is_holonomic in (False, True):
+        player = Player(Limits(), is_holonomic=is_holonomic)
+        floor = Floor(Pose(0.0, beside_m, 0.0))
+        player.start(VARIANTS["joy_1"], 0.0, floor.pose)
+        floor.play(player)
+        assert player.outcome == DONE
+        sideways = {order.vy_m_s for order in floor.orders}
+        assert (sideways != {0.0}) == is_holonomic
+        ends[is_holonomic] = floor.pose.distance_m(HOME)
+    assert ends[False] == pytest.approx(abs(beside_m))
+    assert ends[True] < 0.005
+
+
+@each_gesture
+def test_a_holonomic_base_keeps_its_heading_where_it_is_set_aside_on_its_way(gesture):
+    player, floor = Player(Limits(), is_holonomic=True), Floor(lag=2)
+    player.start(gesture, 0.0, HOME)
+    floor.play(player, until=lambda floor: floor.time_s > 1.0)
+    floor.pose = replace(floor.pose, y_m=floor.pose.y_m + 0.02)  # on a rug, say
+    floor.play(player)
+    assert player.outcome == DONE
+    assert is_at_home(floor.pose)

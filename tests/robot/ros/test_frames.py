@@ -12,14 +12,17 @@ from hypothesis import given
 from robot.motion.pose import Pose
 from robot.motion.twist import Twist
 from robot.ros.frames import (
+    ActionResult,
     BadRosFrame,
     Publication,
     ServiceResponse,
     Topic,
     advertise,
     call_service,
+    cancel_goal,
     publish,
     read_frame,
+    send_goal,
     subscribe,
     to_text,
     unadvertise,
@@ -29,7 +32,9 @@ from robot.ros.messages import (
     EVENTS,
     read_event,
     read_hazards,
+    read_joints,
     read_odometry,
+    read_stamp_s,
     read_twist,
     write_twist,
 )
@@ -47,9 +52,9 @@ CMD = Topic("/cmd_vel", "geometry_msgs/Twist")
             '"latch":false,"queue_size":1}',
         ),
         (
-            publish(CMD, write_twist(Twist(0.2, -1.5))),
+            publish(CMD, write_twist(Twist(0.2, -1.5, 0.1))),
             '{"op":"publish","topic":"/cmd_vel","msg":'
-            '{"linear":{"x":0.2,"y":0.0,"z":0.0},"angular":{"x":0.0,"y":0.0,"z":-1.5}}}',
+            '{"linear":{"x":0.2,"y":0.1,"z":0.0},"angular":{"x":0.0,"y":0.0,"z":-1.5}}}',
         ),
         (unadvertise(CMD), '{"op":"unadvertise","topic":"/cmd_vel"}'),
         (
@@ -133,12 +138,13 @@ def odometry(x=1.0, y=2.0, heading_rad=0.5, v=0.1, w=-0.2):
     half = heading_rad / 2
     turned = {"x": 0, "y": 0, "z": math.sin(half), "w": math.cos(half)}
     pose = {"position": {"x": x, "y": y, "z": 0}, "orientation": turned}
-    return {"pose": {"pose": pose}, "twist": {"twist": {"linear": {"x": v}, "angular": {"z": w}}}}
+    twist = {"linear": {"x": v, "y": 0.05}, "angular": {"z": w}}
+    return {"pose": {"pose": pose}, "twist": {"twist": twist}}
 
 
 def test_an_odometry_is_read():
     pose, twist = read_odometry(odometry())
-    assert (pose.x_m, pose.y_m, twist) == (1.0, 2.0, Twist(0.1, -0.2))
+    assert (pose.x_m, pose.y_m, twist) == (1.0, 2.0, Twist(0.1, -0.2, 0.05))
     assert pose.heading_rad == pytest.approx(0.5)
     assert isinstance(pose, Pose)
 
@@ -174,10 +180,49 @@ def test_an_orientation_of_length_0_is_none():
 
 @given(ANYTHING)
 def test_no_message_does_more_than_be_refused(message):
-    readers: list[Any] = [read_twist, read_odometry, read_hazards]
+    readers: list[Any] = [read_twist, read_odometry, read_hazards, read_joints, read_stamp_s]
     readers += [partial(read_event, kind) for kind in EVENTS]
     for read in readers:
         with suppress(BadRosFrame):
             read(message if isinstance(message, dict) else {"twist": message, "pose": message})
     with suppress(BadRosFrame):
         read_frame(json.dumps(message))
+
+
+ACTION = Topic("/head/follow_joint_trajectory", "control_msgs/action/FollowJointTrajectory")
+
+
+def test_a_goal_is_sent_and_canceled():
+    assert json.loads(to_text(send_goal(ACTION, {"trajectory": {}}, "garry_1"))) == {
+        "op": "send_action_goal",
+        "action": ACTION.name,
+        "action_type": ACTION.kind,
+        "args": {"trajectory": {}},
+        "feedback": False,
+        "id": "garry_1",
+    }
+    assert cancel_goal(ACTION, "garry_1") == {
+        "op": "cancel_action_goal",
+        "action": ACTION.name,
+        "id": "garry_1",
+    }
+
+
+@pytest.mark.parametrize(
+    ("told", "problem"),
+    [
+        ({"values": {"error_string": "there"}, "status": 4, "result": True}, ""),
+        ({"values": {"status": 4, "result": {}}, "result": True}, ""),  # of early 2024
+        ({"values": {"error_string": "no"}, "status": 6, "result": True}, "no"),
+        ({"values": {}, "status": 5, "result": True}, "it ended with the status 5"),
+        ({"values": {}, "result": True}, "it ended with the status None"),
+        ({"values": "Action goal was rejected", "status": 0, "result": False}, "rejected"),
+        ({"values": None}, "refused"),
+    ],
+)
+def test_the_end_of_a_goal_says_why_it_was_not_reached(told, problem):
+    frame = {"op": "action_result", "action": ACTION.name, "id": "garry_1"}
+    result = read_frame(json.dumps(frame | told))
+    assert isinstance(result, ActionResult)
+    assert (result.goal_id, problem in result.problem) == ("garry_1", True)
+    assert bool(result.problem) == bool(problem)

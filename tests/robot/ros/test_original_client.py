@@ -205,7 +205,7 @@ STAND = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.
 def odometry(speed):
     """Return a message of odometry at a speed [m/s]."""
     at = {"position": {"x": 0.0, "y": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
-    twist = {"linear": {"x": speed}, "angular": {"z": 0.0}}
+    twist = {"linear": {"x": speed, "y": 0.0}, "angular": {"z": 0.0}}
     return {"pose": {"pose": at}, "twist": {"twist": twist}}
 
 

@@ -27,6 +27,53 @@ def test_only_a_base_that_stops_by_itself_needs_no_relay():
     assert base_of("--own-timeout-s", "0.6")._client.topics.relay is None
 
 
+QUORI = ["--ros-robot", "quori", "--own-timeout-s", "0.25"]
+ARMS = ["--pose-rest=0,0,0,0,0", "--pose-glad=0.5,0,0.5,0,0", "--pose-sad=0,0,0,0,-0.3"]
+
+
+def test_a_stretch_and_a_quori_are_known_by_name():
+    stretch = base_of("--ros-robot", "stretch", "--ros-url", "ws://robot:9090")
+    assert stretch._client.topics == PROFILES["stretch"]
+    assert (stretch.abilities.answers, stretch.abilities.holonomic) == (True, False)
+    quori = base_of(*QUORI)
+    assert (quori.abilities.answers, quori.abilities.holonomic) == (False, True)
+    assert (
+        base_of(*QUORI, *ARMS)._client.topics.joints.names == PROFILES["quori"].joint_server.names
+    )
+
+
+def test_head_and_arms_of_a_known_robot_are_chosen():
+    words = ["--joints", "joint_wrist_yaw", "--pose-rest=0", "--pose-glad=1", "--pose-sad=0"]
+    joints = base_of("--ros-robot", "stretch", *words)._client.topics.joints
+    assert (joints.server, joints.names) == (PROFILES["stretch"].joint_server, ("joint_wrist_yaw",))
+    assert not base_of("--ros-robot", "stretch", "--joints-topic", "none").abilities.answers
+    action = "/arm/follow_joint_trajectory:control_msgs/action/FollowJointTrajectory"
+    words = ["--joints-topic", action, *words]
+    server = base_of("--ros-robot", "plain", *words)._client.topics.joints.server
+    assert (server.is_action, server.states, server.end_rad_s) == (True, None, 0.0)
+
+
+def test_any_base_has_a_button_that_stops_it():
+    base = base_of("--ros-robot", "plain", "--stop-topic", "/e_stop")
+    assert base._client.topics.sensors["stop_button"] == Topic("/e_stop", "std_msgs/Bool")
+    assert not base.abilities.bumpers
+
+
+@pytest.mark.parametrize(
+    ("words", "cure"),
+    [
+        (["--ros-robot", "quori"], "--own-timeout-s: a quori takes orders of one program alone"),
+        (["--ros-robot", "stretch", "--joints", "joint_lift"], "--joints: name some of"),
+        ([*QUORI, *ARMS, "--joints", "waist_pitch"], "--joints: name all of r_shoulder_pitch"),
+        (["--ros-robot", "stretch", "--pose-glad=0"], "--pose-rest: write an angle"),
+        ([*QUORI, "--joints", "waist_pitch"], "--joints: name all of"),
+    ],
+)
+def test_what_a_known_robot_does_not_take(words, cure):
+    with pytest.raises(BadOption, match=cure):
+        base_of(*words)
+
+
 @pytest.mark.parametrize(
     ("words", "cure"),
     [

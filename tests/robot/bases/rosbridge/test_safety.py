@@ -94,7 +94,7 @@ def test_odometry_that_jumps_stops_it(stage):
 
 def test_another_program_that_drives_it_stops_it(stage):
     stage.begin_moving()
-    stage.bridge.graph.publish(CMD.name, {"linear": {"x": 0.3}, "angular": {"z": 0.0}})
+    stage.bridge.graph.publish(CMD.name, {"linear": {"x": 0.3, "y": 0.0}, "angular": {"z": 0.0}})
     stage.wait(0.04)
     assert stage.of("stop")[0]["reason"] == "other_driver"
     assert stage.base.counters["foreign"] == 1
@@ -102,7 +102,7 @@ def test_another_program_that_drives_it_stops_it(stage):
 
 def test_another_program_that_holds_it_still_is_welcome(stage):
     stage.begin_moving()
-    stage.bridge.graph.publish(CMD.name, {"linear": {"x": 0.0}, "angular": {"z": 0.0}})
+    stage.bridge.graph.publish(CMD.name, {"linear": {"x": 0.0, "y": 0.0}, "angular": {"z": 0.0}})
     stage.wait(0.04)
     assert not stage.of("stop")
 
@@ -113,7 +113,7 @@ messages = st.one_of(
     st.fixed_dictionaries({"linear": ANYTHING, "angular": ANYTHING}),
     st.fixed_dictionaries(
         {
-            "linear": st.fixed_dictionaries({"x": ANYTHING}),
+            "linear": st.fixed_dictionaries({"x": ANYTHING, "y": ANYTHING}),
             "angular": st.fixed_dictionaries({"z": ANYTHING}),
         }
     ),

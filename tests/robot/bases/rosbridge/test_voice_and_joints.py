@@ -7,7 +7,9 @@ from typing import Any
 import pytest
 
 from robot.bases import Answer, BadOption
-from robot.bases.rosbridge.voice_and_joints import FASTEST_RAD_S, HOLD, LONGEST_S, Joints, Voice
+from robot.bases.rosbridge.joint_mover import HOLD
+from robot.bases.rosbridge.joints import FASTEST_RAD_S, LONGEST_S, Joints, JointServer
+from robot.bases.rosbridge.voice_and_joints import Voice
 from robot.ros.frames import Topic
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import CLOSED, Stage, base_of
@@ -15,7 +17,7 @@ from tests.support.rosbridge_stage import CLOSED, Stage, base_of
 SPEECH = Topic("/speech", "std_msgs/String")
 HEAD = Topic("/head_controller/command", "trajectory_msgs/JointTrajectory")
 VOICE = Voice(SPEECH, "Well done!", "Next time.")
-JOINTS = Joints(HEAD, ("pan", "tilt"), (0.0, 0.0), (0.0, -0.3), (0.2, 0.4))
+JOINTS = Joints(JointServer(HEAD), ("pan", "tilt"), (0.0, 0.0), (0.0, -0.3), (0.2, 0.4))
 REST = [0.0, 0.0]
 
 
