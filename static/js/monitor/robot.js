@@ -3,7 +3,14 @@
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { RobotPlacing } from "garry/monitor/robot_placing";
-import { cureOf, describeDecision, describeGesture, describeReason, describeState } from "garry/monitor/robot_text";
+import {
+  cureOf,
+  describeDecision,
+  describeGesture,
+  describeHoming,
+  describeReason,
+  describeState,
+} from "garry/monitor/robot_text";
 import { RobotScene } from "garry/shared/robot_scene";
 
 const KEPT_POSES = 240;
@@ -167,7 +174,8 @@ export class RobotPanel {
     show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
     this.#button("stop").classList.toggle("done", this.#isStopped);
     this.#button("arm").hidden = !this.#isHeld;
-    this.#placing.show(this.#isPlaceable);
+    this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
+    show("robot-homing", this.#describeHoming());
     this.#scene.draw({
       poses: this.#trail,
       lights: this.#status?.lights,
@@ -183,8 +191,17 @@ export class RobotPanel {
 
   // Whether a person may drive it to its mark: a real one that may move, while nobody walks.
   get #isPlaceable() {
-    const isReal = this.#status?.simulated === false;
-    return this.#isConnected && isReal && !this.#isHeld && this.#page.state.session?.state !== "running";
+    const { simulated, state } = this.#status ?? {};
+    const isFree = this.#isConnected && simulated === false && !this.#isStopped;
+    const isReady = isFree && (state === "away" || !this.#isHeld);
+    return isReady && this.#page.state.session?.state !== "running";
+  }
+
+  // How its way home by a tag goes, or ended.
+  #describeHoming() {
+    const { homing, state } = this.#status ?? {};
+    const isTold = homing === "there" ? state === "disarmed" : this.#isPlaceable;
+    return homing && isTold ? describeHoming(homing) : "";
   }
 
   // Whether it is simulated and stopped itself: it is put back by itself in a moment.
