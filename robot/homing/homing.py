@@ -42,7 +42,7 @@ from robot.motion.twist import STILL, Twist
 # a look errs by there (1 cm and 1°: tests/bench/test_tag_home.py).
 THERE_M, THERE_RAD = 0.01, math.radians(1.0)
 # Standard errors of the last look, as its corners allow: half of what is left of those 2 cm and 2°.
-SURE_M, SURE_RAD = 0.005, math.radians(0.5)
+SURE_M, SURE_RAD = 0.006, math.radians(0.5)
 # At the speeds of a manual drive (robot/behavior/manual_drive.py), and a gesture's ramps.
 LIMITS = Limits(v_m_s=0.1, w_rad_s=0.5)
 LOOKS = 8  # ways that it tries; three are enough in nine of ten (the same place)
@@ -55,7 +55,7 @@ SEARCH_RAD = math.radians(30.0)
 # [m, and m for each m of way, and of distance to the tag; rad]. More is a tag that was moved or is
 # not of its size, or a wheel that slipped. (Ours: twice the largest that was measured with a right
 # tag, the same place.)
-DOUBT_M, DOUBT_M_M, DOUBT_RAD = 0.03, 0.04, math.radians(3.0)
+DOUBT_M, DOUBT_M_M, DOUBT_RAD = 0.02, 0.02, math.radians(3.0)
 # At rest its wheels are slower than this [m/s] (a tick of the encoder every 20 ms is 4 mm/s).
 RESTS_M_S = 0.005
 
@@ -95,6 +95,8 @@ class Homing:
     ----------
     code
         What it does, or why it stands, as a code; empty before it was ordered.
+    has_given_up
+        Whether it stands until the button is let go.
     """
 
     def __init__(self, view: HomeView, eye: Eye, response: Response) -> None:
@@ -108,7 +110,7 @@ class Homing:
         """Forget the way: the button was let go, or something stopped it. What it came to stays."""
         if self.code in (LOOKING, DRIVING, SEARCHING):
             self.code = ""
-        self._has_given_up = False
+        self.has_given_up = False
         self._look: Look | None = None
         self._way: deque[Segment] = deque()
         self._seen: _Seen | None = None
@@ -120,7 +122,7 @@ class Homing:
     @property
     def is_home(self) -> bool:
         """Whether it has come home while the button was held."""
-        return self._has_given_up and self.code == THERE
+        return self.has_given_up and self.code == THERE
 
     def answered(self, now_s: float) -> Twist:
         """Return the order that the base should follow now, given how late it answers."""
@@ -157,7 +159,7 @@ class Homing:
 
     def _wanted(self, now_s: float, pose: Pose, twist: Twist) -> Twist:
         sightings = self._eye.take()
-        if self._has_given_up:
+        if self.has_given_up:
             return STILL
         ahead = self._in_flight.predict(pose, now_s)
         while self._way:
@@ -248,7 +250,7 @@ class Homing:
         return off_m > DOUBT_M + DOUBT_M_M * (self._rolled_m + away_m)
 
     def _give_up(self, code: str) -> None:
-        self.code, self._has_given_up = code, True
+        self.code, self.has_given_up = code, True
 
 
 def _home_of(here: Pose, from_home: Pose) -> Pose:

@@ -86,7 +86,7 @@ class Look:
         if self._problem == TWO_TAGS:
             return TWO_TAGS
         if now_s - max(self._newest_s, self._from_s + LATENCY_S) > FRESH_S:
-            return CAMERA_SILENT
+            return CAMERA_SLOW if self._frames else CAMERA_SILENT
         if self._problem:
             return self._problem
         if self.is_whole and self._strays_px > STRAYS_PX:

@@ -28,7 +28,7 @@ Matrix = npt.NDArray[np.float64]
 
 # Corners err by this much [px], in each direction: the mean of some frames at one place, measured
 # on rendered pictures with noise and blur (tests/bench/test_tag_home.py).
-CORNER_PX = 0.15
+CORNER_PX = 0.2
 # A base on a floor tips and rises by no more than this [rad; m, and m for each m of way], with a
 # mount that is known to some degrees. More than three times as much is another tag, or another
 # mount. (Ours.)

@@ -6,15 +6,22 @@ import math
 import random
 from collections import deque
 from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robot.bases.kinematic import KinematicBase
+from robot.bases import Abilities
+from robot.bases.kinematic import Imperfections
+from robot.behavior.performer import Performer
 from robot.homing.home_view import Carried, HomeView, Lens, Mount
+from robot.homing.homing import Homing
 from robot.homing.sighting import Corners, Sighting
 from robot.homing.tag_pose import Matrix, mount_matrix
+from robot.motion.base_response import Response
 from robot.motion.pose import HOME, Pose
+from tests.support.gesture_runs import OrdinaryBase
+from tests.support.robot_stage import WELCOME, Stage
 
 LENS = Lens(640, 480, math.radians(62.0))
 SIZE_M = 0.16
@@ -23,7 +30,7 @@ FARTHEST_M, MOST_OBLIQUE_RAD, MARGIN_PX = 3.0, math.radians(65.0), 4.0
 AHEAD = Mount(0.1)
 # Its corners stray by so much from frame to frame, and stand off by so much at a place [px]: what
 # was measured of rendered pictures with noise (the same place), rounded up.
-STRAY_PX, OFF_PX = 0.1, 0.15
+STRAY_PX, OFF_PX = 0.1, 0.2
 
 
 def thing(x_m: float, y_m: float, z_m: float, turned_deg: float, carried: Carried) -> Matrix:
@@ -64,7 +71,7 @@ class TagRoom:
     ) -> None:
         self.carried, self.mount, self.size_m = carried, mount, size_m
         # The tag beside the treadmill, 0.9 m from home, turned away from its line of sight by 30°.
-        self.fixed = thing(0.95, 0.25, 0.25, -135.0, carried) if fixed is None else fixed
+        self.fixed = thing(0.95, 0.25, 0.27, -135.0, carried) if fixed is None else fixed
         self._on_base = mount_matrix(mount, carried)
         self._on_base[2, 3] = 0.25
 
@@ -106,8 +113,19 @@ class TagRoom:
         return found if (found > low).all() and (found < high).all() else None
 
 
+class MovedBase(OrdinaryBase):
+    """A real base that was moved: nobody knows where it is."""
+
+    name: ClassVar[str] = "moved"
+    abilities = Abilities(simulated=False, moves=True)
+
+    def put(self, pose: Pose) -> None:
+        """Put it somewhere, seen from home."""
+        self._truth = pose
+
+
 class SimulatedEye:
-    """A camera and a detector: 12 frames a second, 50 to 150 ms late.
+    """A camera and a detector: 12 frames a second, 50 to 150 ms late, with noise.
 
     Parameters
     ----------
@@ -123,44 +141,54 @@ class SimulatedEye:
     Attributes
     ----------
     see
-        Returns the tags of a frame, given the true pose: those of the room, with noise. A test may
-        replace it.
+        Returns the tags of a frame from a true pose. A test may replace it.
+    every_s
+        Between two frames, on average [s].
+    problem
+        Of each frame.
+    is_silent
+        Whether no frames come.
+    late_s
+        How much later than that they come, with an old stamp [s].
+    watched
+        How often it was asked to look.
     """
 
     def __init__(
         self,
         room: TagRoom,
-        base: KinematicBase,
+        base: MovedBase,
         monotonic: Callable[[], float],
         chance: random.Random,
     ) -> None:
-        self._room, self._base, self._monotonic, self.chance = room, base, monotonic, chance
+        self._room, self._base, self._monotonic, self._chance = room, base, monotonic, chance
         self._noise = np.random.default_rng(chance.getrandbits(32))
         self._next_s = -math.inf
-        self._coming: deque[Sighting] = deque()
+        self._coming: deque[tuple[float, Sighting]] = deque()
         self._off_px: Matrix = np.zeros((4, 2))
-        self._stands_at = HOME
+        self._stood = HOME
         self.see: Callable[[Pose], list[tuple[int, Corners]]] = self.tags
-        self.every_s, self.problem, self.is_silent, self.watched = 1 / 12, "", False, 0
+        self.every_s, self.late_s = 1 / 12, 0.0
+        self.problem, self.is_silent, self.watched = "", False, 0
 
     def watch(self, now_s: float) -> None:
-        """Take frames up to now, as if the room was looked at since the last call."""
+        """Take a frame, where it is time for one."""
         self.watched += 1
         if now_s < self._next_s:
             return
-        self._next_s = max(self._next_s, now_s) + self.every_s * self.chance.uniform(0.8, 1.2)
-        if self.is_silent:
-            return
-        tags = () if self.problem else tuple(self.see(self._base.ground_truth().pose))
-        late_s = self.chance.uniform(0.05, 0.15)
-        size_px = LENS.width_px, LENS.height_px
-        self._coming.append(Sighting(now_s + late_s, tags, size_px, self.problem))
+        self._next_s = max(self._next_s, now_s) + self.every_s * self._chance.uniform(0.8, 1.2)
+        if not self.is_silent:
+            tags = () if self.problem else tuple(self.see(self._base.ground_truth().pose))
+            comes_s = now_s + self._chance.uniform(0.05, 0.15)
+            size_px = LENS.width_px, LENS.height_px
+            frame = Sighting(comes_s, tags, size_px, self.problem)
+            self._coming.append((comes_s + self.late_s, frame))
 
     def take(self) -> list[Sighting]:
         """Return the frames that have come since the last call."""
-        now_s, came = self._monotonic(), list[Sighting]()
-        while self._coming and self._coming[0].at_s <= now_s:
-            came.append(self._coming.popleft())
+        came = list[Sighting]()
+        while self._coming and self._coming[0][0] <= self._monotonic():
+            came.append(self._coming.popleft()[1])
         return came
 
     def tags(self, pose: Pose, number: int = 7) -> list[tuple[int, Corners]]:
@@ -168,8 +196,86 @@ class SimulatedEye:
         corners = self._room.corners(pose)
         if corners is None:
             return []
-        if pose.distance_m(self._stands_at) > 0.002 or pose.turn_rad(self._stands_at) > 0.002:
-            self._stands_at = pose
-            self._off_px = self._noise.normal(0.0, OFF_PX, (4, 2))
+        if pose.distance_m(self._stood) > 0.002 or pose.turn_rad(self._stood) > 0.002:
+            self._stood, self._off_px = pose, self._noise.normal(0.0, OFF_PX, (4, 2))
         corners = corners + self._off_px + self._noise.normal(0.0, STRAY_PX, (4, 2))
         return [(number, tuple((float(x), float(y)) for x, y in corners))]
+
+
+class HomingStage(Stage):
+    """A real base that was moved, armed, whose session does not run, with a tag to find home by.
+
+    Parameters
+    ----------
+    moved
+        Where it is, seen from home.
+    seed
+        Of the base's faults, and of the camera's noise.
+    room
+        Where it is.
+    """
+
+    def __init__(self, moved: Pose, seed: int = 1, room: TagRoom | None = None) -> None:
+        chance = random.Random(seed)
+        faults = Imperfections(
+            chance.uniform(0.08, 0.25),
+            chance.uniform(0.02, 0.06),
+            left_scale=1 - chance.uniform(0.0, 0.02),
+            drift_deg_min=3.0,
+        )
+        super().__init__(lambda monotonic: MovedBase(monotonic, faults))
+        self.room = room or TagRoom()
+        self.base: MovedBase
+        self.base.response = Response()  # nobody has measured it
+        self.eye = SimulatedEye(self.room, self.base, lambda: self.now_s, chance)
+        homing = Homing(self.room.view(), self.eye, self.base.response)
+        self.robot = Performer(self.base, homing=homing)
+        self.ordered: list[Any] = []
+        self.hear(**WELCOME | {"state": "paused"})
+        self.hear(type="arm")
+        self.wait(0.1)
+        self.base.put(moved)
+
+    @property
+    def code(self) -> str:
+        """How its way home goes, or ended."""
+        assert self.robot.body.homing is not None
+        return self.robot.body.homing.code
+
+    @property
+    def truth(self) -> Pose:
+        """Where it is."""
+        return self.base.ground_truth().pose
+
+    def hold(self, for_s: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Hold the button that drives it home: an order every 0.1 s."""
+        for _ in range(round(for_s / 0.1)):
+            if until():
+                return
+            self.hear(type="drive", ahead=0, left=0, home=True)
+            for _ in range(5):
+                self.wait(0.02)
+                self.ordered.append(self.robot.body.ordered)
+
+    def go_home(self, within_s: float = 120.0) -> str:
+        """Hold the button until it is home or gives up, and return which."""
+        self.hold(0.1)
+        homing = self.robot.body.homing
+        assert homing is not None
+        self.hold(within_s, lambda: homing.is_home or homing.has_given_up or self.is_disarmed)
+        return self.code
+
+    @property
+    def is_disarmed(self) -> bool:
+        """Whether a person has to arm it."""
+        return not self.robot.body.safety.is_armed
+
+
+def find_start(room: TagRoom, chance: random.Random) -> Pose:
+    """Return a place 0.3 to 1.5 m from home where its tag is found in some direction."""
+    while True:
+        away_m, at_rad = chance.uniform(0.3, 1.5), chance.uniform(-math.pi, math.pi)
+        x_m, y_m = away_m * math.cos(at_rad), away_m * math.sin(at_rad)
+        headings = [math.radians(10 * step) for step in range(36)]
+        if any(room.corners(Pose(x_m, y_m, heading)) is not None for heading in headings):
+            return Pose(x_m, y_m, chance.uniform(-math.pi, math.pi))
