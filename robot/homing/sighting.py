@@ -51,15 +51,11 @@ def read_sighting(line: str) -> Sighting:
         at_s, tags, (width, height), problem = json.loads(line)
         return Sighting(
             _number(at_s, math.inf),
-            tuple(
-                (int(tag), tuple((_pixel(x), _pixel(y)) for x, y in corners))
-                for tag, corners in tags
-                if len(corners) == 4
-            ),
+            tuple((int(tag), _read_corners(corners)) for tag, corners in tags),
             (int(width), int(height)),
             str(problem),
         )
-    except (TypeError, OverflowError, RecursionError) as problem:
+    except (TypeError, ValueError, OverflowError, RecursionError) as problem:
         raise ValueError(f"no sighting: {problem}") from None
 
 
@@ -70,5 +66,7 @@ def _number(value: Any, most: float) -> float:
     return number
 
 
-def _pixel(value: Any) -> float:
-    return _number(value, FARTHEST_PX)
+def _read_corners(corners: Any) -> Corners:
+    first, second, third, fourth = corners
+    four = (first, second, third, fourth)
+    return tuple((_number(x, FARTHEST_PX), _number(y, FARTHEST_PX)) for x, y in four)

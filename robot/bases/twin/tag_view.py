@@ -21,7 +21,7 @@ from robot.motion.pose import Pose
 LENS = Lens(640, 480, math.radians(62.0))
 MOUNT, HEIGHT_M = Mount(0.1), 0.25
 SIZE_M = 0.16
-# Where the tag hangs: its middle [m], and which way its face looks [rad]; as docs/robot.md asks for.
+# Where the tag hangs, as docs/robot.md asks for: its middle [m], and which way its face looks.
 PLACE_M, FACES_RAD = (0.95, 0.25, 0.27), math.radians(-135.0)
 FINER = 2  # drawn so much finer, and averaged: pybullet has no smooth edges
 PIXELS = 24  # of the texture, for each module
@@ -64,9 +64,7 @@ class TagView:
         """Return what the camera sees from a pose of its base, in gray."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         eye = (pose.x_m + MOUNT.ahead_m * cos, pose.y_m + MOUNT.ahead_m * sin, HEIGHT_M)
-        view = self._world.computeViewMatrix(
-            eye, (eye[0] + cos, eye[1] + sin, HEIGHT_M), (0, 0, 1)
-        )
+        view = self._world.computeViewMatrix(eye, (eye[0] + cos, eye[1] + sin, HEIGHT_M), (0, 0, 1))
         width, height = FINER * LENS.width_px, FINER * LENS.height_px
         drawn = self._world.getCameraImage(
             width,
