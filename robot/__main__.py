@@ -125,7 +125,7 @@ def open_homing(base: MobileBase, opened: contextlib.ExitStack) -> Homing | None
     Its camera's process is ended with ``opened``. Raises BadCalibration.
     """
     view = find_home_view(base)
-    if view is None:
+    if view is None or not base.abilities.closed_loop:
         return None
     if find_spec("cv2") is None:
         print_notice(

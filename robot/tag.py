@@ -143,6 +143,8 @@ def describe(sighting: Sighting, now_s: float, size_m: float, field_deg: float) 
         yield f"no tag; {lens.width_px} × {lens.height_px}, {age}"
     for number, corners in sighting.tags:
         solutions = solve_tag(np.array(corners), size_m, lens)
+        if not solutions:
+            continue
         x_m, _, z_m = solutions[0].place_m.tolist()
         turned_deg = math.degrees(math.acos(min(1.0, abs(float(solutions[0].tag[2, 2])))))
         doubt = "" if is_clear(solutions) else " (or the other way)"

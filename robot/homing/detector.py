@@ -32,7 +32,8 @@ def make_detector() -> cv2.aruco.ArucoDetector:
 
 def find_tags(detector: cv2.aruco.ArucoDetector, picture: Picture) -> list[tuple[int, Corners]]:
     """Return the number and corners [px] of each tag in a picture."""
-    corners, numbers, _ = detector.detectMarkers(picture)
+    detected: Any = detector.detectMarkers(picture)
+    corners, numbers, _ = detected
     found: list[tuple[int, Corners]] = []
     for quad, number in zip(corners, () if numbers is None else numbers.ravel(), strict=True):
         points = quad.reshape(4, 2).tolist()

@@ -43,6 +43,8 @@ from robot.motion.twist import STILL, Twist
 THERE_M, THERE_RAD = 0.01, math.radians(1.0)
 # Standard errors of the last look, as its corners allow: half of what is left of those 2 cm and 2°.
 SURE_M, SURE_RAD = 0.006, math.radians(0.5)
+# A look that errs by more than this [m] is no reason to drive anywhere. (Ours: the box has room.)
+ROUGH_M = 0.4
 # At the speeds of a manual drive (robot/behavior/manual_drive.py), and a gesture's ramps.
 LIMITS = Limits(v_m_s=0.1, w_rad_s=0.5)
 LOOKS = 8  # ways that it tries; three are enough in nine of ten (the same place)
@@ -218,7 +220,9 @@ class Homing:
             return
         away_m, turned_rad = found.pose.distance_m(HOME), found.pose.turn_rad(HOME)
         self._looks += 1
-        if away_m <= THERE_M and turned_rad <= THERE_RAD:
+        if found.error_m > ROUGH_M:
+            self._give_up(UNSURE)
+        elif away_m <= THERE_M and turned_rad <= THERE_RAD:
             is_sure = found.error_m <= SURE_M and found.error_rad <= SURE_RAD
             self._give_up(THERE if is_sure else UNSURE)
         elif away_m > FARTHEST_M or self._looks > LOOKS:

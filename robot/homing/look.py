@@ -19,8 +19,8 @@ from robot.homing.codes import (
 from robot.homing.sighting import Sighting
 from robot.homing.tag_pose import Matrix
 
-# A camera delivers a frame at most so late [s]: what it took before the base stood is left out.
-# (Three reports of USB cameras: docs/reference/kobuki.md#cameras-and-tags; half as much again.)
+# A camera delivers a frame at most so late [s] (docs/reference/kobuki.md#cameras-and-tags): what it
+# took before the base stood is left out.
 LATENCY_S = 0.25
 # A frame older than this [s] moves nothing, and its camera counts as silent.
 FRESH_S = 0.5
@@ -63,7 +63,7 @@ class Look:
 
     def add(self, sighting: Sighting) -> None:
         """Add a frame; one from before the base stood does not count."""
-        if sighting.at_s < self._from_s + LATENCY_S:
+        if sighting.at_s < self._from_s + LATENCY_S or self._problem == TWO_TAGS:
             return
         self._newest_s = sighting.at_s
         self._problem = sighting.problem

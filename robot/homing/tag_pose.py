@@ -8,7 +8,7 @@ used as a place to look again from. How surely the corners tell the pose follows
 
 A tag's x is to the right and its y down, as printed; its z points into the sheet. So one that is
 seen from the front is not turned. (SOLVEPNP_IPPE_SQUARE has y up: half a turn away, where IPPE's
-rotation vectors are wrong, off by 69 px with OpenCV 4.14 and 5.0.)
+rotation vectors are wrong: docs/reference/kobuki.md#cameras-and-tags.)
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class _Fit:
 
 
 def solve_tag(corners_px: Matrix, size_m: float, lens: Lens) -> list[Solution]:
-    """Return the one or two poses of a tag, the better first.
+    """Return the one or two poses of a tag, the better first; none where they are of no square.
 
     Parameters
     ----------
@@ -98,15 +98,22 @@ def solve_tag(corners_px: Matrix, size_m: float, lens: Lens) -> list[Solution]:
     lens
         Of the camera.
     """
-    _, turns, places, misfits = cv2.solvePnPGeneric(
-        _square(size_m),
-        corners_px.astype(np.float64),
-        _camera_matrix(lens),
-        None,
-        flags=cv2.SOLVEPNP_IPPE,
-    )
+    try:
+        _, turns, places, misfits = cv2.solvePnPGeneric(
+            _square(size_m),
+            corners_px.astype(np.float64),
+            _camera_matrix(lens),
+            None,
+            flags=cv2.SOLVEPNP_IPPE,
+        )
+    except cv2.error:  # corners on one line, or all in one place
+        return []
     solutions = [
-        Solution(turn.ravel(), place.ravel(), float(misfit.item()))
+        Solution(
+            np.asarray(turn.ravel(), np.float64),
+            np.asarray(place.ravel(), np.float64),
+            float(misfit.item()),
+        )
         for turn, place, misfit in zip(turns, places, misfits, strict=True)
         if np.isfinite(turn).all() and np.isfinite(place).all() and place[2, 0] > 0
     ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import random
 from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ class Pictures:
         self._view, self._detector = view, make_detector()
         self._noise = np.random.default_rng(seed)
         self._last = self._stood = HOME
-        self._picture = None
+        self._picture: Any = None
 
     def see(self, pose):
         """Return the tags of a picture from a pose."""
@@ -82,7 +83,7 @@ def test_corners_in_pictures(view):
 
 def test_it_comes_home(view):
     """From many places, with the whole robot's program: how near, how long, how many looks."""
-    room, chance, rows, ends = TagRoom(), random.Random(36), [], Counter()
+    room, chance, rows, ends = TagRoom(), random.Random(36), [], Counter[str]()
     for number in range(PLACES):
         moved = find_start(room, chance)
         stage = HomingStage(moved, seed=number, room=room)

@@ -175,7 +175,7 @@ export class RobotPanel {
     this.#button("stop").classList.toggle("done", this.#isStopped);
     this.#button("arm").hidden = !this.#isHeld;
     this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
-    show("robot-homing", this.#describeHoming());
+    show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
     this.#scene.draw({
       poses: this.#trail,
       lights: this.#status?.lights,
@@ -197,11 +197,10 @@ export class RobotPanel {
     return isReady && this.#page.state.session?.state !== "running";
   }
 
-  // How its way home by a tag goes, or ended.
-  #describeHoming() {
+  // Whether it drove home by its tag, and waits for a person to look.
+  get #isBack() {
     const { homing, state } = this.#status ?? {};
-    const isTold = homing === "there" ? state === "disarmed" : this.#isPlaceable;
-    return homing && isTold ? describeHoming(homing) : "";
+    return this.#isConnected && !this.#isStopped && homing === "there" && state === "disarmed";
   }
 
   // Whether it is simulated and stopped itself: it is put back by itself in a moment.
@@ -228,11 +227,13 @@ export class RobotPanel {
 
   #describeHold() {
     const reason = this.#isConnected && this.#status?.reason;
+    if (this.#isBack) return describeHoming("there");
     if (this.#isHeld) return fill(_("It is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
     return NOTABLE.has(reason) ? fill(_("It will not move: %(why)s."), { why: describeReason(reason) }) : "";
   }
 
   #describeCure() {
+    if (this.#isBack) return this.#describeBattery();
     const parts = [cureOf(this.#isHeld ? this.#stopReason : this.#status?.reason), this.#describeBattery()];
     if (this.#isHeld) parts.push(_("Put it on its mark, nobody near it, then:"));
     return parts.filter(Boolean).join(" ");

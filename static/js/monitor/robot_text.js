@@ -124,7 +124,7 @@ const STATES = {
 
 export const describeReason = (reason) => REASONS[reason] ?? reason;
 export const cureOf = (reason) => CURES[reason] ?? "";
-export const describeHoming = (code) => HOMING[code] ?? code;
+export const describeHoming = (code) => (code ? (HOMING[code] ?? code) : "");
 // The name of a variant ends with its number; a clinic's own gesture has the name that they gave it.
 export const describeGesture = (name) => GESTURES[name.replace(/_\d+$/, "")] ?? name;
 export const describeState = (state) => STATES[state] ?? state;

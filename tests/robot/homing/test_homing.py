@@ -111,10 +111,12 @@ def test_it_stands_where_its_camera_is_of_no_use_and_goes_on_when_it_is(fault, c
     assert stage.go_home() == "there"
 
 
-def test_a_camera_with_other_frames_than_home_was_learned_with_moves_nothing():
+def test_a_camera_with_other_frames_than_home_was_learned_with_moves_nothing(monkeypatch):
     stage = HomingStage(BESIDE)
     take = stage.eye.take
-    stage.eye.take = lambda: [replace(seen, size_px=(1280, 720)) for seen in take()]
+    monkeypatch.setattr(
+        stage.eye, "take", lambda: [replace(seen, size_px=(1280, 720)) for seen in take()]
+    )
     stage.hold(4.0)
     assert stage.code == "camera_changed"
     assert_still(stage, BESIDE)
@@ -208,10 +210,10 @@ def test_too_far_away_it_is_to_be_carried():
     "hazard",
     ["bump", "cliff", "wheel_drop", "button", "stop", "pause_ends", "silence", "unwatched"],
 )
-def test_what_stops_a_manual_drive_stops_it(hazard):
+def test_what_stops_a_manual_drive_stops_it(hazard, monkeypatch):
     stage = HomingStage(BESIDE)
     stage.hold(4.0)
-    assert not stage.robot.body.ordered.is_still
+    assert not stage.ordered[-1].is_still
     read = stage.base.read
     if hazard == "stop":
         stage.hear(type="stop")
@@ -225,7 +227,7 @@ def test_what_stops_a_manual_drive_stops_it(hazard):
         felt = SensorState(stop_pressed=True)
         if hazard != "button":
             felt = SensorState(hazards=frozenset({hazard}))
-        stage.base.read = lambda: replace(read(), sensors=felt)
+        monkeypatch.setattr(stage.base, "read", lambda: replace(read(), sensors=felt))
     stage.wait(0.02 if hazard != "silence" else HOLDS_S + 0.04)
     assert stage.robot.body.ordered.is_still
     stage.wait(0.5)
