@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -26,8 +26,8 @@ REAL = STATUS | {"base": "kobuki", "state": "idle", "gesture": None, "simulated"
 @contextmanager
 def driven(
     server: Server, walk: Walk, status: Message = REAL, ways: tuple[str, ...] = ("ahead", "left")
-) -> Iterator[list[tuple[Any, ...]]]:
-    """Give what a real robot that is armed hears of driving."""
+) -> Iterator[tuple[list[tuple[Any, ...]], Callable[[Message], None]]]:
+    """Give what a real robot that is armed hears of driving, and how it reports a status."""
     heard: list[tuple[Any, ...]] = []
 
     def listen() -> None:
@@ -41,14 +41,14 @@ def driven(
         thread = threading.Thread(target=listen)
         thread.start()
         robot.send(json.dumps({"type": "report", "report": status}))
-        yield heard
+        yield heard, lambda more: robot.send(json.dumps({"type": "report", "report": more}))
         robot.close()
         thread.join()
 
 
 def test_it_drives_while_the_button_is_held_and_stands_when_it_is_let_go(server, visit):
     (walk,) = make_walks(server, {"valence": "positive"})
-    with driven(server, walk) as heard:
+    with driven(server, walk) as (heard, _):
         page = visit(walk.monitor_path, walk, "laptop")
         ahead, left = page.locator("[data-drive='1 0']"), page.locator("[data-drive='0 1']")
         expect(ahead).to_be_visible()
@@ -75,7 +75,7 @@ def test_it_drives_while_the_button_is_held_and_stands_when_it_is_let_go(server,
 def test_one_that_has_learned_a_tag_drives_home_while_its_button_is_held(server, visit):
     (walk,) = make_walks(server, {"valence": "positive"})
     knows = REAL | {"state": "away", "reason": "away_from_home", "homing": "no_tag"}
-    with driven(server, walk, knows, ("home",)) as heard:
+    with driven(server, walk, knows, ("home",)) as (heard, told):
         page = visit(walk.monitor_path, walk, "laptop")
         home = page.locator("[data-home]")
         expect(home).to_be_visible()
@@ -83,6 +83,10 @@ def test_one_that_has_learned_a_tag_drives_home_while_its_button_is_held(server,
         home.hover()
         page.mouse.down()
         wait_until(lambda: heard.count((True,)) >= 4)
+        place = home.bounding_box()
+        told(knows | {"state": "idle", "reason": "not_running", "homing": "driving"})
+        expect(page.locator("[data-show='robot-homing']")).to_contain_text("drives to its mark")
+        assert home.bounding_box() == place  # it stays under the finger
         page.mouse.up()
         wait_until(lambda: heard[-1] == (False,))
 

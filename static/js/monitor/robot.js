@@ -159,8 +159,23 @@ export class RobotPanel {
 
   draw() {
     const { show } = this.#page;
-    const share = this.#decision?.activated_share;
     show("robot-state", this.#describeState());
+    show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
+    this.#button("stop").classList.toggle("done", this.#isStopped);
+    this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
+    show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
+    if (!this.#placing.isHeld) this.#drawWords(); // a button that is held stays under its finger
+    this.#scene.draw({
+      poses: this.#trail,
+      lights: this.#status?.lights,
+      mood: this.#status?.mood,
+      look: this.#status?.look,
+    });
+  }
+
+  #drawWords() {
+    const { show } = this.#page;
+    const share = this.#decision?.activated_share;
     const isOther = this.#isHeld || this.#orderFailure; // than what it decides
     show(
       "share",
@@ -171,17 +186,7 @@ export class RobotPanel {
     show("robot-last", isOther ? "" : describeDecision(this.#decision, this.#breakReason));
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
-    show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
-    this.#button("stop").classList.toggle("done", this.#isStopped);
     this.#button("arm").hidden = !this.#isHeld;
-    this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
-    show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
-    this.#scene.draw({
-      poses: this.#trail,
-      lights: this.#status?.lights,
-      mood: this.#status?.mood,
-      look: this.#status?.look,
-    });
   }
 
   #enlarge(button) {

@@ -35,6 +35,10 @@ export class RobotPlacing {
     this.#root.querySelector("[data-home]").hidden = !knowsHome;
   }
 
+  get isHeld() {
+    return this.#timer !== 0;
+  }
+
   #hold(order) {
     clearInterval(this.#timer);
     this.#drive(order);
