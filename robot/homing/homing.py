@@ -194,7 +194,7 @@ class Homing:
             self._give_up(problem)
         elif self._look.is_whole:
             self._go_on(pose, self._look.corners_px)
-        elif self._look.has_frames:
+        elif self._look.has_frames and self.code not in CAMERA_CODES:
             self.code = SEARCHING if self._searched_rad else LOOKING
 
     def _search(self, pose: Pose) -> None:

@@ -1,15 +1,21 @@
 """`python -m robot tag`: prints a tag, says what is seen, and learns home."""
 
 import math
+import threading
+from dataclasses import replace
 
 import pytest
 
 pytest.importorskip("cv2", reason="pip install garry[tag]")
 
+from robot.bases import BASES
+from robot.calibration import store_home_view
+from robot.doctor import try_cameras
 from robot.homing.home_view import Carried
 from robot.homing.sighting import Sighting
 from robot.motion.pose import HOME
 from robot.tag import NotLearned, describe, fit_field_deg, learn, main, make_parser
+from tests.support.tag_pictures import picture_of, show
 from tests.support.tag_room import LENS, SIZE_M, HomingStage, TagRoom, thing
 
 LEARN = ["learn", "--base", "kobuki", "--field-deg", "62", "--ahead-mm", "100"]
@@ -104,3 +110,32 @@ def test_without_opencv_it_says_the_cure(tmp_path, capsys, monkeypatch):
     with pytest.raises(SystemExit):
         main(["sheet", str(tmp_path / "tag.svg")])
     assert "garry[tag]" in capsys.readouterr().err
+
+
+@pytest.mark.server
+def test_the_doctor_tries_the_camera_by_which_home_is_found(tmp_path):
+    picture = tmp_path / "seen.png"
+    base, view = (
+        BASES["kinematic"](lambda: 0.0),
+        replace(TagRoom().view(), camera=f"file:{picture}"),
+    )
+    assert list(try_cameras()) == []
+    store_home_view(base, view)
+    stop = threading.Event()
+
+    def film():
+        while not stop.wait(0.05):
+            show(picture, picture_of(view.tag))
+
+    thread = threading.Thread(target=film)
+    thread.start()
+    try:
+        (seen,) = try_cameras()
+    finally:
+        stop.set()
+        thread.join()
+    assert f"tags: {view.tag}" in seen.what
+    assert seen.cure == ""
+    store_home_view(base, replace(view, camera=str(tmp_path / "none.mp4")))
+    (missing,) = try_cameras()
+    assert "does not open" in missing.cure

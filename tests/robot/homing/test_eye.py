@@ -10,20 +10,9 @@ pytest.importorskip("cv2", reason="pip install garry[tag]")
 import cv2
 
 from robot.homing.camera import Camera
-from robot.homing.detector import tag_modules
 from robot.homing.eye import CameraEye
 from robot.homing.sighting import Sighting, read_sighting
-
-
-def picture_of(tag):
-    paper = np.pad(np.where(tag_modules(tag), 20, 230), 3, constant_values=230)
-    return cv2.imencode(".png", np.kron(paper, np.ones((12, 12))).astype(np.uint8))[1].tobytes()
-
-
-def show(file, data):
-    new = file.with_name("new")
-    new.write_bytes(data)
-    new.replace(file)
+from tests.support.tag_pictures import picture_of, show
 
 
 def look(eye, accept, within_s=20.0):
