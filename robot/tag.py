@@ -145,13 +145,14 @@ def describe(sighting: Sighting, now_s: float, size_m: float, field_deg: float) 
         solutions = solve_tag(np.array(corners), size_m, lens)
         if not solutions:
             continue
-        x_m, _, z_m = solutions[0].place_m.tolist()
-        turned_deg = math.degrees(math.acos(min(1.0, abs(float(solutions[0].tag[2, 2])))))
+        place_m, facing = solutions[0].place_m, solutions[0].tag[:3, 2]
+        x_m, _, z_m = place_m.tolist()
+        away_m = float(np.linalg.norm(place_m))
+        turned_deg = math.degrees(math.acos(min(1.0, abs(float(place_m @ facing)) / away_m)))
         doubt = "" if is_clear(solutions) else " (or the other way)"
         yield (
-            f"tag {number}: {float(np.linalg.norm(solutions[0].place_m)):.3f} m, "
-            f"{math.degrees(math.atan2(x_m, z_m)):.1f}° to the right, face turned "
-            f"{turned_deg:.0f}°{doubt}, {age}"
+            f"tag {number}: {away_m:.3f} m, {math.degrees(math.atan2(x_m, z_m)):.1f}° to the right, "
+            f"turned {turned_deg:.0f}° from the line of sight{doubt}, {age}"
         )
 
 

@@ -79,6 +79,7 @@ def test_what_the_camera_sees_is_told():
     room = TagRoom()
     (line,) = describe(sighting_of(room), 10.07, SIZE_M, 62.0)
     assert "tag 7: 0.886 m, -16.4° to the right" in line
+    assert "turned 29° from the line of sight" in line
     assert "70 ms old" in line
     (line,) = describe(Sighting(10.0, (), (640, 480)), 10.1, SIZE_M, 62.0)
     assert line.startswith("no tag")
