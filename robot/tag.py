@@ -151,8 +151,8 @@ def describe(sighting: Sighting, now_s: float, size_m: float, field_deg: float) 
         turned_deg = math.degrees(math.acos(min(1.0, abs(float(place_m @ facing)) / away_m)))
         doubt = "" if is_clear(solutions) else " (or the other way)"
         yield (
-            f"tag {number}: {away_m:.3f} m, {math.degrees(math.atan2(x_m, z_m)):.1f}° to the right, "
-            f"turned {turned_deg:.0f}° from the line of sight{doubt}, {age}"
+            f"tag {number}: {away_m:.3f} m, {math.degrees(math.atan2(x_m, z_m)):.1f}° "
+            f"to the right, turned {turned_deg:.0f}° from the line of sight{doubt}, {age}"
         )
 
 
