@@ -4,6 +4,7 @@
 `python -m robot calibrate --base NAME` measures how a base answers, once for each;
 `python -m robot doctor` finds a Kobuki's port and says what is wrong on the way to it;
 `python -m robot replay FILE --base NAME` gives a simulated base the orders of an incident again;
+`python -m robot tag` prints a tag, and learns how it is seen from home;
 `python -m robot twin` is a simulated one at a port of its own.
 
 Exit status: 0 ended by SIGTERM or SIGHUP (--child: standard input closed); 1 the base does not
@@ -27,18 +28,25 @@ from functools import partial
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from robot import calibrate, doctor, play_gesture, replay
+from robot import calibrate, doctor, play_gesture, replay, tag
 from robot.base_options import (
     add_base_arguments,
     make_base,
     make_command_parser,
     print_notice,
 )
-from robot.bases import BadOption, BaseLost
+from robot.bases import BadOption, BaseLost, MobileBase
 from robot.bases.twin.__main__ import main as run_twin
 from robot.black_box.recorder import BlackBox
-from robot.calibration import BadCalibration, apply_calibration, calibration_file
+from robot.calibration import (
+    BadCalibration,
+    apply_calibration,
+    calibration_file,
+    find_home_view,
+    home_file,
+)
 from robot.connection_args import (
     BadConnectionArgs,
     add_connection_arguments,
@@ -46,11 +54,15 @@ from robot.connection_args import (
     find_token_store,
     websocket_url,
 )
+from robot.homing.eye import CameraEye
 from robot.link import Link, LinkRefused
 from robot.original_topics import OriginalTopics
 from robot.ros.holder import add_driven_base_arguments, find_driven_base
 from robot.ros.original_nodes import TOPICS
 from robot.worker import Worker
+
+if TYPE_CHECKING:  # it needs the extra `tag`
+    from robot.homing.homing import Homing
 
 ROBOT_PATH = "/ws/robot/"
 
@@ -62,6 +74,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "doctor": doctor.main,
     "gesture": play_gesture.main,
     "replay": replay.main,
+    "tag": tag.main,
     "twin": run_twin,
 }
 DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -104,6 +117,27 @@ def find_black_box(named: str, own: str) -> Path | None:
     if named in ("", "off"):
         return None
     return Path(named).expanduser() / sha256(own.encode()).hexdigest()[:12]
+
+
+def open_homing(base: MobileBase, opened: contextlib.ExitStack) -> Homing | None:
+    """Return what drives an open base home by its tag; None where it has not learned one.
+
+    Its camera's process is ended with ``opened``. Raises BadCalibration.
+    """
+    view = find_home_view(base)
+    if view is None or not base.abilities.closed_loop:
+        return None
+    if find_spec("cv2") is None:
+        print_notice(
+            f"{home_file()} says how {base.identity} sees home, and OpenCV is not installed: it "
+            "does not drive home by itself. Cure: pip install 'garry[tag]'."
+        )
+        return None
+    from robot.homing.homing import Homing
+
+    eye = opened.enter_context(CameraEye(view.camera))
+    print_notice(f"It finds home by tag {view.tag}, camera {view.camera}.")
+    return Homing(view, eye, base.response)
 
 
 async def wait_for_end(is_child: bool) -> None:
@@ -168,7 +202,12 @@ def run(options: Namespace) -> int:
     folder = find_black_box(options.black_box, own)
     keeps_motion = find_spec("mcap") is not None
     box = None if folder is None else BlackBox(folder, keeps_motion=keeps_motion)
-    with base, originals or contextlib.nullcontext(), box or contextlib.nullcontext():
+    with (
+        base,
+        originals or contextlib.nullcontext(),
+        box or contextlib.nullcontext(),
+        contextlib.ExitStack() as opened,
+    ):
         if apply_calibration(base):
             print_notice(f"{base.identity} answers as it was measured to.")
         elif base.abilities.moves and not base.abilities.simulated:
@@ -176,12 +215,14 @@ def run(options: Namespace) -> int:
                 f"{calibration_file()} has no measurement of {base.identity}. Run `python -m robot "
                 f"calibrate` for that file."
             )
+        homing = open_homing(base, opened)
         make_worker = partial(
             Worker,
             partial(Link, url, token, store_token=find_token_store(options, print_notice)),
             base,
             originals=originals,
             black_box=box,
+            homing=homing,
             notice=print_notice,
         )
         try:

@@ -1,15 +1,20 @@
-"""What was measured of bases, in a file of this computer: `python -m robot calibrate` writes it."""
+"""What was measured and learned of bases, in files of this computer.
+
+`python -m robot calibrate` writes how each answers, `python -m robot tag learn` how it sees home.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from robot.atomic_file import write_atomically
 from robot.bases import MobileBase
+from robot.homing.home_view import BadHomeView, HomeView
 from robot.motion.base_response import Response
 
 
@@ -52,10 +57,48 @@ def store_calibration(base: MobileBase, response: Response) -> Path:
     response
         How it was measured to answer.
     """
-    path = calibration_file()
-    measured = _read(path) | {base.identity: asdict(response)}
+    return _store(calibration_file(), base, asdict(response))
+
+
+def home_file() -> Path:
+    """Return the file of how bases see home, beside that of the measurements."""
+    return calibration_file().with_suffix(".home.json")
+
+
+def find_home_view(base: MobileBase) -> HomeView | None:
+    """Return how an open base sees home; None where it has not learned that.
+
+    Raises BadCalibration.
+    """
+    stored = _read(home_file()).get(base.identity)
+    if stored is None:
+        return None
+    try:
+        return HomeView.from_json(stored)
+    except BadHomeView as problem:
+        raise BadCalibration(
+            f"{home_file()} does not say how {base.identity} sees home: {problem} Run "
+            f"`python -m robot tag learn` again."
+        ) from None
+
+
+def home_views() -> list[HomeView]:
+    """Return how each base of this computer sees home. Raises BadCalibration."""
+    try:
+        return [HomeView.from_json(stored) for stored in _read(home_file()).values()]
+    except BadHomeView as problem:
+        raise BadCalibration(f"{home_file()} cannot be used: {problem} Remove it.") from None
+
+
+def store_home_view(base: MobileBase, view: HomeView) -> Path:
+    """Store how an open base sees home, and return the file. Raises BadCalibration."""
+    return _store(home_file(), base, view.to_json())
+
+
+def _store(path: Path, base: MobileBase, value: Mapping[str, Any]) -> Path:
+    stored = _read(path) | {base.identity: value}
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, f"{json.dumps(measured, indent=1)}\n".encode(), mode=0o644)
+    write_atomically(path, f"{json.dumps(stored, indent=1)}\n".encode(), mode=0o644)
     return path
 
 

@@ -1,5 +1,6 @@
 """`python -m robot doctor`: finds a Kobuki's port, and says what is wrong with it.
 
+It tries the camera, too, by which a base of this computer finds home (docs/robot.md).
 With --cut it tries the hardware cut (docs/safety.md), with the wheels off the floor: it sends
 nothing for some seconds, then asks for the emergency stop to be pressed, and says whether the base
 lost its power.
@@ -11,11 +12,17 @@ import sys
 import time
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
 
 from robot.bases import BASES
 from robot.bases.kobuki import STOP_FRAME, KobukiBase
 from robot.bases.kobuki_protocol.frames import BAUD
 from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
+from robot.calibration import BadCalibration, home_views
+from robot.homing.codes import CAMERA_SILENT, CAMERA_SLOW, NO_TAG
+from robot.homing.codes import CURES as CAMERA_CURES
+from robot.homing.eye import CameraEye
+from robot.homing.home_view import HomeView
 from robot.motion.gestures import GESTURES
 from robot.port.opening import PortOpener
 from robot.port.owner import SerialPort
@@ -26,6 +33,8 @@ LISTEN_S = 0.5
 SILENT_S = 0.5  # a base that has power sends 50 frames a second
 WATCHDOG_S, PRESS_S = 3.0, 20.0
 FRAMES_PER_S = 45.0  # a base sends 50; some may be lost
+CAMERA_S, CAMERA_FRAMES = 12.0, 30  # a camera may take some seconds to start
+CAMERA_PER_S = 4.0  # a look takes eight within 2.5 s (robot/homing/look.py)
 
 CURES = {
     "bump": "Something presses its bumper. Make room around it.",
@@ -93,6 +102,43 @@ def list_plugins() -> Iterator[Diagnosis]:
         yield Diagnosis(f"{what}: {plugin.problem or 'in use'}.", cure)
 
 
+def try_cameras() -> Iterator[Diagnosis]:
+    """Yield what the cameras see by which bases find home."""
+    try:
+        views = home_views()
+    except BadCalibration as problem:
+        yield Diagnosis("How home is seen:", str(problem))
+        return
+    if views and find_spec("cv2") is None:
+        yield Diagnosis("A base has learned to find home by a tag.", "pip install 'garry[tag]'")
+        return
+    for view in views:
+        yield try_camera(view)
+
+
+def try_camera(view: HomeView) -> Diagnosis:
+    """Return what a camera sees within some seconds."""
+    what, seen, frames, began_s = f"Camera {view.camera}", set[int](), 0, time.monotonic()
+    first_s = problem = None
+    with CameraEye(view.camera) as eye:
+        while (now_s := time.monotonic()) - began_s < CAMERA_S and frames < CAMERA_FRAMES:
+            eye.watch(now_s)
+            for sighting in eye.take():
+                problem = sighting.problem
+                first_s = sighting.at_s if first_s is None else first_s
+                frames += 1
+                seen |= {number for number, _ in sighting.tags}
+            time.sleep(0.02)
+    if problem or first_s is None:
+        problem = problem or CAMERA_SILENT
+        return Diagnosis(f"{what}: {problem}.", CAMERA_CURES[problem])
+    per_s = (frames - 1) / max(now_s - first_s, 1e-3)
+    tags = ", ".join(map(str, sorted(seen))) or "none"
+    text = f"{what}: {per_s:.0f} frames a second; tags: {tags}; home is by tag {view.tag}."
+    problem = CAMERA_SLOW if per_s < CAMERA_PER_S else "" if view.tag in seen else NO_TAG
+    return Diagnosis(text, CAMERA_CURES[problem] if problem else "")
+
+
 def try_cut(port: str) -> Iterator[Diagnosis]:
     """Yield whether a watchdog, or else a person's emergency stop, takes the base's power."""
     try:
@@ -149,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     port = options.port or find_port()
     wrong = 0
     looks = [check_port(port, list_ports()), try_computer(), listen(port), list_plugins()]
-    for look in [try_cut(port)] if options.cut else looks:
+    for look in [try_cut(port)] if options.cut else [*looks, try_cameras()]:
         for diagnosis in look:
             wrong += bool(diagnosis.cure)
             cure = f"\n      Cure: {diagnosis.cure}" if diagnosis.cure else ""

@@ -6,7 +6,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot.bases import BASES, BaseLost, MobileBase
 from robot.behavior.control_loop import control_loop
@@ -17,6 +17,9 @@ from robot.link import Link, LinkRefused, Message
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.original_topics import OriginalTopics
 from robot.wire.close_codes import CloseCode
+
+if TYPE_CHECKING:  # it needs the extra `tag`
+    from robot.homing.homing import Homing
 
 
 class Worker:
@@ -34,6 +37,8 @@ class Worker:
         Publishes on the original's topics; open.
     black_box
         Records; open.
+    homing
+        Drives it home by its tag; None where it has learned none.
     notice
         Called with lines for people who watch.
     monotonic, sleep
@@ -48,11 +53,12 @@ class Worker:
         limits: Limits = DEFAULT_LIMITS,
         originals: OriginalTopics | None = None,
         black_box: BlackBox | None = None,
+        homing: Homing | None = None,
         notice: Callable[[str], None] = lambda _text: None,
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
-        self.performer = Performer(base, limits)
+        self.performer = Performer(base, limits, homing=homing)
         self._link = dial(greet=self._greet, on_lost=self._handle_lost_link)
         self._base, self._originals, self._black_box = base, originals, black_box
         self._capture = Capture(black_box, self.performer, base)

@@ -5,7 +5,9 @@ It knows no server and no session. Time is a parameter.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from robot.bases import Answer, BaseState, MobileBase
 from robot.behavior.answer_choice import Choice
@@ -16,10 +18,13 @@ from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
 from robot.behavior.status import RobotState, StatusReporter
 from robot.motion.base_response import AT_ONCE
 from robot.motion.gesture import Gesture
-from robot.motion.limits import Limits
+from robot.motion.limits import TETHER_M, Limits
 from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
 from robot.motion.pose import HOME
 from robot.motion.twist import STILL
+
+if TYPE_CHECKING:  # it needs the extra `tag`
+    from robot.homing.homing import Homing
 
 CANNOT_MOVE = "base_cannot_move"
 
@@ -33,6 +38,8 @@ class Body:
         An open base; nothing else may order it.
     limits
         Speeds and accelerations of every gesture.
+    homing
+        Drives it home by its tag; None where it has learned none.
 
     Attributes
     ----------
@@ -42,8 +49,11 @@ class Body:
         What the base reported last; before that, home.
     """
 
-    def __init__(self, base: MobileBase, limits: Limits) -> None:
+    def __init__(self, base: MobileBase, limits: Limits, homing: Homing | None = None) -> None:
         self.base, self.state = base, BaseState(HOME, STILL)
+        self.homing = homing
+        self._drives_home = False
+        self._is_lost = False  # it was on its way home, which is not where odometry began
         # Since the last safety check, so that nothing is lost to another reader in between.
         self._hazards, self._stop_pressed = frozenset[str](), False
         # Without odometry its pose is what was ordered, which is never late.
@@ -58,7 +68,7 @@ class Body:
     @property
     def is_away(self) -> bool:
         """Whether it has to be put back by a person; a simulated one is carried back at once."""
-        return not self.base.abilities.simulated and not self.safety.is_at_home(self.state)
+        return not self.base.abilities.simulated and not self._is_at_home(self.state)
 
     def read(self) -> BaseState:
         """Return the state now, with each hazard since the last safety check. Raises BaseLost.
@@ -88,7 +98,7 @@ class Body:
             return reason
         if reason := self.safety.blocking_reason(state):
             return reason
-        if not self.safety.is_at_home(state):
+        if not self._is_at_home(state):
             if not self.base.abilities.simulated:
                 return AWAY
             self.base.set_home()  # as a person would carry it back
@@ -157,7 +167,7 @@ class Body:
             or safety.arm(now_s, state)
             or safety.blocking_reason(state)
         )
-        if not reason and not safety.is_at_home(state):
+        if not reason and not self._is_at_home(state):
             reason = AWAY
         if not reason:
             above = {"glad": True, "sad": False}.get(gesture.score.mood)
@@ -176,20 +186,28 @@ class Body:
         """
         state, player = self.read(), self.player
         self._hazards, self._stop_pressed = frozenset(), False
-        ordered = player.answered(now_s)
+        ordered, tether_m = player.answered(now_s), TETHER_M
+        if self._drives_home and self.homing is not None:
+            ordered, tether_m = self.homing.answered(now_s), math.inf
         self.expression.tick(now_s)
-        found = self.safety.check(now_s, state, ordered, performing=player.is_busy)
+        performing = player.is_busy or self._drives_home
+        found = self.safety.check(now_s, state, ordered, performing=performing, tether_m=tether_m)
         if found:
             self.stop_for(found)
         elif self.safety.may_recover(now_s):
             self.base.set_home()  # as a person would carry it back
             self.safety.recover(now_s, self.read())
         was, driven = player.gesture, self.manual_drive.twist(now_s)
-        if driven.is_still or not (may_be_driven and self._can_be_driven(state)):
+        may_be_driven = may_be_driven and self._can_be_driven(state)
+        if self.homing is not None and may_be_driven and self.manual_drive.leads_home(now_s):
+            self._drive_home(self.homing, now_s, state)
+        elif driven.is_still or not may_be_driven:
+            self._end_homing()
             self.ordered = self.base.drive(player.step(now_s, state.pose))
         else:
+            self._end_homing()
             self.ordered = self.base.drive(driven)
-            self.base.set_home()  # where it stands is home when the button is let go
+            self._set_home()  # where it stands is home when the button is let go
         if was is not None and not player.is_busy:
             self.expression.stop()
             self.status.report_gesture(was, "ended", player.outcome)
@@ -205,11 +223,12 @@ class Body:
         if problem:
             self.stop_for(problem)
         elif not self.player.is_busy:
-            self.base.set_home()
+            self._set_home()
 
     def halt(self, reason: str) -> None:
         """Stand still at once."""
         self.manual_drive.end()
+        self._end_homing()
         gesture = self.player.gesture
         self.player.halt(reason)
         self.expression.stop()
@@ -240,7 +259,7 @@ class Body:
             return "disarmed", reason
         if self.player.is_busy:
             return "performing", ""
-        if self.is_away:
+        if self.is_away and not self._drives_home:
             return "away", AWAY
         return "idle", unready or reason
 
@@ -272,7 +291,37 @@ class Body:
             lights=self.expression.lights,
             bad_messages=bad_messages,
             counters={"refused_arms": self.safety.refused_arms, **self.base.counters},
+            homing=None if self.homing is None else self.homing.code,
         )
+
+    def _drive_home(self, homing: Homing, now_s: float, state: BaseState) -> None:
+        """Order the next twist on its way home. There, a person has to arm it again."""
+        if not self._drives_home or self.ordered.is_still:
+            self.safety.start_gesture(now_s, state)  # what is felt, is felt from each stand on
+        self._drives_home = True
+        self.ordered = self.base.drive(homing.step(now_s, state.pose, state.twist))
+        self._is_lost |= not self.ordered.is_still
+        if homing.is_home:
+            self._end_homing()
+            self._set_home()
+            self.safety.disarm()
+
+    def _end_homing(self) -> None:
+        """End its way home, wherever it is: where odometry begins anew is no home then."""
+        if self._drives_home and self.homing is not None:
+            self._drives_home = False
+            self.homing.end()
+            if self._is_lost:
+                self.base.set_home()
+
+    def _set_home(self) -> None:
+        """Make its place home, because a person or its tag says so."""
+        self._is_lost = False
+        self.base.set_home()
+
+    def _is_at_home(self, state: BaseState) -> bool:
+        """Whether it stands where gestures begin."""
+        return not self._is_lost and self.safety.is_at_home(state)
 
     def _can_be_driven(self, state: BaseState) -> bool:
         """Whether it is armed, real and unhindered."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot.bases import MobileBase
 from robot.behavior.answer_choice import AnswerChooser
@@ -26,6 +26,9 @@ from robot.motion.gestures import BUILT_IN, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
+
+if TYPE_CHECKING:  # it needs the extra `tag`
+    from robot.homing.homing import Homing
 
 Message = Mapping[str, Any]
 
@@ -47,6 +50,8 @@ class Performer:
         Speeds and accelerations of every gesture.
     gestures
         The gestures that a cue may name.
+    homing
+        Drives it home by its tag; None where it has learned none.
 
     Attributes
     ----------
@@ -67,8 +72,9 @@ class Performer:
         base: MobileBase,
         limits: Limits = DEFAULT_LIMITS,
         gestures: Mapping[str, Gesture] = BUILT_IN,
+        homing: Homing | None = None,
     ) -> None:
-        self.body = Body(base, limits)
+        self.body = Body(base, limits, homing)
         self.gestures = GestureLibrary(gestures, limits)
         self.decider = WindowDecider(Cue())
         self.answers, self._beside = AnswerChooser(0), BesideAnswers(self.body, 0)

@@ -132,7 +132,12 @@ class Safety:
 
     def disconnect(self) -> None:
         """Reset what depends on the server: a real base has to be armed again."""
-        self.is_armed, self.is_watched = self._abilities.simulated, False
+        self.disarm()
+        self.is_watched = False
+
+    def disarm(self) -> None:
+        """Let a real base wait for a person."""
+        self.is_armed = self._abilities.simulated
 
     def arm(self, now_s: float, state: BaseState) -> str:
         """Arm the base for a person, unless something speaks against it.
@@ -183,7 +188,15 @@ class Safety:
         self._resistance = Resistance()
         self._gestures_started += 1
 
-    def check(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
+    def check(
+        self,
+        now_s: float,
+        state: BaseState,
+        ordered: Twist,
+        *,
+        performing: bool,
+        tether_m: float = TETHER_M,
+    ) -> str:
         """Return the code of what must stop the base now, and latch it; empty where nothing must.
 
         Parameters
@@ -195,11 +208,14 @@ class Safety:
         ordered
             The order that it should follow now, given how late it answers.
         performing
-            Whether a gesture is played, its announcement included.
+            Whether a gesture is played, its announcement included, or it drives home.
+        tether_m
+            How far it may be from home [m].
         """
         elapsed_s = 0.0 if self._checked_s is None else now_s - self._checked_s
         self._checked_s = now_s
-        found = next(self._faults(now_s, state, ordered, performing, elapsed_s), "")
+        faults = self._faults(now_s, state, ordered, performing, elapsed_s, tether_m)
+        found = next(faults, "")
         if self.latch or not (found == BUTTON or self.is_armed):
             return ""
         if found:
@@ -252,14 +268,20 @@ class Safety:
         return sensors.refusal or min(sensors.hazards, default="")
 
     def _faults(
-        self, now_s: float, state: BaseState, ordered: Twist, performing: bool, elapsed_s: float
+        self,
+        now_s: float,
+        state: BaseState,
+        ordered: Twist,
+        performing: bool,
+        elapsed_s: float,
+        tether_m: float,
     ) -> Iterator[str]:
         """Yield the codes of all faults, the most direct first."""
         if reason := self._base_fault(state):
             yield reason
         if performing and elapsed_s > LAPSED_S:
             yield LAPSED
-        if state.pose.distance_m(HOME) > TETHER_M:
+        if state.pose.distance_m(HOME) > tether_m:
             yield TETHER
         if performing and self._resistance.add(state, ordered, min(elapsed_s, LAPSED_S)):
             yield STALLED

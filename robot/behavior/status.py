@@ -60,7 +60,7 @@ class StatusReporter:
         if not base.abilities.notes:
             self._aloud.add(Indication.MOVING)
         self._reported_s: float | None = None  # the last status
-        self._reported: RobotState | None = None
+        self._reported: tuple[RobotState, str | None] | None = None
         self._performing: Gesture | None = None  # since when its look counts
         self._began_s = 0.0
         self._indication: Indication | None = None
@@ -142,6 +142,7 @@ class StatusReporter:
         lights: tuple[Color, Color] | None,
         bad_messages: int,
         counters: Mapping[str, int],
+        homing: str | None = None,
     ) -> None:
         """Report the status where it has changed, and every so often.
 
@@ -161,12 +162,14 @@ class StatusReporter:
             How many messages broke the protocol.
         counters
             How often something went wrong, by name; those at 0 are omitted.
+        homing
+            How its way home by a tag goes, as a code; None where it has learned no tag.
         """
         every_s = STATUS_IDLE_S if gesture is None else STATUS_MOVING_S
         due = self._reported_s is None or not 0 <= now_s - self._reported_s < every_s
-        if not due and state == self._reported:
+        if not due and (state, homing) == self._reported:
             return
-        self._reported_s, self._reported = now_s, state
+        self._reported_s, self._reported = now_s, (state, homing)
         if gesture is None or self._performing is not gesture:
             self._performing, self._began_s = gesture, now_s
         look = REST
@@ -192,6 +195,7 @@ class StatusReporter:
                 "lights": list(lights or LIGHTS[self._indication or Indication.WAITING]),
                 "mood": "calm" if gesture is None else gesture.score.mood,
                 "look": [look.mouth, look.eyes],
+                "homing": homing,
             }
         )
 

@@ -16,11 +16,6 @@ from robot.motion.path import Drive, Segment, is_on_path, plan_path
 from robot.motion.pose import HOME, Pose
 from robot.motion.score import NEUTRAL, Score
 
-# How near to its waypoint a base has to come [m, rad] (docs/reference/kobuki.md#beside-a-person
-# asks for 1 cm and 2°).
-NEAR_M = 0.004
-NEAR_RAD = 0.02
-
 # Less than this nobody sees from 2 m away [m, rad]: half a degree of the field of view, and 6°,
 # which a mast or a face on the base shows (docs/robot.md). (Ours.)
 VISIBLE_M = 0.02

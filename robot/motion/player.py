@@ -2,38 +2,29 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from dataclasses import replace
 
 from robot.marking import gettext_noop
 from robot.motion.base_response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.delay_meter import DelayMeter
-from robot.motion.gesture import MIN_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
+from robot.motion.following import NEAR_M, NEAR_RAD, Follower
+from robot.motion.gesture import MIN_PACE, Gesture, Waypoint
 from robot.motion.limits import AT_HOME_M, AT_HOME_RAD, Limits
 from robot.motion.path import Drive, Segment, Turn, plan_path
 from robot.motion.pose import HOME, Pose, wrap
-from robot.motion.twist import STILL, WHEELBASE_M, Twist
+from robot.motion.twist import STILL, Twist
 
 DONE = "done"
 OUT_OF_TIME = gettext_noop("out_of_time")
 BAD_ODOMETRY = "bad_odometry"
 
-# Braking is planned with this share of the limits, so that an order that comes a little late is
-# still in time.
-BRAKING = 0.8
-# Speed for each meter or radian that is left [1/s]: no overshoot in the last centimeter with orders
-# every 20 ms and a base that follows within 100 ms.
-CLOSING_PER_S = 8.0
 # At home it waits for the orders that are still on their way, and this much longer [s]; then it
 # turns once more if they have carried it past.
 SETTLE_S = 0.1
 # One that is nearly at home when its time is over goes the rest at half its pace, so long [s].
 LATE_S = 2.0
 LATE_PACE = 0.5
-# While driving: heading offset for each meter beside the line [rad/m], and its maximum [rad].
-STEER_RAD_M = 2.5
-STEER_MAX_RAD = 0.3
 
 
 class Player:
@@ -63,12 +54,10 @@ class Player:
         self, limits: Limits, response: Response = AT_ONCE, *, is_holonomic: bool = False
     ) -> None:
         self.limits, self._is_holonomic = limits, is_holonomic
-        self._least = Twist(response.stiction_m_s, 2 * response.stiction_m_s / WHEELBASE_M)
-        # One that does not creep comes nearer to its places in the same time.
-        creeps = response.stiction_m_s <= CLOSING_PER_S * NEAR_M
-        self._near_m, self._near_rad = (NEAR_M, NEAR_RAD) if creeps else (NEAR_M / 2, NEAR_RAD / 2)
-        # It stops short, too: a base that turned round at once would seem to be held.
-        self._pause_s = 0.0 if creeps else SETTLE_S
+        self._follower = Follower(response.stiction_m_s, is_holonomic=is_holonomic)
+        # One that does not creep stops short, too: a base that turned round at once would seem to
+        # be held.
+        self._pause_s = 0.0 if self._follower.creeps else SETTLE_S
         self._in_flight = OrdersInFlight(response.delay_s)
         self._meter = DelayMeter()
         self.gesture: Gesture | None = None
@@ -157,7 +146,7 @@ class Player:
             self._in_flight.delay_s = self._meter.delay_s
         limits, wanted = self._wanted_twist(time_s, self._in_flight.predict(pose, time_s))
         self._ramped = limits.approach(self._ramped, wanted, elapsed_s)
-        self.twist = self._lift(self._ramped, wanted)
+        self.twist = self._follower.lift(self._ramped, wanted)
         if self._verdict and self._ramped.is_still:
             self._end(self._verdict)
         self._in_flight.add(self.twist, time_s)
@@ -185,7 +174,7 @@ class Player:
                 else:
                     self._is_late, self._until_s = True, time_s + LATE_S
             elif self._segments:
-                wanted = self._follow(self._segments[0], here, limits)
+                wanted = self._follower.follow(self._segments[0], here, limits)
                 if wanted is not None:
                     return limits, wanted
                 self._segments.popleft()
@@ -204,28 +193,6 @@ class Player:
                 self._next_waypoint(self._waypoint.pose, time_s)
         return self.limits, STILL
 
-    def _lift(self, ramped: Twist, wanted: Twist) -> Twist:
-        """Return an order that no wheel ignores: at its least speed, or still.
-
-        While it drives, it is steered by as much as leaves both wheels at that speed; a holonomic
-        base keeps its direction instead.
-        """
-        if self._is_holonomic:
-            along = ramped if ramped.speed_m_s else wanted
-            to_wanted = ramped.v_m_s * wanted.v_m_s + ramped.vy_m_s * wanted.vy_m_s
-            left_m_s = math.copysign(wanted.speed_m_s, to_wanted)
-            lifted_m_s = _lift(ramped.speed_m_s, left_m_s, self._least.v_m_s)
-            if lifted_m_s:
-                share = lifted_m_s / along.speed_m_s
-                return Twist(share * along.v_m_s, ramped.w_rad_s, share * along.vy_m_s)
-        v_m_s = _lift(ramped.v_m_s, wanted.v_m_s, self._least.v_m_s)
-        if v_m_s:
-            most_rad_s = math.inf
-            if self._least.v_m_s:
-                most_rad_s = 2 * (abs(v_m_s) - self._least.v_m_s) / WHEELBASE_M
-            return Twist(v_m_s, max(-most_rad_s, min(most_rad_s, ramped.w_rad_s)))
-        return Twist(0.0, _lift(ramped.w_rad_s, wanted.w_rad_s, self._least.w_rad_s))
-
     def _rest_of_the_way(self, here: Pose, heading_rad: float) -> list[Segment]:
         """Return what is left at home, once the base has come to rest: ahead or back, and a turn.
 
@@ -241,39 +208,6 @@ class Player:
         if rest or abs(heading_rad - here.heading_rad) > NEAR_RAD:
             rest.append(Turn(heading_rad, 0.0))
         return rest
-
-    def _follow(self, segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
-        """Return the twist that follows a segment; None at its end."""
-        match segment:
-            case Turn():
-                left_rad = segment.heading_rad - pose.heading_rad
-                if abs(left_rad) <= self._near_rad:
-                    return None
-                return Twist(
-                    w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2)
-                )
-            case Drive() if self._is_holonomic:
-                left = Pose(segment.x_m, segment.y_m).seen_from(pose)
-                away_m = left.distance_m(HOME)
-                if away_m <= self._near_m:
-                    return None
-                share = _approach_speed(away_m, limits.v_m_s, limits.slow_down_m_s2) / away_m
-                turn_rad = wrap(segment.heading_rad - pose.heading_rad)
-                return Twist(share * left.x_m, turn_rad * CLOSING_PER_S / 2, share * left.y_m)
-            case Drive():
-                goal = Pose(segment.x_m, segment.y_m)
-                left = goal.seen_from(Pose(pose.x_m, pose.y_m, segment.heading_rad))
-                left_m, beside_m = left.x_m, -left.y_m
-                ahead = math.copysign(1.0, segment.by_m)
-                if left_m * ahead <= self._near_m:
-                    return None
-                # Towards the line; backwards that is by turning the other way.
-                steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
-                turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
-                return Twist(
-                    _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
-                    turn_rad * CLOSING_PER_S / 2,
-                )
 
     def _next_waypoint(self, start: Pose, time_s: float) -> None:
         self._there_s = None
@@ -302,16 +236,3 @@ class Player:
 
 def _is_near_home(pose: Pose) -> bool:
     return pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
-
-
-def _lift(ramped: float, wanted: float, least: float) -> float:
-    """Return a speed of at least the least one on its way to what is wanted, or 0."""
-    if abs(ramped) >= least:
-        return ramped
-    return math.copysign(least, wanted) if wanted and ramped * wanted >= 0 else 0.0
-
-
-def _approach_speed(left: float, speed: float, slow_down: float) -> float:
-    """Return a speed from which the rest of the way is long enough to brake."""
-    braking = math.sqrt(2 * BRAKING * slow_down * abs(left))
-    return math.copysign(min(speed, braking, CLOSING_PER_S * abs(left)), left)

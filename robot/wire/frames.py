@@ -137,6 +137,14 @@ def read_number(
     raise BadFrame(f'"{name}" is a number from {low:g} to {high:g}.')
 
 
+def read_flag(message: Mapping[str, Any], name: str) -> bool:
+    """Return a field that is true or false; a missing one is false. Raises BadFrame."""
+    value = message.get(name, False)
+    if not isinstance(value, bool):
+        raise BadFrame(f'"{name}" is true or false.')
+    return value
+
+
 def check_values(value: Any, depth: int = MAX_NESTING) -> None:
     """Check that a value can be passed on.
 

@@ -40,7 +40,7 @@ class StationRobots:
         there = (live, *self._others_at_location_of(live))
         await asyncio.gather(*(one.robot_orders.arm(by, timezone.now()) for one in there))
 
-    def drive(self, session_id: int, drive: Mapping[str, float]) -> None:
+    def drive(self, session_id: int, drive: Message) -> None:
         """Pass on that a person holds a button to drive the robot to its mark."""
         live = self._sessions.get(session_id)
         if live is not None and live.robot is not None:

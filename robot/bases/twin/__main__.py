@@ -113,6 +113,13 @@ def make_parser() -> ArgumentParser:
         metavar="FILE",
         help="keep a picture of it there (PNG, five a second at most; needs pybullet)",
     )
+    parser.add_argument(
+        "--tag",
+        type=int,
+        metavar="N",
+        help="with --camera: keep a picture there of what a camera on it sees of a room with tag N "
+        "(needs pybullet and OpenCV)",
+    )
     parser.add_argument("--child", action="store_true", help="end when standard input closes")
     faults = parser.add_argument_group("faults from the beginning")
     for fault in fields(Faults):
@@ -131,6 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(
             "--camera needs pybullet and pillow. Cure: pip install 'garry[twin]', or do without."
         )
+    if options.tag is not None and not (options.camera and find_spec("cv2")):
+        parser.error("--tag needs --camera, and OpenCV. Cure: pip install 'garry[tag]'.")
     if options.camera and not options.camera.parent.is_dir():
         parser.error(f"--camera: there is no folder {options.camera.parent}. Make it first.")
     faults = Faults()
@@ -170,7 +179,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     threading.Thread(target=read_orders, daemon=True).start()
     camera: AbstractContextManager[object] = nullcontext()
     if options.camera:
-        camera = Camera(options.camera, lambda: body.pose)
+        camera = Camera(options.camera, lambda: body.pose, options.tag)
     try:
         answer(port.name)
         with camera:

@@ -89,7 +89,7 @@ const page = {
   note: (what, value) => socket.ask({ type: "remark", what, value }),
   remark: (what, value) => page.note(what, value).catch((problem) => announce(problem.message)),
   orderRobot: (order) => socket.send({ type: "robot", order }),
-  driveRobot: (ahead, left) => socket.send({ type: "robot", order: "drive", ahead, left }),
+  driveRobot: (drive) => socket.send({ type: "robot", order: "drive", ...drive }),
   orderStop: () => robot.order("stop"),
 };
 const robot = (page.robot = new RobotPanel(document.querySelector(".robot"), page));

@@ -3,7 +3,14 @@
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { RobotPlacing } from "garry/monitor/robot_placing";
-import { cureOf, describeDecision, describeGesture, describeReason, describeState } from "garry/monitor/robot_text";
+import {
+  cureOf,
+  describeDecision,
+  describeGesture,
+  describeHoming,
+  describeReason,
+  describeState,
+} from "garry/monitor/robot_text";
 import { RobotScene } from "garry/shared/robot_scene";
 
 const KEPT_POSES = 240;
@@ -153,8 +160,23 @@ export class RobotPanel {
 
   draw() {
     const { show } = this.#page;
-    const share = this.#decision?.activated_share;
     show("robot-state", this.#describeState());
+    show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
+    this.#button("stop").classList.toggle("done", this.#isStopped);
+    this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
+    show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
+    if (!this.#placing.isHeld) this.#drawWords(); // a button that is held stays under its finger
+    this.#scene.draw({
+      poses: this.#trail,
+      lights: this.#status?.lights,
+      mood: this.#status?.mood,
+      look: this.#status?.look,
+    });
+  }
+
+  #drawWords() {
+    const { show } = this.#page;
+    const share = this.#decision?.activated_share;
     const isOther = this.#isHeld || this.#orderFailure; // than what it decides
     show(
       "share",
@@ -165,16 +187,7 @@ export class RobotPanel {
     show("robot-last", isOther ? "" : describeDecision(this.#decision, this.#breakReason));
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
-    show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
-    this.#button("stop").classList.toggle("done", this.#isStopped);
     this.#button("arm").hidden = !this.#isHeld;
-    this.#placing.show(this.#isPlaceable);
-    this.#scene.draw({
-      poses: this.#trail,
-      lights: this.#status?.lights,
-      mood: this.#status?.mood,
-      look: this.#status?.look,
-    });
   }
 
   #enlarge(button) {
@@ -184,8 +197,16 @@ export class RobotPanel {
 
   // Whether a person may drive it to its mark: a real one that may move, while nobody walks.
   get #isPlaceable() {
-    const isReal = this.#status?.simulated === false;
-    return this.#isConnected && isReal && !this.#isHeld && this.#page.state.session?.state !== "running";
+    const { simulated, state } = this.#status ?? {};
+    const isFree = this.#isConnected && simulated === false && !this.#isStopped;
+    const isReady = isFree && (state === "away" || !this.#isHeld);
+    return isReady && this.#page.state.session?.state !== "running";
+  }
+
+  // Whether it drove home by its tag, and waits for a person to look.
+  get #isBack() {
+    const { homing, state } = this.#status ?? {};
+    return this.#isConnected && !this.#isStopped && homing === "there" && state === "disarmed";
   }
 
   // Whether it is simulated and stopped itself: it is put back by itself in a moment.
@@ -212,11 +233,13 @@ export class RobotPanel {
 
   #describeHold() {
     const reason = this.#isConnected && this.#status?.reason;
+    if (this.#isBack) return describeHoming("there");
     if (this.#isHeld) return fill(_("It is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
     return NOTABLE.has(reason) ? fill(_("It will not move: %(why)s."), { why: describeReason(reason) }) : "";
   }
 
   #describeCure() {
+    if (this.#isBack) return this.#describeBattery();
     const parts = [cureOf(this.#isHeld ? this.#stopReason : this.#status?.reason), this.#describeBattery()];
     if (this.#isHeld) parts.push(_("Put it on its mark, nobody near it, then:"));
     return parts.filter(Boolean).join(" ");

@@ -96,6 +96,26 @@ const CURES = {
   other_driver: _("Stop the other program."),
   unordered_motion: _("Stop other programs that drive it, and do not push it."),
 };
+// How its way home by a tag goes, or why it stands.
+const HOMING = {
+  looking: _("It looks for its tag."),
+  searching: _("It looks around for its tag."),
+  driving: _("It drives to its mark."),
+  there: _("It is on its mark. Look, then let it move."),
+  no_camera: _("Its camera does not answer. Check the cable."),
+  camera_silent: _("Its camera does not answer. Check the cable."),
+  camera_slow: _("Its camera is too slow. Switch on more light."),
+  camera_dark: _("Its camera sees nothing. Uncover it, switch on the light."),
+  camera_changed: _("Its camera is another one. Teach it its place anew."),
+  no_tag: _("It does not see its tag. Turn it towards the tag, or carry it back."),
+  two_tags: _("It sees its tag twice. Take one away."),
+  tag_moves: _("Its tag moves. Fix it."),
+  tag_not_level: _("Its tag hangs differently than before. Put it right, or teach it its place anew."),
+  tag_contradicted: _("What it sees and how it rolled do not fit. Check its tag and its wheels."),
+  tag_unsure: _("It cannot tell its mark surely enough by its tag. Drive it there by hand."),
+  too_far: _("It is too far away. Carry it nearer."),
+  home_not_reached: _("It did not get exactly to its mark. Drive it there by hand."),
+};
 const STATES = {
   idle: _("waiting"),
   performing: _("moving"),
@@ -106,6 +126,7 @@ const STATES = {
 
 export const describeReason = (reason) => REASONS[reason] ?? reason;
 export const cureOf = (reason) => CURES[reason] ?? "";
+export const describeHoming = (code) => (code ? (HOMING[code] ?? code) : "");
 // The name of a variant ends with its number; a clinic's own gesture has the name that they gave it.
 export const describeGesture = (name) => GESTURES[name.replace(/_\d+$/, "")] ?? name;
 export const describeState = (state) => STATES[state] ?? state;

@@ -39,7 +39,7 @@ from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
-from robot.wire.frames import BadFrame, read_name, read_number, read_whole
+from robot.wire.frames import BadFrame, read_flag, read_name, read_number, read_whole
 
 
 class ScreenConsumer(Socket):
@@ -239,7 +239,9 @@ class ScreenConsumer(Socket):
     def _drive_robot(self, message: Message) -> None:
         """Pass on that a person holds a button to drive the robot to its mark."""
         shares = {"ahead": (0, 1), "left": (-1, 1)}
-        drive = {name: read_number(message, name, *ends) for name, ends in shares.items()}
+        drive: Message = {name: read_number(message, name, *ends) for name, ends in shares.items()}
+        if read_flag(message, "home"):
+            drive["home"] = True
         if self.live is not None and self.runtime.may_move_robots:
             self.runtime.robots.drive(self.live.id, drive)
 

@@ -101,6 +101,7 @@ class _Status(Struct):
     lights: tuple[_Light, _Light] = ("off", "off")
     mood: Literal["calm", "glad", "sad"] | None = None
     look: tuple[Name, Number] | None = None
+    homing: Code | None = None
 
 
 class _Stop(Struct):

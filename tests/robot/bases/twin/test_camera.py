@@ -81,3 +81,26 @@ def test_what_it_needs_is_said(tmp_path, capsys, monkeypatch, missing):
     said = capsys.readouterr().err
     assert missing in said
     assert ("Make it first" if missing == "folder" else "Cure") in said
+
+
+@pytest.mark.parametrize("with_camera", [True, False])
+def test_a_tag_is_seen_by_a_camera_and_takes_opencv(tmp_path, capsys, monkeypatch, with_camera):
+    if with_camera:
+        monkeypatch.setattr(
+            "robot.bases.twin.__main__.find_spec", lambda name: None if name == "cv2" else name
+        )
+    with pytest.raises(SystemExit):
+        main([*(["--camera", str(tmp_path / "seen.png")] if with_camera else []), "--tag", "7"])
+    assert "garry[tag]" in capsys.readouterr().err
+
+
+@pytest.mark.server
+def test_what_it_sees_of_a_tag_is_where_geometry_has_it(tmp_path):
+    pytest.importorskip("cv2", reason="pip install garry[tag]")
+    from robot.bases.twin.tag_view import TagView
+    from robot.homing.detector import find_tags, make_detector
+    from tests.support.tag_room import TagRoom
+
+    ((number, corners),) = find_tags(make_detector(), TagView(7).picture(HOME))
+    assert number == 7
+    assert np.abs(np.array(corners) - TagRoom().corners(HOME)).max() < 1.0
