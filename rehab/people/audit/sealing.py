@@ -7,7 +7,7 @@ import json
 import secrets
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 from django.core.serializers.json import DjangoJSONEncoder
 from django.db import models
@@ -31,10 +31,13 @@ def is_cut(log: str) -> str:
     return has_seal(log, "OLD.id BETWEEN s.first_id AND s.last_id AND s.cut_at IS NOT NULL")
 
 
-class SealableRows(models.QuerySet[Any]):
+M = TypeVar("M", bound="SealableModel")
+
+
+class SealableRows(models.QuerySet[M]):
     """Rows of a log; each that is added gets its digest, also of many at once."""
 
-    def bulk_create(self, objs: Iterable[Any], *args: Any, **kwargs: Any) -> list[Any]:
+    def bulk_create(self, objs: Iterable[M], *args: Any, **kwargs: Any) -> list[M]:
         """Add rows in one query, each with its digest."""
         rows = list(objs)
         for row in rows:
