@@ -118,6 +118,8 @@ class Runtime:
             robot_stopped=loaded.robot_stopped,
         )
         await self.recovery.pause_orphaned(live)
+        if self.clinics.epochs.get(live.clinic_id) != live.epoch:
+            return  # another server may have the clinic by now: who asks for it finds out
         self.robots.restore_stops(live)
         self.sessions[session_id] = live
         if live.is_open and not self.draining:

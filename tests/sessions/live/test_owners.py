@@ -21,6 +21,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.live.database import owners
 from rehab.sessions.live.session import loading
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.supervisor import source_name
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
@@ -207,6 +208,26 @@ async def test_a_clinic_that_another_process_took_is_dropped_with_all_its_socket
     assert not await Step.everywhere.filter(session=session).aexists()
     again = await place.tablet(session).dial()
     assert (await again.sent_away())[0] == 4421
+
+
+async def test_a_session_that_loads_while_its_clinic_goes_is_not_kept_here(
+    place, begun, monkeypatch
+):
+    """It would hear of no step: pages there would wait for ever."""
+    session = await begun(place)
+    runtime = runtimes.current()
+    del runtime.sessions[session.pk]  # as after a commit that failed
+    pause_orphaned, parent = runtime.recovery.pause_orphaned, os.getppid()
+
+    async def lose_clinic(live: LiveSession) -> None:
+        monkeypatch.setattr(runtime.recovery, "pause_orphaned", pause_orphaned)
+        await runtime.clinics.release(live.clinic_id)
+        await own(session, f"{HOST}|{parent}|{owners._start_time(parent)}")
+
+    monkeypatch.setattr(runtime.recovery, "pause_orphaned", lose_clinic)
+    with pytest.raises(owners.OwnedElsewhere):
+        await runtime.session(session.pk)
+    assert session.pk not in runtime.sessions
 
 
 async def test_a_clinic_without_an_open_session_moves_to_another_server(place, sourced):
