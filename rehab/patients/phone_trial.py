@@ -39,18 +39,20 @@ def find_trial(user: User) -> TrainingSession | None:
     )
 
 
-def begin_trial(patient: Patient, station: Station, side: Side, by: User) -> TrainingSession:
+def begin_trial(patient: Patient, station: Station, side: Side | None, by: User) -> TrainingSession:
     """Return the open trial of a leg, a new one where there is none.
 
+    Without a leg it is the open trial's, else the patient's, who keeps the leg of the latest one.
     One of the other leg that has not started ends. Raises StationTaken where any other session is
     open at the station.
     """
     trial = find_trial(by)
-    if trial is not None and trial.trained_side == side:
+    if trial is not None and side in (None, trial.trained_side):
         return trial
+    side = side or Side(patient.paretic_side or Side.LEFT)
     if trial is not None and trial.state == State.READY:
         change_session(trial, ChangeKind.ABORT, by=by)
-    return create_session(
+    trial = create_session(
         SessionRequest(
             patient=patient,
             valence=POSITIVE.slug,
@@ -69,6 +71,10 @@ def begin_trial(patient: Patient, station: Station, side: Side, by: User) -> Tra
             simulated=True,
         )
     )
+    if patient.paretic_side != side:
+        patient.paretic_side = side
+        patient.save(update_fields=["paretic_side"])
+    return trial
 
 
 def look_at_trial(trial: TrainingSession, now: datetime) -> dict[str, Found]:
