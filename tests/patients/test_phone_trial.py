@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from urllib.parse import quote
+
 import pytest
 from django.test import Client
 
@@ -35,7 +37,7 @@ def test_its_goal_is_the_mean_of_a_short_baseline(pt, world: World, settings):
     assert "More is better" in page
     assert "No screen shows Demo" in page
     assert "No phone’s page is connected yet." in page
-    assert f'action="/https/?next={TRIAL}"' in page
+    assert f'action="/https/?next={quote(TRIAL, safe="")}"' in page
 
 
 @pytest.mark.django_db(transaction=True)  # the writer has its own connection

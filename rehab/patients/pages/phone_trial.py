@@ -6,6 +6,7 @@ import segno
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
@@ -84,6 +85,7 @@ def _show(request: HttpRequest, more: dict[str, object]) -> HttpResponse:
         "legs": LEGS.items(),
         "stations": Station.objects.visible_to(user),
         **tablet_address(request),
+        "here": reverse("try-phone"),  # the QR code of the phone answers a POST
         **more,
     }
     return render(request, "patients/phone_trial.html", context)

@@ -99,18 +99,18 @@ def address_for_others(request: HttpRequest) -> str | None:
 
 
 def tablet_address(request: HttpRequest) -> dict[str, Any]:
-    """Return the address that a tablet opens, and its drawing to scan.
+    """Return the address that a tablet opens, its drawing to scan, and where this page is.
 
     Without an address: whether a tablet reached the server all the same.
     """
-    server = address_for_others(request)
+    server, here = address_for_others(request), request.get_full_path()
     if server is None:
         tablets = Device.objects.visible_to(user_of(request)).filter(kind=Device.Kind.TABLET)
-        return {"is_reached": tablets.exclude(last_seen_at=None).exists()}
+        return {"is_reached": tablets.exclude(last_seen_at=None).exists(), "here": here}
     address = server + reverse("tablet")
     drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
     own_certificate = secure_host() is not None and not settings.CERTIFICATE
-    return {"address": address, "qr": drawing, "own_certificate": own_certificate}
+    return {"address": address, "qr": drawing, "own_certificate": own_certificate, "here": here}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
