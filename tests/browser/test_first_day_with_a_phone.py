@@ -93,6 +93,8 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     expect(pt.locator(".whom")).not_to_contain_text("simulated")
     picture(pt, "therapist-before-the-start")
     tap(pt, "[data-main]", "start")
+    coach = pt.locator("[data-show=coach]")
+    expect(coach).to_contain_text("Goal at the end of the baseline", timeout=PATIENCE_MS)
 
     expect(tablet.locator("body")).to_have_attribute("data-step", "12", timeout=PATIENCE_MS)
     expect(tablet.locator("body")).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)

@@ -27,8 +27,9 @@ OVERLAP = """(selector) => {
 # By how much of the goal the baseline is drawn off it; the scale reaches from 50 to 150 %.
 FARTHEST = """() => {
   const y = (one) => +one.getAttribute("cy");
-  const [top, goal] = [".above", ".goal"].map((one) => document.querySelector("#strip " + one).getBBox().y);
-  const calm = [...document.querySelectorAll("#strip .calm")];
+  const strip = document.getElementById("strip");
+  const [top, goal] = [".above", ".goal"].map((one) => strip.querySelector(one).getBBox().y);
+  const calm = [...strip.querySelectorAll(".calm")];
   return Math.max(...calm.map((one) => Math.abs(y(one) - goal))) / (goal - top) / 2;
 }"""
 MEANS = """async () =>
@@ -58,6 +59,8 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     feet.walk(0.9, 1.0, None, 1.1, 1.0)
     at_stride(page, 5)
     expect(page.locator("[data-show=strip]")).to_have_text("Strides in W/kg, mean ± SD")
+    coach = page.locator("[data-show=coach]")
+    expect(coach).to_contain_text("4 strides. The goal needs at least 50.")
     expect(strip.locator("circle.calm")).to_have_count(4)
     expect(strip.locator(".mean, .spread")).to_have_count(2)
     expect(strip).to_contain_text("W/kg")
@@ -81,6 +84,9 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     expect(strip.locator("path.hit")).to_have_count(1)
     expect(strip.locator("path.miss")).to_have_count(1)
     expect(strip.locator(".minute")).to_have_text(["now", "−1 min"])
+    feet.walk(0.9996)
+    expect(page.locator("[data-show=verdict]")).to_have_text("below")
+    expect(page.locator("[data-show=performance]")).to_have_text("99\u00a0%")
     for remark in ("rest", "dizziness", "verbal_cue"):
         page.click(f"[data-remark={remark}]")
     expect(strip.locator(".remark-words")).to_have_count(3)
