@@ -10,6 +10,7 @@ from rehab.patients.first_steps import Found
 from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.payloads import Message
 from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.stations.models import Station
@@ -39,18 +40,20 @@ def find_trial(user: User) -> TrainingSession | None:
     )
 
 
-def begin_trial(patient: Patient, station: Station, side: Side, by: User) -> TrainingSession:
+def begin_trial(patient: Patient, station: Station, side: Side | None, by: User) -> TrainingSession:
     """Return the open trial of a leg, a new one where there is none.
 
+    Without a leg it is the open trial's, else the patient's, who keeps the leg of the latest one.
     One of the other leg that has not started ends. Raises StationTaken where any other session is
     open at the station.
     """
     trial = find_trial(by)
-    if trial is not None and trial.trained_side == side:
+    if trial is not None and side in (None, trial.trained_side):
         return trial
+    side = side or Side(patient.paretic_side or Side.LEFT)
     if trial is not None and trial.state == State.READY:
         change_session(trial, ChangeKind.ABORT, by=by)
-    return create_session(
+    trial = create_session(
         SessionRequest(
             patient=patient,
             valence=POSITIVE.slug,
@@ -69,19 +72,29 @@ def begin_trial(patient: Patient, station: Station, side: Side, by: User) -> Tra
             simulated=True,
         )
     )
+    if patient.paretic_side != side:
+        patient.paretic_side = side
+        patient.save(update_fields=["paretic_side"])
+    return trial
 
 
 def look_at_trial(trial: TrainingSession, now: datetime) -> dict[str, Found]:
     """Return which of its screens are there: the patient's, and the phone's."""
     running = runtime.peek()
     live = running.sessions.get(trial.pk) if running else None
-    presence = live.presence(now) if live else {"tablets": 0, "source": False}
+    presence = live.presence(now) if live else {"tablets": 0, "source": False, "source_plays": ""}
     name = {"name": trial.patient.nickname}
     return {
         "screen": Found(True, _("A screen shows %(name)s") % name)
         if presence["tablets"]
         else Found(False, _("No screen shows %(name)s") % name),
-        "phone": Found(True, _("The phone’s page is connected."))
-        if presence["source"]
-        else Found(False, _("No phone’s page is connected yet.")),
+        "phone": _look_at_phone(presence),
     }
+
+
+def _look_at_phone(presence: Message) -> Found:
+    if presence["source_plays"]:
+        return Found(True, _("The phone’s page is connected."))
+    if presence["source"]:
+        return Found(False, _("The phone’s page is connected. Play a recording there."))
+    return Found(False, _("No phone’s page is connected yet."))

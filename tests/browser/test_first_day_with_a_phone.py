@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from rehab.stations.https.certificate import network_address
-from tests.support.browsers import PATIENCE_MS, SIZES, picture, sign_in
+from tests.support.browsers import PATIENCE_MS, SIZES, Visit, picture, sign_in
 from tests.support.data import signals
 from tests.support.servers import Server, free_port, serve
 from tests.support.walk_seed import make_walks
@@ -73,6 +73,8 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     phone = opened.value
     phone.set_viewport_size({"width": SIZES["phone"][0], "height": SIZES["phone"][1]})
     expect(phone.locator("section[data-step=trial]")).to_be_visible()
+    connected = pt.locator("[data-live=phone]")
+    expect(connected).to_have_text("The phone’s page is connected. Play a recording there.")
     recording = phone.locator("[data-recording]")
     recording.set_input_files({"name": "a.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
     expect(phone.locator("[data-show=problem]")).to_contain_text("seven columns")
@@ -82,7 +84,7 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     picture(phone, "phone-recording")
     tap(phone, "text=Play this recording", "play")
     expect(phone.locator("[data-show=playing]")).to_contain_text("Recording, 0:2")
-    expect(pt.locator("[data-live=phone]")).to_have_text("The phone’s page is connected.")
+    expect(connected).to_have_text("The phone’s page is connected.")
     tap(pt, "text=To the therapist’s page", "the therapist's page")
     source = pt.locator("[data-presence=source]")
     expect(source).to_contain_text("recording · connected")
@@ -91,6 +93,8 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     expect(pt.locator(".whom")).not_to_contain_text("simulated")
     picture(pt, "therapist-before-the-start")
     tap(pt, "[data-main]", "start")
+    coach = pt.locator("[data-show=coach]")
+    expect(coach).to_contain_text("Goal at the end of the baseline", timeout=PATIENCE_MS)
 
     expect(tablet.locator("body")).to_have_attribute("data-step", "12", timeout=PATIENCE_MS)
     expect(tablet.locator("body")).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)
@@ -107,7 +111,9 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
     assert all(is_valid for is_valid, _ in steps)
 
 
-def test_a_recording_that_begins_again_says_so(server: Server, browser: Browser):
+def test_a_recording_says_its_round_and_ends_with_the_session(
+    server: Server, browser: Browser, visit: Visit
+):
     (walk,) = make_walks(server, {"measure": "shank_stance", "goal": 60.0})
     rows = [f"{n / 50},0,0,9.81,{n % 7},0,0" for n in range(100)]
     with browser.new_context(base_url=server.url) as pocket:
@@ -116,8 +122,14 @@ def test_a_recording_that_begins_again_says_so(server: Server, browser: Browser)
         text = "\n".join(["time_s,ax,ay,az,gx,gy,gz", *rows]).encode()
         expect(page.locator("section[data-step=trial]")).to_be_visible()
         file: FilePayload = {"name": "short.csv", "mimeType": "text/csv", "buffer": text}
+        pt = visit(walk.monitor_path, walk, "laptop")
+        pt.click("[data-main]")
         page.set_input_files("[data-recording]", file)
         page.click("text=Play this recording")
         playing = page.locator("[data-show=playing]")
         expect(playing).to_contain_text("Recording, 0:00 of 0:02")
         expect(playing).to_contain_text("Recording again, round 2")
+        expect(pt.locator("[data-presence=source]")).to_contain_text("recording, round")
+        pt.click("[data-end]")
+        pt.click("text=End session")
+        expect(playing).to_contain_text("The session has ended.")

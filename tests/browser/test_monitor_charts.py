@@ -24,6 +24,14 @@ OVERLAP = """(selector) => {
   return boxes.some((a, i) => boxes.slice(0, i).some((b) =>
     a.left < b.right && b.left < a.right && a.top < b.bottom - 2 && b.top < a.bottom - 2));
 }"""
+# By how much of the goal the baseline is drawn off it; the scale reaches from 50 to 150 %.
+FARTHEST = """() => {
+  const y = (one) => +one.getAttribute("cy");
+  const strip = document.getElementById("strip");
+  const [top, goal] = [".above", ".goal"].map((one) => strip.querySelector(one).getBBox().y);
+  const calm = [...strip.querySelectorAll(".calm")];
+  return Math.max(...calm.map((one) => Math.abs(y(one) - goal))) / (goal - top) / 2;
+}"""
 MEANS = """async () =>
   (await import("garry/monitor/strip")).runningMeans([2, 4, null, 6]).map((one) => one &&
     [one.mean, one.sd])"""
@@ -51,6 +59,8 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     feet.walk(0.9, 1.0, None, 1.1, 1.0)
     at_stride(page, 5)
     expect(page.locator("[data-show=strip]")).to_have_text("Strides in W/kg, mean ± SD")
+    coach = page.locator("[data-show=coach]")
+    expect(coach).to_contain_text("4 strides. The goal needs at least 50.")
     expect(strip.locator("circle.calm")).to_have_count(4)
     expect(strip.locator(".mean, .spread")).to_have_count(2)
     expect(strip).to_contain_text("W/kg")
@@ -66,9 +76,17 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     feet.walk(*[1.0] * 47, 1.9, 0.2, *[1.1] * 10)
     at_stride(page, 64)
     expect(page.locator("[data-show=strip]")).to_have_text("Strides against the goal")
+    expect(strip.locator("circle.calm")).to_have_count(50)
+    assert page.evaluate(FARTHEST) == pytest.approx(0.1, abs=0.01)
+    page.reload()  # the latest 60 are read again, and the first five were another than the goal
+    expect(strip.locator("circle.calm")).to_have_count(47)
+    assert page.evaluate(FARTHEST) == 0
     expect(strip.locator("path.hit")).to_have_count(1)
     expect(strip.locator("path.miss")).to_have_count(1)
     expect(strip.locator(".minute")).to_have_text(["now", "−1 min"])
+    feet.walk(0.9996)
+    expect(page.locator("[data-show=verdict]")).to_have_text("below")
+    expect(page.locator("[data-show=performance]")).to_have_text("99\u00a0%")
     for remark in ("rest", "dizziness", "verbal_cue"):
         page.click(f"[data-remark={remark}]")
     expect(strip.locator(".remark-words")).to_have_count(3)

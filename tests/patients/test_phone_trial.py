@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from urllib.parse import quote
+
 import pytest
 from django.test import Client
 
@@ -25,15 +27,17 @@ def begin(pt: Client, side: str = "left") -> TrainingSession:
     return TrainingSession.everywhere.filter(patient__code="demo").order_by("pk").last()
 
 
-def test_its_goal_is_the_mean_of_a_short_baseline(pt, world: World):
+def test_its_goal_is_the_mean_of_a_short_baseline(pt, world: World, settings):
     plan = begin(pt).to_plan()
     assert [phase.kind for phase in plan.phases] == ["baseline", "training"]
     assert plan.goal.percent_of_baseline == 100
     assert plan.goal.baseline_strides <= plan.phases[0].strides <= 10
-    page = pt.get(TRIAL).content.decode()
+    settings.HOST, settings.ALLOWED_HOSTS = "127.0.0.1", ["127.0.0.1"]
+    page = pt.get(TRIAL, headers={"host": "127.0.0.1:8000"}).content.decode()
     assert "More is better" in page
     assert "No screen shows Demo" in page
     assert "No phone’s page is connected yet." in page
+    assert f'action="/https/?next={quote(TRIAL, safe="")}"' in page
 
 
 @pytest.mark.django_db(transaction=True)  # the writer has its own connection
@@ -48,6 +52,22 @@ def test_a_second_tap_leads_to_the_same_trial_and_the_other_leg_to_a_new_one(pt,
     assert "still has an open session" in answer.content.decode()
     other.refresh_from_db()
     assert other.state == "running"
+
+
+@pytest.mark.django_db(transaction=True)  # the writer has its own connection
+def test_opening_it_again_keeps_the_leg(pt, world: World):
+    def reopen() -> TrainingSession:
+        assert pt.post(TRIAL, {"open": ""}).headers["Location"] == TRIAL
+        return TrainingSession.everywhere.filter(patient__code="demo").order_by("pk").last()
+
+    assert reopen().trained_side == "left"
+    right = begin(pt, "right")
+    assert reopen() == right
+    assert "Try a phone: right" in pt.get(TRIAL).content.decode()
+    assert Patient.everywhere.get(code="demo").paretic_side == "right"
+    change_session(right, ChangeKind.ABORT)
+    again = reopen()
+    assert (again.trained_side, again != right) == ("right", True)
 
 
 def test_a_taken_station_leads_to_its_session(pt, world: World):

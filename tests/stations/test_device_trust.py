@@ -81,6 +81,16 @@ def test_a_blinded_assessor_lets_no_tablet_in(world, approver, station):
     assert AuditEntry.everywhere.filter(act="refused", by=approver).exists()
 
 
+@pytest.mark.parametrize("tablets", ["127.0.0.1", "192.168.1.20", "192.168.1.31"])
+def test_this_computer_is_in_its_own_network(world, station, monkeypatch, tablets):
+    monkeypatch.setattr("rehab.stations.pages.pairing.network_address", lambda: "192.168.1.20")
+    person = signed_in(world.people[Role.PT], REMOTE_ADDR="127.0.0.1")
+    page = enter_code(person, shown_code(Client(REMOTE_ADDR=tablets)), station).content.decode()
+    assert "another network" not in page
+    away = shown_code(Client(REMOTE_ADDR="192.168.7.31"))
+    assert "another network" in enter_code(person, away, station).content.decode()
+
+
 def test_the_page_describes_the_tablet_and_lets_it_in_once_compared(world, station):
     person = signed_in(world.people[Role.PT], REMOTE_ADDR="198.51.100.4")
     tablet = Client(REMOTE_ADDR=HOME, HTTP_USER_AGENT=FIREFOX)

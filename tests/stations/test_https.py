@@ -90,8 +90,9 @@ def lead(world: World) -> Client:
 
 
 @pytest.fixture
-def clinic_folder(settings, tmp_path):
+def clinic_folder(settings, tmp_path, monkeypatch):
     settings.DATA_DIR = tmp_path
+    monkeypatch.setattr("rehab.stations.pages.https.network_address", lambda: "192.168.1.20")
     return tmp_path
 
 
@@ -106,6 +107,29 @@ def test_the_lead_makes_it_on_a_page(lead: Client, pt: Client, clinic_folder):
     before = own_authority().server.read_bytes()
     lead.post("/https/")
     assert own_authority().server.read_bytes() == before  # phones trust it
+
+
+@pytest.mark.django_db
+def test_without_a_network_nothing_is_made(lead: Client, clinic_folder, monkeypatch):
+    monkeypatch.setattr("rehab.stations.pages.https.network_address", lambda: None)
+    assert "Connect it to the clinic’s network first" in lead.post("/https/").content.decode()
+    assert find_certificate() is None
+
+
+@pytest.mark.django_db
+def test_it_leads_back_to_the_page_that_led_there(lead: Client, clinic_folder):
+    trial = "/first-steps/phone/"
+    page = lead.post(f"/https/?next={trial}", follow=True).content.decode()
+    assert f'href="{trial}"' in page
+    assert "Back to Try a phone" in page
+    assert "A recording measures no movement" in page
+    assert f'href="/tablets/pair/?next={trial.replace("/", "%2F")}"' in page
+    assert f'href="{trial}"' in lead.get(f"/tablets/pair/?next={trial}").content.decode()
+    for stranger in ("https://evil.example/", "//evil.example/", "javascript:alert(1)"):
+        for path in ("/https/", "/tablets/pair/"):
+            page = lead.get(path, {"next": stranger}).content.decode()
+            assert f'"{stranger}' not in page
+            assert "Back to Try" not in page
 
 
 @pytest.mark.django_db

@@ -6,6 +6,7 @@ import segno
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
@@ -35,14 +36,15 @@ from rehab.training.steps import Side
 def try_phone(request: HttpRequest) -> HttpResponse:
     """Show the three screens of a trial, each with its way there; first choose the leg.
 
-    ``side`` opens a session of the demo patient; ``code`` lets a tablet in.
+    ``open`` opens the trial that there is, else one of the latest leg; ``side`` one of that leg;
+    ``code`` lets a tablet in.
     """
     lets_in = "code" in request.POST
     if lets_in and not step_up.is_confirmed(request, timezone.now()):
         return step_up.ask(request)
     side = request.POST.get("side", "")
-    if side in LEGS:
-        return _begin(request, Side(side))
+    if side in LEGS or "open" in request.POST:
+        return _begin(request, Side(side) if side in LEGS else None)
     trial = find_trial(user_of(request))
     if trial is None:
         return render(request, "patients/phone_trial.html", {"legs": LEGS.items()})
@@ -52,7 +54,7 @@ def try_phone(request: HttpRequest) -> HttpResponse:
     return _show(request, asked)
 
 
-def _begin(request: HttpRequest, side: Side) -> HttpResponse:
+def _begin(request: HttpRequest, side: Side | None) -> HttpResponse:
     user = user_of(request)
     patient, station = add_demo_patient(request), first_station(clinic_of(user))
     if not patient.simulated:
@@ -83,6 +85,7 @@ def _show(request: HttpRequest, more: dict[str, object]) -> HttpResponse:
         "legs": LEGS.items(),
         "stations": Station.objects.visible_to(user),
         **tablet_address(request),
+        "here": reverse("try-phone"),  # the QR code of the phone answers a POST
         **more,
     }
     return render(request, "patients/phone_trial.html", context)

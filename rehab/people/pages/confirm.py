@@ -47,5 +47,4 @@ def confirm(request: HttpRequest) -> HttpResponse:
         _("Show it once more, then go on where you were."),
         _("Continue"),
     )
-    next_url = request.GET.get("next", "")
-    return asked or redirect(next_url if step_up.is_own_page(request, next_url) else "home")
+    return asked or redirect(step_up.way_back(request) or "home")

@@ -77,6 +77,12 @@ def is_own_page(request: HttpRequest, url: str) -> bool:
     )
 
 
+def way_back(request: HttpRequest) -> str:
+    """Return the page of this server that ``next`` in the address names; empty for none."""
+    next_url = request.GET.get("next", "")
+    return next_url if is_own_page(request, next_url) else ""
+
+
 def _ask(next_url: str) -> HttpResponse:
     return redirect(f"{reverse('confirm')}?{urlencode({'next': next_url})}")
 

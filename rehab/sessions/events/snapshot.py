@@ -24,6 +24,7 @@ from rehab.training.steps import InvalidReason
 
 # What a chart needs of a past step.
 CHART_FIELDS = ("number", "performance", "hit", "close", "points", "valid", "phase")
+PT_CHART_FIELDS = (*CHART_FIELDS, "time_s", "value", "gain", "goal")
 
 
 def history_entry(
@@ -40,7 +41,7 @@ def history_entry(
             return None
     if step.side != plan.trained_side:
         return None
-    fields = CHART_FIELDS if audience is Audience.PATIENT else (*CHART_FIELDS, "time_s", "value")
+    fields = CHART_FIELDS if audience is Audience.PATIENT else PT_CHART_FIELDS
     return {name: getattr(step, name) for name in fields}
 
 
@@ -89,6 +90,7 @@ def snapshot(
             **describe_types(fold),
             **describe_coaching(fold),
             "trained_side": plan.trained_side,
+            "higher_is_better": plan.measure.higher_is_better,
             "marks": list(marks),
             "conditions": dict(conditions),
             **alarms.describe(),

@@ -33,21 +33,26 @@ from rehab.stations.https.certificate import (
 @step_up.required
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_up_https(request: HttpRequest) -> HttpResponse:
-    """Make a certificate of the clinic's own; then show how phones and tablets get it."""
+    """Make a certificate of the clinic's own; then show how phones and tablets get it.
+
+    ``next`` in the address is the page that led here, and that this one leads back to.
+    """
     user = user_of(request)
+    network = network_address()
     may_make = user.role == Role.LEAD and not settings.HOSTED and not is_encrypting()
-    if request.method == "POST" and may_make:
+    if request.method == "POST" and may_make and network:
         now = timezone.now()
         make_own(now)
         address, about = client_address(request), "https: a certificate of the clinic's own"
         record(Act.CHANGE, user, clinic_id=user.clinic_id, about=about, address=address, now=now)
-        return redirect("https")
+        return redirect(request.get_full_path())
     context: dict[str, Any] = {
         "is_hosted": settings.HOSTED,
         "is_encrypting": is_encrypting() or request.is_secure(),
         "may_make": may_make,
-        "address": network_address(),
+        "address": network,
         "secure_address": secure_address(),
+        "way_back": step_up.way_back(request),
         **certificate_square(),
     }
     return render(request, "stations/https.html", context)

@@ -24,7 +24,7 @@ from rehab.people.sign_in.devices import describe_browser
 from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import NotTrusted
-from rehab.stations.https.certificate import secure_host
+from rehab.stations.https.certificate import network_address, secure_host
 from rehab.stations.models import Device, Station
 from rehab.stations.pairing import PairingRefused, approve_pairing, find_by_code
 from rehab.stations.pins import PinRefused, check_pin
@@ -35,13 +35,22 @@ from rehab.stations.tablets import COOKIE
 @step_up.required
 @require_http_methods(["GET", "HEAD", "POST"])
 def pair(request: HttpRequest) -> HttpResponse:
-    """Approve the tablet that shows a code, for a station of the person's own clinic."""
+    """Approve the tablet that shows a code, for a station of the person's own clinic.
+
+    ``next`` in the address is the page that led here, and that this one leads back to.
+    """
     user = user_of(request)
     first_station(clinic_of(user))
+    back = step_up.way_back(request) or reverse("start")
     asked = let_in(request) if request.method == "POST" else {}
     if asked is None:
-        return redirect("start")
-    context = {"stations": Station.objects.visible_to(user), **asked, **tablet_address(request)}
+        return redirect(back)
+    context = {
+        "stations": Station.objects.visible_to(user),
+        "back": back,
+        **asked,
+        **tablet_address(request),
+    }
     return render(request, "stations/pair.html", context)
 
 
@@ -60,7 +69,7 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
     try:
         pairing = find_by_code(code, user, now)
         if request.POST.get("compared") != "yes":
-            theirs, own = truncate_address(pairing.address), truncate_address(here)
+            theirs, own = _network_of(pairing.address), _network_of(here)
             agent = describe_browser(request.headers.get("User-Agent", ""))
             return {
                 "asking": {"code": pairing.code, "network": theirs, "browser": pairing.browser},
@@ -76,6 +85,12 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
     return None
 
 
+def _network_of(address: str) -> str:
+    """Return the network of an address; of this computer itself, the one that it is in."""
+    is_own = address in {"127.0.0.1", "::"}  # of IPv6 the client's /64 is known
+    return truncate_address((is_own and network_address()) or address)
+
+
 def address_for_others(request: HttpRequest) -> str | None:
     """Return where other devices open this server; None where only this computer can."""
     secure = secure_host()
@@ -84,18 +99,18 @@ def address_for_others(request: HttpRequest) -> str | None:
 
 
 def tablet_address(request: HttpRequest) -> dict[str, Any]:
-    """Return the address that a tablet opens, and its drawing to scan.
+    """Return the address that a tablet opens, its drawing to scan, and where this page is.
 
     Without an address: whether a tablet reached the server all the same.
     """
-    server = address_for_others(request)
+    server, here = address_for_others(request), request.get_full_path()
     if server is None:
         tablets = Device.objects.visible_to(user_of(request)).filter(kind=Device.Kind.TABLET)
-        return {"is_reached": tablets.exclude(last_seen_at=None).exists()}
+        return {"is_reached": tablets.exclude(last_seen_at=None).exists(), "here": here}
     address = server + reverse("tablet")
     drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
     own_certificate = secure_host() is not None and not settings.CERTIFICATE
-    return {"address": address, "qr": drawing, "own_certificate": own_certificate}
+    return {"address": address, "qr": drawing, "own_certificate": own_certificate, "here": here}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)

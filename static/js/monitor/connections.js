@@ -48,11 +48,15 @@ function describeCompanion({ companion, companion_trouble: trouble, companion_cl
 // What walks in a trial instead of a leg (rehab/sessions/live/protocol/messages.py).
 const PLAYED = { recording: _("recording"), simulated: _("simulated") };
 
+function describePlayed({ source, source_plays: plays, source_round: round }) {
+  if (!source) return "";
+  return round > 1 ? fill(_("recording, round %(count)s"), { count: round }) : PLAYED[plays];
+}
+
 function describeAllSources(presence, strides, silent_s, isRunning) {
   const [sign, words] = describeSource(presence.source, strides, silent_s, isRunning, presence.source_trouble);
-  const played = presence.source && PLAYED[presence.source_plays];
   const others = [describeClock(presence.source_clock), describeCompanion(presence)];
-  const all = [played, words, ...others].filter(Boolean);
+  const all = [describePlayed(presence), words, ...others].filter(Boolean);
   return [presence.companion_trouble && sign === "✓" ? "!" : sign, all.join(" · ")];
 }
 

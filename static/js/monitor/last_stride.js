@@ -1,7 +1,7 @@
 // The last stride in figures: performance, value, verdict, and what else was measured.
 
 import { _, fill, number } from "garry/shared/language";
-import { percent, signed } from "garry/shared/format";
+import { notReaching, percent, signed } from "garry/shared/format";
 import { clockCures, phaseName, reasonName } from "garry/shared/labels";
 
 // By which sensor a stride was measured (rehab/training/measures.py).
@@ -71,7 +71,7 @@ export function createLastStride({ state, show }) {
       }
       const isJudged = stride.performance != null;
       show("number", fill(_("no. %(number)s"), { number: stride.number }));
-      show("performance", isJudged ? percent(stride.performance) : "—");
+      show("performance", isJudged ? percent(notReaching(stride.performance)) : "—");
       show("value", describeValue(stride, session.unit));
       show(
         "extras",

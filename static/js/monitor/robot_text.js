@@ -1,7 +1,7 @@
 // What a robot's reasons and states are called on the PT's page.
 
 import { _, fill } from "garry/shared/language";
-import { percent } from "garry/shared/format";
+import { notReaching, percent } from "garry/shared/format";
 
 // Why it does not move, or did not end what it began.
 const REASONS = {
@@ -138,7 +138,7 @@ export function describeDecision(decision, breakReason) {
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
   return fill(_("Last five seconds: %(mean)s of the goal. It celebrates from %(threshold)s: %(what)s."), {
-    mean: percent(mean),
+    mean: percent(notReaching(mean, threshold)),
     threshold: percent(threshold),
     what: gesture ? describeGesture(gesture) + (pool ? "" : size) + end : describeReason(reason),
   });

@@ -5,7 +5,7 @@ import { percent } from "garry/shared/format";
 import { legendOf } from "garry/monitor/annotations";
 import { drawHitRing } from "garry/monitor/hit_ring";
 import { drawLastStrides } from "garry/monitor/last_strides";
-import { drawStrip } from "garry/monitor/strip";
+import { drawStrip, performanceOf } from "garry/monitor/strip";
 
 const LAST = 20;
 
@@ -63,7 +63,7 @@ export function createStrideCharts({ state, show }) {
       drawStrip(strip, state.strides, state.annotations, session);
       drawLegend();
       show("of-twenty", describeLast());
-      drawLastStrides(twenty, state.strides.slice(-LAST), LAST);
+      drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session));
       drawHitRing(ring, session.hit_rate, session.target.hit_rate);
       describeRate(session);
     },

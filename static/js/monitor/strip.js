@@ -12,7 +12,7 @@ const SPACING = 4; // pixels between strides, at least
 const FEWEST = 60; // strides that the width is made for
 const LETTER = 8; // pixels
 const AXIS = 18; // pixels, for the minutes
-const LANE = 20; // pixels below the scale, for strides that it does not judge
+const LANE = 20; // pixels below the scale, for strides that were not measured
 const MINUTE_S = 60;
 
 const path = (kind, d) => shape("path", { class: kind, d });
@@ -31,11 +31,22 @@ export function runningMeans(values) {
   });
 }
 
+// Return what gives a stride's performance; one from before there was a goal has that of the first goal.
+export function performanceOf(strides, { goal, higher_is_better: isHigherBetter }) {
+  const first = strides.find((stride) => stride.goal != null)?.goal ?? goal;
+  return ({ performance, valid, value, gain }) => {
+    if (performance != null) return performance;
+    if (!valid || value == null || first === null) return null;
+    return isHigherBetter ? (gain * value) / first : first / (gain * value);
+  };
+}
+
 // Return what is plotted: [lowest, highest], the value of a stride, and the lines of the scale.
-function scaleOf(shown, { goal, unit }) {
+function scaleOf(shown, strides, session) {
+  const { goal, unit } = session;
   if (goal !== null || shown.some(({ performance }) => performance != null)) {
     const lines = [0.5, 1, 1.5].map((share) => [share, percent(share)]);
-    return { range: RANGE, isJudged: true, valueOf: ({ performance }) => performance, lines };
+    return { range: RANGE, isJudged: true, valueOf: performanceOf(strides, session), lines };
   }
   const valueOf = ({ valid, value }) => (valid ? (value ?? null) : null);
   const highest = Math.max(0, ...shown.map((stride) => valueOf(stride) ?? 0));
@@ -56,7 +67,7 @@ export function drawStrip(svg, strides, annotations, session) {
   const shown = strides.slice(-Math.max(20, Math.floor((width - 70) / SPACING)));
   const dx = (width - 70) / Math.max(shown.length - 1, FEWEST);
   const floor = height - AXIS;
-  const { range, isJudged, valueOf, lines } = scaleOf(shown, session);
+  const { range, isJudged, valueOf, lines } = scaleOf(shown, strides, session);
   const x = (index) => 56 + index * dx;
   const y = (value) => {
     const inside = Math.min(Math.max(value, range[0]), range[1]);
@@ -85,12 +96,8 @@ export function drawStrip(svg, strides, annotations, session) {
 
   function drawStride(stride, index) {
     const value = valueOf(stride);
-    if (value == null) {
-      return stride.valid
-        ? shape("circle", { class: "calm", cx: x(index), cy: floor - 8, r: 3.2 })
-        : path("gap", `M${x(index)} ${floor - 4}v-10`);
-    }
-    const kind = !isJudged ? "calm" : stride.close ? "close" : stride.hit ? "hit" : "miss";
+    if (value == null) return path("gap", `M${x(index)} ${floor - 4}v-10`);
+    const kind = stride.performance == null ? "calm" : stride.close ? "close" : stride.hit ? "hit" : "miss";
     if (value > range[1]) return path(kind, `M${x(index)} ${y(range[1]) - 5}l5 9h-10z`);
     if (value < range[0]) return path(kind, `M${x(index)} ${y(range[0]) + 5}l5 -9h-10z`);
     return shape("circle", { class: kind, cx: x(index), cy: y(value), r: index === shown.length - 1 ? 6 : 3.2 });

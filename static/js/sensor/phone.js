@@ -37,6 +37,7 @@ const LINKS = {
   "other leg": _("connected, for the steps’ symmetry: the other leg is trained"),
   lost: _("no network: strides are kept and sent later"),
   "no session": _("waiting for a session"),
+  ended: _("The session has ended."),
   unauthorized: _("This QR code is no longer valid. Show a new one on the therapist’s page."),
   replaced: _("Another phone has scanned this QR code. Show a new one on the therapist’s page."),
   refused: _("The server does not take these strides."),
@@ -58,7 +59,7 @@ const recent = new RecentSamples();
 const lastPlace = new LastPlace(place, side);
 let elsewhere_deg = 0; // by how much it sits otherwise than last time
 let plays = ""; // instead of a leg: "recording" or "simulated"
-let findProgress = null; // of what plays
+let walk = null; // what plays, as long as it does
 let sender;
 let link = "no session";
 let count = 0;
@@ -118,16 +119,17 @@ function describeClock(stride) {
   return { clock_error_ms: 1000 * error_s, step_asymmetry_percent: symmetry.find(stride, sender.clock, now_s()) };
 }
 
-let said = null;
+let said = "";
 function tick() {
-  const trouble = findTrouble();
-  if (trouble !== said) sender?.say({ trouble: (said = trouble), rate_hz: motion.rate_hz, plays });
+  const round = plays === "recording" ? walk.progress().time : 1;
+  const state = { trouble: findTrouble(), plays, round };
+  if (sender && said !== (said = JSON.stringify(state))) sender.say({ ...state, rate_hz: motion.rate_hz });
   if (body.dataset.step === "check") drawCheck();
   show("strides", String(count));
   const rate = motion.rate_hz === null ? "–" : Math.round(motion.rate_hz);
   const waiting = sender?.waiting ?? 0;
   show("state", fill(_("%(link)s · %(rate)s Hz · %(waiting)s waiting"), { link: LINKS[link], rate, waiting }));
-  if (plays) show("playing", describePlayed(findProgress()));
+  if (walk) show("playing", describePlayed(walk.progress()));
 }
 
 const toMinutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")}`;
@@ -199,19 +201,28 @@ async function begin() {
 }
 
 // Nobody stands or lifts a foot in a recording: it is not checked.
-async function play(what, leg) {
+function play(what, leg) {
   if (plays) return;
   plays = what;
-  await connect();
-  findProgress = walkInstead(leg, take);
+  walk = walkInstead(leg, take);
   slots.get("playing").hidden = false;
   tick();
   step(what === "recording" ? "locked" : "check");
 }
 
+// Nothing walks on in a session that is over.
+function endPlay() {
+  if (!walk) return;
+  walk.stop();
+  [plays, walk] = ["", null];
+  show("playing", _("The session has ended. Leave, to choose what plays in the next one."));
+  step("locked");
+}
+
 async function connect() {
   sender = new Sender(body.dataset.socket, token, side, await Journal.open(), (state, message) => {
     link = state;
+    if (state === "ended") endPlay();
     if (["unauthorized", "replaced", "refused"].includes(state)) refuse(message ?? LINKS[state]);
   });
   sender.onContact = (contact) => symmetry.note(contact);
@@ -246,6 +257,7 @@ function offerTrial() {
   simulated.addEventListener("click", async () => play("simulated", await fetchLeg(body.dataset.trial)));
   show("leg", fill(_("%(side)s %(place)s: try a recording"), { side: SIDES[side], place: PLACES[place] }));
   step("trial");
+  connect();
 }
 
 function holdToLeave(button) {
@@ -256,7 +268,7 @@ function holdToLeave(button) {
 }
 
 function leave() {
-  if (plays)
+  if (isTrial)
     location.reload(); // where something else is chosen
   else step("check");
 }

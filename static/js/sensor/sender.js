@@ -38,7 +38,8 @@ export class Sender {
   onContact = () => {}; // of the other leg's phone
   state = "ready"; // of the session
 
-  // `onState(state, message)`: "connected", "other leg", "lost", "no session", or why it ends: a value of FINAL.
+  // `onState(state, message)`: "connected", "other leg", "lost", "no session", "ended" (the session), or why it ends:
+  // a value of FINAL.
   constructor(path, token, side, journal, onState) {
     this.#path = path;
     this.#side = side;
@@ -82,7 +83,7 @@ export class Sender {
     return true;
   }
 
-  // `about`: { trouble, rate_hz }.
+  // `about`: { trouble, rate_hz, plays, round }.
   say(about) {
     this.#about = about;
     const error_s = this.clock.error_s(now_s());
@@ -160,6 +161,7 @@ export class Sender {
         break;
       case "stop":
         this.state = "finished";
+        this.#onState("ended");
         break;
       case "error":
         this.problem = message.message;
@@ -170,9 +172,10 @@ export class Sender {
   async #join({ session, state, next, is_companion: companion }) {
     this.#pause_ms = FIRST_PAUSE_MS;
     this.#isAnswered = true;
+    const wasWalking = ["running", "paused"].includes(this.state);
     this.state = state;
     if (session === null) {
-      this.#onState("no session");
+      this.#onState(wasWalking ? "ended" : "no session"); // which it may not have heard while it was lost
       return;
     }
     if (this.#asked !== this.#socket) {

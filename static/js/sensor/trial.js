@@ -36,13 +36,13 @@ export async function readRecording(file) {
   return [walk, walk];
 }
 
-// Play both parts, the second one again and again. Return a function that says how far it is: which time, and seconds.
+// Play both parts, the second one again and again. Return { progress, stop }: how far it is, which time and seconds.
 export function walkInstead([first, again], take) {
   const skipped_s = first.length_s > 2 * STARTS_S ? STARTS_S : 0;
   const begin = performance.now() - 1000 * skipped_s;
   let [part, start_s, next, time] = [first, 0, 0, 1];
   const played_s = () => (performance.now() - begin) / 1000;
-  setInterval(() => {
+  const timer = setInterval(() => {
     const now_s = played_s();
     while (start_s + part.rows[next][0] <= now_s) {
       const [at_s, ax, ay, az, gx, gy, gz] = part.rows[next];
@@ -57,5 +57,6 @@ export function walkInstead([first, again], take) {
       [part, next, time] = [again, 0, time + 1];
     }
   }, EVERY_MS);
-  return () => ({ time, at_s: Math.max(0, played_s() - start_s), length_s: part.length_s });
+  const progress = () => ({ time, at_s: Math.max(0, played_s() - start_s), length_s: part.length_s });
+  return { progress, stop: () => clearInterval(timer) };
 }

@@ -65,6 +65,8 @@ async def test_the_therapist_sees_what_plays_instead_of_a_leg(place, sourced):
         await monitor.until(
             lambda e, it=what: e["kind"] == "presence" and e["presence"]["source_plays"] == it
         )
+    await source.say({"type": "sensor", "trouble": "", "plays": "recording", "round": 2})
+    await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["source_round"] == 2)
     await source.say({"type": "sensor", "trouble": "", "plays": "music"})
     assert (await source.sent_away())[0] == 4400
 

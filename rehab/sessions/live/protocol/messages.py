@@ -217,10 +217,11 @@ class Played(StrEnum):
 
 
 class SensorState(Struct, frozen=True):
-    """What a worn sensor says of itself: its trouble, its rate, its clock less ours."""
+    """What a worn sensor says of itself: its trouble, what plays, its rate, its clock less ours."""
 
     trouble: SensorTrouble
     plays: Played = Played.NOTHING
+    round: Annotated[int, Meta(ge=1)] = 1  # of a recording that begins again
     rate_hz: Number | None = None
     clock_offset_s: Number | None = None
     clock_error_s: Positive | None = None

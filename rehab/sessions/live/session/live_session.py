@@ -259,6 +259,7 @@ class LiveSession:
             "source": self.source is not None,
             "source_trouble": _trouble(self.source, self.source_state),
             "source_plays": _plays(self.source, self.source_state),
+            "source_round": self.source_state.round if self.source and self.source_state else 1,
             "source_clock": _clock(self.source, self.source_state),
             "companion": self.companion is not None,
             "companion_trouble": _trouble(self.companion, self.companion_state),

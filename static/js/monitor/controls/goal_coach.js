@@ -18,12 +18,13 @@ export function createGoalCoach({ show, onPress, change }) {
   function describeBaseline({ baseline: { mean, sd, count, needed, goal, asks }, unit }) {
     if (mean === null) return "";
     const values = { mean: number(mean, 2), sd: sd === null ? "–" : number(sd, 2), unit, count, needed };
-    if (goal === null) return fill(_("Baseline: mean %(mean)s %(unit)s, SD %(sd)s, %(count)s strides."), values);
-    const text = _(
-      "Baseline: mean %(mean)s %(unit)s, SD %(sd)s, %(count)s of %(needed)s strides. Goal: %(goal)s %(unit)s.",
-    );
-    const told = fill(text, { ...values, goal: number(goal, 2) });
-    return asks ? `${told} ${_("Go to the next phase to accept it.")}` : told;
+    const told = fill(_("Baseline: mean %(mean)s %(unit)s, SD %(sd)s, %(count)s strides."), values);
+    if (goal === null) return told;
+    if (count < needed) return `${told} ${fill(_("The goal needs at least %(needed)s."), values)}`;
+    const text = asks
+      ? _("The goal would be %(goal)s %(unit)s: go to the next phase to accept it.")
+      : _("Goal at the end of the baseline, as it stands: %(goal)s %(unit)s.");
+    return `${told} ${fill(text, { goal: number(goal, 2), unit })}`;
   }
 
   function describeSuggestion({ suggested_goal: goal, wanted_hit_rate: wanted, unit, goal: now }) {
