@@ -5,6 +5,7 @@ from argparse import ArgumentParser
 import numpy as np
 import pytest
 
+from rehab.gait.wearables import VERSION
 from rehab.sources.intake.settings import IntakeSettings, add_signal_arguments
 from rehab.sources.reporting import SourceError
 from rehab.training.measures import MEASURES, WORN_CHANNELS
@@ -57,7 +58,7 @@ def test_strides_of_both_feet_have_figures_of_their_own_and_no_a2(chunk):
         for stride in own:
             assert stride.value is None
             assert stride.reasons == ()
-            assert stride.extra["wearable_foot"] == 1
+            assert stride.extra["wearable_foot"] == VERSION
             assert stride.extra["stride_s"] == pytest.approx(STRIDE_S, abs=0.02)
             assert stride.extra["cadence_min"] == pytest.approx(100, abs=2)
             assert stride.extra["foot_stance_percent"] == pytest.approx(65, abs=1)

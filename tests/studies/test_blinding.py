@@ -146,7 +146,12 @@ def test_a_session_of_the_study_is_the_arms(world):
     assert [phase["gain"] for phase in first["phases"]] == [1.0, 0.85, 1.0]
     assert [phase["gain"] for phase in second["phases"]] == [1.0, 1.0, 1.0]
     assert (first["robot_intensity"], second["robot_intensity"]) == (0.0, 1.0)
-    assert first["goal"] == {"value": None, "percent_of_baseline": 100, "asks": False}
+    assert first["goal"] == {
+        "value": None,
+        "percent_of_baseline": 100,
+        "asks": False,
+        "baseline_strides": 50,
+    }
 
 
 @pytest.mark.parametrize("kind", [ChangeKind.VALENCE, ChangeKind.VALENCE_NOW])
