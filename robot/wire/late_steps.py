@@ -68,11 +68,9 @@ class RemoteClock:
         self._offset, self._seen_s = max(known, offset), now_s
         return False
 
-    def allow_standstill(self, now_s: float) -> None:
-        """Lower the estimate as if the clock had stood still since its last fresh time."""
-        if self._offset is not None:
-            self._offset -= (now_s - self._seen_s) * self._speed
-            self._seen_s = now_s
+    def forget(self) -> None:
+        """Begin the estimate anew with the next time that arrives."""
+        self._offset = None
 
     def _decayed_offset(self, now_s: float) -> float | None:
         if self._offset is None:

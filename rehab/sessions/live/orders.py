@@ -6,7 +6,6 @@ ordered goes straight to ``StationRobots``: nothing may hold a stop up.
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -64,7 +63,7 @@ async def _change(host: Host, live: LiveSession, order: ChangeOrder) -> None:
     if CONTROLS[order.kind].leads_to is State.RUNNING:
         _check_room(host, live)
         if live.source_clock is not None:
-            live.source_clock.resume(time.monotonic())
+            live.source_clock.resume()
     await live.change(Change(order.kind, order.value), order.by, timezone.now())
     if live.aggregate.fold.state not in ENDED_STATES:
         return

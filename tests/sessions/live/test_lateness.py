@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from rehab.sessions.live import orders
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.log import Step
@@ -50,14 +49,14 @@ def test_a_clock_that_was_told_late_is_corrected_by_a_quicker_step():
 def test_a_clock_that_stood_still_with_the_session_makes_nothing_late():
     lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0, clock_pauses=True)
     assert not lateness.is_late(1.0, 1.0)
-    lateness.resume(31.0)  # the session goes on after half a minute
+    lateness.resume()  # the session goes on after half a minute
     assert not lateness.is_late(2.0, 32.0)
     assert lateness.is_late(3.0, 38.1)  # and what is late from then on is late
 
 
-def test_a_pause_excuses_no_more_than_itself():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0, clock_pauses=True)
-    lateness.resume(10.0)
+def test_a_clock_that_went_on_with_the_session_is_not_excused_by_a_pause():
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
+    lateness.resume()
     assert lateness.is_late(1.0, 80.0)
 
 
@@ -129,7 +128,6 @@ async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
     now = SimpleNamespace(s=1000.0)
     clock = SimpleNamespace(monotonic=lambda: now.s, time=lambda: now.s)
     monkeypatch.setattr(source_module, "time", clock)
-    monkeypatch.setattr(orders, "time", clock)
     session = await begun(place)
     tablet, robot = await place.tablet(session).open(), await place.robot().open()
     source = await place.source().open(clock_s=0.0, **told)
@@ -145,6 +143,31 @@ async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
     assert [event["number"] for event in steps if event["live"]] == fresh
     await robot.overhear()
     assert [m["number"] for m in robot.heard if m["type"] == "step"] == fresh
+
+
+async def test_a_played_source_that_was_away_when_its_session_went_on_is_live(
+    place, begun, monkeypatch
+):
+    """Its clock stood until it came back: nobody can say since when."""
+    now = SimpleNamespace(s=1000.0)
+    monkeypatch.setattr(source_module, "time", SimpleNamespace(monotonic=lambda: now.s))
+    session = await begun(place)
+    tablet = await place.tablet(session).open()
+    source = await place.source().open(clock_s=0.0, clock_pauses=True)
+    await source.walk(4.0, time_s=0.0)
+    await change(session, "pause")
+    await source.hang_up()
+    await change(session, "resume")
+    now.s += 30.0
+    again = await place.source().dial()
+    assert (await again.hello(last=1, clock_pauses=True))["next"] == 2
+    for number in (2, 3):
+        now.s += 10.0  # until it hears that it may play
+        await again.say({"type": "step"} | a_step(number, 4.0, time_s=10.0 * number))
+    await again.acked(3)
+    await tablet.until_step(3)
+    steps = [event for event in tablet.events if event["kind"] == "step"]
+    assert [event["live"] for event in steps] == [True] * 3
 
 
 async def test_what_a_source_calls_late_is_never_live_and_tells_nothing_of_its_clock(place, begun):

@@ -132,8 +132,10 @@ class SourceConsumer(DeviceSocket):
             state = {"state": fold.state.value, "next": 1, "is_companion": True}
             await self.send_message({"type": "welcome", "session": live.id, **state})
             return
+        # A clock that pauses and is not in hello stands: what was known of it is out of date.
+        is_unknown = not (self.lateness.is_known or self.lateness.clock_pauses)
         clock = live.source_clock
-        if clock is not None and clock.run == self.lateness.run and not self.lateness.is_known:
+        if is_unknown and clock is not None and clock.run == self.lateness.run:
             self.lateness = clock
         live.source_clock = self.lateness
         live.source_state = None  # a sensor says so again

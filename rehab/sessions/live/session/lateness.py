@@ -29,7 +29,7 @@ class Lateness:
         clock_pauses: bool = False,
     ) -> None:
         self.run = run
-        self._clock_pauses = clock_pauses
+        self.clock_pauses = clock_pauses
         self._clock = None if speed is None else RemoteClock(speed, clock_s, now_s)
 
     @property
@@ -37,13 +37,14 @@ class Lateness:
         """Whether anything is known of the source's clock."""
         return self._clock is not None and self._clock.is_known
 
-    def resume(self, now_s: float) -> None:
-        """Allow for a clock that stood still while the session was paused, if it is one that does.
+    def resume(self) -> None:
+        """Begin anew with the next step, if the clock stood while the session was paused.
 
-        The next steps show for how long.
+        For how long it stood shows only that step: the source hears of pause and resumption late,
+        and perhaps on another connection.
         """
-        if self._clock is not None and self._clock_pauses:
-            self._clock.allow_standstill(now_s)
+        if self._clock is not None and self.clock_pauses:
+            self._clock.forget()
 
     def is_late(self, time_s: float, now_s: float) -> bool:
         """Return whether a step of this source time, arriving now, is too late to be shown."""
