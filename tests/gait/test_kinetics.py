@@ -34,6 +34,10 @@ def test_slope(rate_hz, error):
     assert np.abs(slope - expected)[2:-2].max() / (2 * np.pi * 5) < error
 
 
+def test_the_slope_of_a_line_is_the_same_up_to_both_ends():
+    assert differentiate(np.arange(9.0), 250) == pytest.approx(np.full(9, 250.0))
+
+
 def test_peak():
     place, height = interpolate_peak(np.array([0.0, 3.0, 4.0, 3.0]), 2)
     assert (place, height) == (2.0, 4.0)

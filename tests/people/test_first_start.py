@@ -21,6 +21,7 @@ def test_the_first_account_leads_the_first_clinic():
     password = first_password()
     account = User.everywhere.get()
     assert account.check_password(password)
+    assert password.count("-") == 2  # three words: they are typed on a tablet
     assert (account.role, account.clinic) == (Role.LEAD, first_clinic())
     assert (live_settings.DATA_DIR / "first_password").stat().st_mode & 0o777 == 0o600
 

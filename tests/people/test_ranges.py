@@ -42,6 +42,19 @@ def test_all_of_the_range_is_said_in_the_pages_unit_and_language(low: bool) -> N
     assert "min=" not in form.as_p()  # the browser would say it without a unit
 
 
+@pytest.mark.parametrize(
+    ("least", "most", "unit", "said"),
+    [
+        (1, None, "", "Give 1 or more."),
+        (1, None, "m", "Give 1 m or more."),
+        (None, 2, "", "Give up to 2."),
+        (None, 2, "m", "Give up to 2 m."),
+    ],
+)
+def test_a_range_may_be_open_at_one_end(least: Any, most: Any, unit: str, said: str) -> None:
+    assert str(range_message(least, most, unit)) == said
+
+
 @pytest.mark.django_db
 def test_the_set_up_says_its_ranges(world: World) -> None:
     given = {

@@ -13,7 +13,7 @@ from joserfc.jwk import KeySet, RSAKey
 
 from rehab.people.models import Clinic, SignOnGroup, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import sign_on
+from rehab.people.sign_in import sign_on, step_up
 from rehab.people.sign_in.sign_on import LOGOUT_EVENT, SignOnRefused
 from rehab.studies.unblinding import Task, give_mark
 from tests.support.studies import running_study
@@ -115,6 +115,42 @@ def test_an_assessor_gets_no_second_account(linked, world, settings):
 def test_a_second_factor_counts_where_the_hospital_vouches_for_it(claims, shown, settings):
     settings.OIDC_MFA_ACR = ["gold"]
     assert sign_on.has_second_factor(claims) is shown
+
+
+@pytest.fixture
+def back(linked, client, monkeypatch) -> Any:
+    """A person who comes back from the hospital, there for this, with these claims."""
+
+    def come_back(kind: str, **claims: Any) -> Any:
+        purpose = {"kind": kind, "next_url": reverse("account"), "at": int(NOW.timestamp())}
+        monkeypatch.setattr(sign_on, "complete", lambda _: (purpose, {"sub": "4711"} | claims))
+        return client.get(reverse("sign-on-complete"))
+
+    return come_back
+
+
+def test_the_hospitals_second_factor_stands_for_the_own_one(back, client):
+    back("sign-in", amr=["mfa"])
+    assert client.get(reverse("account")).status_code == 200
+
+
+def test_without_it_the_own_second_factor_is_asked_for(back, client):
+    assert back("sign-in", amr=["pwd"]).url != reverse("account")
+    assert client.get(reverse("account")).status_code == 302
+
+
+@pytest.mark.parametrize(
+    ("claims", "confirmed"),
+    [({}, True), ({"sub": "4712"}, False), ({"auth_time": 1}, False)],
+    ids=["same person now", "another person", "long ago"],
+)
+def test_only_the_same_person_confirms_and_only_now(back, client, linked, claims, confirmed):
+    client.force_login(linked)
+    session = client.session
+    session[step_up.CONFIRMED_AT] = 0
+    session.save()
+    back("confirm", **{"auth_time": int(NOW.timestamp()) + 1} | claims)
+    assert (client.session[step_up.CONFIRMED_AT] != 0) == confirmed
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,9 @@ def test_fewer_than_twenty_strides_and_impossible_goals_suggest_nothing():
     assert suggest_goal(A2, [4.0] * SUGGESTION_STRIDES, 0.6) == 4.0
 
 
-@pytest.mark.parametrize(("rate", "goal"), [(0.62, 2.125), (0.63, 1.875)])  # 12.4, 12.6 of 20
+@pytest.mark.parametrize(
+    ("rate", "goal"), [(0.62, 2.125), (0.63, 1.875), (1, 0.25)]
+)  # 12.4 … of 20
 def test_the_wanted_share_is_rounded_to_the_nearest_number_of_hits(rate, goal):
     assert suggest_goal(A2, [stride / 4 for stride in range(1, 21)], rate) == goal
 

@@ -135,6 +135,16 @@ def test_whole_texts_are_taken_past_the_queue():
     assert (taken, daphne.texts()) == (TEXTS, [])
 
 
+@pytest.mark.parametrize("waiting", [b"", b"earlier"])
+def test_nothing_overtakes_what_the_kernel_has_not_taken(waiting):
+    protocol, _ = connect(keep([]))
+    protocol.transport.dataBuffer = waiting
+    sent: list[bytes] = []
+    protocol.transport.writeSomeData = lambda data: sent.append(data) or len(data)
+    protocol.sendData(b"now")
+    assert sent == ([] if waiting else [b"now"])
+
+
 # --- frames ---------------------------------------------------------------------------------------
 
 SIZES = [1, 125, 126, 127, 65_535]

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Collection, Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,7 +20,7 @@ from django.db import DatabaseError
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.session import loading
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.supervisor import source_name
@@ -54,6 +55,24 @@ def dead_pid() -> int:
 )
 def test_which_owners_live(owner, alive):
     assert owners.is_alive(owner) == alive
+
+
+@pytest.mark.parametrize(
+    ("valid", "knows", "alive"),
+    [
+        (["here", "there"], True, True),
+        (["here"], True, False),
+        (["here"], False, True),  # it has no lease to judge by
+        ([], True, True),  # its own has expired, too: the database's clock was set
+    ],
+    ids=["leased", "expired", "no lease", "all expired"],
+)
+def test_a_hosted_owner_lives_as_long_as_its_lease(valid, knows, alive, settings, monkeypatch):
+    settings.HOSTED = True
+    own = SimpleNamespace(may_judge_by=lambda ids: "here" in ids)
+    monkeypatch.setattr(lease, "held", lambda: own if knows else None)
+    monkeypatch.setattr(lease, "valid_servers", lambda: [SimpleNamespace(id=one) for one in valid])
+    assert owners.is_alive("there") == alive
 
 
 def test_a_process_that_has_ended_is_dead_and_this_one_lives():
