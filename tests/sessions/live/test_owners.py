@@ -62,7 +62,7 @@ def test_which_owners_live(owner, alive):
     [
         (["here", "there"], True, True),
         (["here"], True, False),
-        (["here"], False, True),  # it has no lease to judge by
+        (["here"], False, False),  # a command, which has no lease
         ([], True, True),  # its own has expired, too: the database's clock was set
     ],
     ids=["leased", "expired", "no lease", "all expired"],
