@@ -37,7 +37,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
   let receivedAt = 0;
   let heardAt = performance.now(); // unlike `receivedAt` not when a new connection is tried
   let confirmedAt = 0;
-  let clockAhead_s = Infinity; // of ours before the server's, by the frame that came quickest
+  let clockAhead_s, sentAt_s; // ours before the server's, by this connection's quickest frame; its time at the last one
   let lastNumber = null; // the last step that this page has
   let catchUpTo = null; // steps up to this one are being sent after a break
   let confirmedFrame = 0;
@@ -62,6 +62,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     if (message.type !== "error") heardAt = receivedAt; // a server that sends us away knows nothing of the session
     switch (message.type) {
       case "snapshot":
+        clockAhead_s = Infinity; // perhaps it is another server
         measureAge(message.now);
         retryPause = FIRST_PAUSE_MS;
         catchUpTo = message.number;
@@ -113,9 +114,12 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     retryPause = FIRST_PAUSE_MS;
   }
 
-  // Return how old something of this time of the server is [s]; its clock and ours may differ.
+  // Return how old something of this time of the server is [s]; its clock and ours may differ. Where times go back,
+  // its clock was set.
   function measureAge(at_s) {
-    const ahead = Date.now() / 1000 - at_s;
+    const ahead = performance.now() / 1000 - at_s;
+    if (at_s < sentAt_s - LATE_S) clockAhead_s = Infinity;
+    sentAt_s = at_s;
     clockAhead_s = Math.min(clockAhead_s, ahead);
     return ahead - clockAhead_s;
   }
