@@ -7,6 +7,7 @@ import pytest
 
 from robot.bases.kinematic import KinematicBase
 from robot.behavior.beside_answers import MOMENTS
+from robot.behavior.idle import IdleLife
 from robot.behavior.safety import ANNOUNCE_S
 from robot.motion.looks import ACT_OF
 from robot.motion.pools import IDLE
@@ -223,6 +224,13 @@ def test_an_arming_is_followed_by_no_idle_motion_that_was_due(when_s):
     assert began(stage) == seen
     stage.wait(30)
     assert len(began(stage)) > len(seen)
+
+
+def test_all_idle_motions_come_and_none_twice_in_a_row():
+    life = IdleLife(7)
+    motions = [one for s in range(600) if (one := life.next(float(s), math.inf, 1.0))]
+    assert set(motions) == set(IDLE)
+    assert all(a is not b for a, b in itertools.pairwise(motions))
 
 
 def test_idle_motions_are_small_and_slow_and_make_no_sound():

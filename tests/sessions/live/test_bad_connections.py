@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from rehab.sessions.live.consumers import base
 from tests.support.callers import (
     Caller,
@@ -19,17 +21,20 @@ from tests.support.callers import (
 # --- too much, too little -------------------------------------------------------------------------
 
 
-async def test_a_flood_of_frames(place, sourced, bystander, monkeypatch):
+@pytest.mark.parametrize("is_new", [False, True], ids=["the same step", "a step each"])
+async def test_a_flood_of_frames(place, sourced, bystander, monkeypatch, is_new):
     monkeypatch.setattr(base, "FRAME_BURST", 50.0)
     monkeypatch.setattr(base, "FRAMES_PER_S", 1.0)
     session, source = await sourced(place)
     await source.walk(4.0)
-    for _ in range(60):
-        await source.say(a_step(1))
+    for number in range(2, 62):
+        await source.say({"type": "step"} | a_step(number) if is_new else a_step(1))
     code, error = await source.sent_away()
     assert (code, error["code"]) == (4029, "flood")
     assert "frames a second" in error["message"]
-    assert await numbers(session) == [1]
+    stored = await numbers(session)
+    assert stored == list(range(1, len(stored) + 1))
+    assert len(stored) <= (50 if is_new else 1)
 
 
 async def test_a_flood_of_unacknowledged_steps(place, sourced, bystander, stall):

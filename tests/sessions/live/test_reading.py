@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.source import SourceConsumer
-from rehab.sessions.live.protocol.messages import read_frame, read_seen
+from rehab.sessions.live.protocol.messages import read_frame, read_report, read_seen
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.log import Step
 from robot.wire.frames import BadFrame, read_object, read_whole
@@ -118,6 +118,17 @@ def test_what_a_page_has_seen_is_read_at_once_as_it_is_in_its_turn(message):
 def test_usual_words_of_what_is_seen_are_read_at_once():
     assert read_seen('{"type":"seen","frame":8}') == 8
     assert read_seen('{"type":"change","frame":8}') is None
+
+
+@pytest.mark.parametrize("field", [{"look": ["wave"]}, {"lights": "off"}])
+def test_what_a_report_has_wrong_is_named_with_its_cure(field):
+    pose = {"x_m": 0, "y_m": 0, "heading_rad": 0}
+    status = {"kind": "status", "base": "twin", "state": "idle", "reason": "", "pose": pose}
+    read_report({"report": status})
+    with pytest.raises(BadFrame) as refused:
+        read_report({"report": status | field})
+    (name,) = field
+    assert f'"{name}" is a list of 2: ' in str(refused.value)
 
 
 def test_binary_frames_are_refused():

@@ -77,5 +77,5 @@ def _describe(kind: inspect.Type) -> str:
         case inspect.StructType(fields=fields):
             return f"an object with {', '.join(field.encode_name for field in fields)}"
         case inspect.TupleType(item_types=items):
-            return f"a list of {len(items)}, each {_describe(items[0])}"
+            return f"a list of {len(items)}: {', '.join(map(_describe, items))}"
     return f"no {type(kind).__name__.removesuffix('Type').lower()} that fits; see docs/protocol.md"
