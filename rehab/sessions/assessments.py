@@ -114,7 +114,10 @@ class Course:
         if self.norm is None:
             return ""
         low, high = (format_number(end, self.test.places) for end in self.norm)
-        return f"{low if low == high else f'{low}–{high}'} {self.test.unit}".rstrip()
+        text = f"{low if low == high else f'{low}–{high}'} {self.test.unit}".rstrip()
+        if self.norm[0] == self.test.least:
+            return gettext("up to %(most)s") % {"most": f"{high} {self.test.unit}"}
+        return text
 
     @property
     def spark(self) -> str:
