@@ -43,7 +43,8 @@ class ClinicalTest:
     steps
         What to do, a sentence each.
     norms
-        From an age [years] on, the lowest and highest mean of healthy men and women.
+        From an age [years] on, from where to where healthy people are average; the lower end is
+        `least` where a source names a limit alone.
     least_change
         From which change on it is more than chance, or matters to patients; None: unknown.
     levels
@@ -101,7 +102,7 @@ WALK_SPEED = (
     gettext_noop("Stop it when the first foot crosses the last mark."),
     gettext_noop("Walking aid and orthosis as usual; walk slightly behind, never ahead."),
 )
-# Bohannon & Williams Andrews 2011; Steffen 2002; Bohannon 2006.
+# Each number's source is beside it; in full in docs/reference/questionnaires.md.
 CLINICAL_TESTS: dict[str, ClinicalTest] = {
     test.slug: test
     for test in (
@@ -115,7 +116,7 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
             higher_is_better=True,
             way=Way.SPEED,
             steps=(*WALK_SPEED, gettext_noop("Say: “Walk at your own comfortable speed.”")),
-            norms=(
+            norms=(  # means of women and men: Bohannon & Williams Andrews 2011
                 (20, 1.34, 1.36),
                 (30, 1.34, 1.43),
                 (40, 1.39, 1.43),
@@ -124,7 +125,7 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 (70, 1.13, 1.26),
                 (80, 0.94, 0.97),
             ),
-            least_change=0.16,
+            least_change=0.16,  # Tilson 2010
         ),
         ClinicalTest(
             slug="10mwt_fast",
@@ -136,6 +137,7 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
             higher_is_better=True,
             way=Way.SPEED,
             steps=(*WALK_SPEED, gettext_noop("Say: “Walk as fast as you safely can.”")),
+            least_change=0.1,  # Hiengkaew 2012
         ),
         ClinicalTest(
             slug="6mwt",
@@ -156,8 +158,8 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 gettext_noop("Tap “Lap” at each turn. Every minute, say how much time is left."),
                 gettext_noop("At six minutes, measure the meters since the last turn."),
             ),
-            norms=((60, 538, 572), (70, 471, 527), (80, 392, 417)),
-            least_change=34.4,
+            norms=((60, 538, 572), (70, 471, 527), (80, 392, 417)),  # means: Steffen 2002
+            least_change=34.4,  # Tang 2012
             loinc="64098-7",
         ),
         ClinicalTest(
@@ -179,8 +181,9 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                     "count."
                 ),
             ),
-            norms=((60, 8.1, 8.1), (70, 9.2, 9.2), (80, 11.3, 11.3)),
-            least_change=2.9,
+            # 95 % confidence intervals of means: Bohannon 2006
+            norms=((60, 7.1, 9.0), (70, 8.2, 10.2), (80, 10.0, 12.7)),
+            least_change=2.9,  # Flansbjer 2005
             loinc="89423-8",
         ),
         ClinicalTest(
@@ -199,7 +202,8 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 ),
                 gettext_noop("Stop when the fifth stand is complete."),
             ),
-            norms=((60, 11.4, 11.4), (70, 12.6, 12.6), (80, 14.8, 14.8)),
+            norms=((60, 2, 11.4), (70, 2, 12.6), (80, 2, 14.8)),  # at most: Bohannon 2006
+            least_change=3.0,  # of who walks outside a little: Martín-San Agustín 2021
         ),
         ClinicalTest(
             slug="fac",
@@ -216,7 +220,7 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                     "allowed."
                 ),
             ),
-            least_change=1,
+            least_change=1,  # a category
             levels=(
                 gettext_noop("Cannot walk, or needs two people"),
                 gettext_noop("Needs one person all the time, to carry weight"),
@@ -236,8 +240,8 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
             higher_is_better=True,
             way=Way.SCORE,
             steps=(gettext_noop("Use the clinic’s own form, and enter its total."),),
-            norms=((60, 55, 55), (70, 53, 54), (80, 50, 53)),
-            least_change=5,
+            norms=((60, 55, 55), (70, 53, 54), (80, 50, 53)),  # means: Steffen 2002
+            least_change=5,  # Hiengkaew 2012
         ),
     )
 }

@@ -96,17 +96,21 @@ class Course:
         return self.test.judge(self.results[0].value, self.results[-1].value)
 
     @property
+    def now(self) -> str:
+        """The newest result with its unit."""
+        return MISSING if self.last is None else format_result(self.test, self.last.value)
+
+    @property
+    def first(self) -> str:
+        """The first result with its unit; empty if the newest is the only one."""
+        return format_result(self.test, self.results[0].value) if len(self.results) > 1 else ""
+
+    @property
     def summary(self) -> str:
-        """The newest result with its unit, and the first one if there was one before."""
-        if self.last is None:
-            return MISSING
-        text = format_result(self.test, self.last.value)
-        if len(self.results) < 2:
-            return text
-        return gettext("%(now)s, at first %(first)s") % {
-            "now": text,
-            "first": format_result(self.test, self.results[0].value),
-        }
+        """The newest result, and the first one if there was one before."""
+        if not self.first:
+            return self.now
+        return gettext("%(now)s, at first %(first)s") % {"now": self.now, "first": self.first}
 
     @property
     def usual(self) -> str:
@@ -114,7 +118,10 @@ class Course:
         if self.norm is None:
             return ""
         low, high = (format_number(end, self.test.places) for end in self.norm)
-        return f"{low if low == high else f'{low}–{high}'} {self.test.unit}".rstrip()
+        text = f"{low if low == high else f'{low}–{high}'} {self.test.unit}".rstrip()
+        if self.norm[0] == self.test.least:
+            return gettext("up to %(most)s") % {"most": f"{high} {self.test.unit}"}
+        return text
 
     @property
     def spark(self) -> str:

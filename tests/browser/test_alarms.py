@@ -207,7 +207,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             expect(page.locator("[data-alarm]")).to_have_count(1)
         told = start.locator(".elsewhere .red", has_text="Iris fell.")
         expect(told).to_be_visible()
-        expect(patient.locator(".words")).to_have_text("Stand still.")
+        expect(patient.locator(".words")).to_have_text("Stay where you are.")
         expect(patient.locator(".sub")).to_have_text("Help is coming.")
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")

@@ -185,7 +185,7 @@ def test_a_session_from_start_to_scores(server, browser):
             assert page.locator(".part p").text_content() == "8 steps left in this part"
             assert page.locator(".part progress").get_attribute("value") in (None, "0.2")
             assert page.evaluate("document.querySelector('.part progress').value") == 0.2
-        looks(page, "lost", "The sensor is silent.")
+        looks(page, "lost", "No signal from the sensor.")
         page.click("button.pause")
         page.click("text=End")
         page.click("text=Yes, end")

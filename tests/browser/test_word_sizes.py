@@ -50,6 +50,8 @@ MEASURE = """() => {
     short: Number(short ?? 1), words: box(".words"), number: box(".key"), head: box("header"),
     buttons: [...document.querySelectorAll("header button")].filter((one) => one.checkVisibility())
       .map((one) => { const { left, right } = one.getBoundingClientRect(); return [left, right]; }),
+    ground: document.querySelector(".ground").getBoundingClientRect().top,
+    label: box(".label"), foot: document.querySelector(".thermometer .foot").getScreenCTM().a > 0,
     emblem: shown(".emblem"), scene: shown(".thermometer"), chart: shown(".strides") };
 }"""
 
@@ -143,6 +145,10 @@ def test_words_are_as_large_as_promised(
             assert found["drop"] == 3 or (not measured and found["drop"] == 2)
             assert found["drop"] == 3 or found["short"] >= KEPT_FROM - 0.01
         width, height = SCREENS[screen]
+        # The horizon crosses neither words nor number: it is between them, or there is none.
+        if found["drop"] and found["ground"] < height:
+            assert found["words"][3] - 2 <= found["ground"] <= found["label"][1] + 2
+        assert found["foot"]  # the same foot, whichever side it is on
         for left, top, right, bottom in (found["words"], found["number"]):
             assert left >= -1
             assert top >= found["head"][3] - 0.35 * found["word"]

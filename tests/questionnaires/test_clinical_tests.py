@@ -29,8 +29,9 @@ def test_each_is_whole(test):
         ("10mwt", 0.94, 0.78, -1),
         ("tug", 31.0, 28.1, 1),
         ("tug", 28.0, 31.0, -1),
-        ("5sts", 12.0, 12.0, 0),
-        ("5sts", 12.0, 11.9, 1),  # no least change is known
+        ("5sts", 20.0, 17.0, 1),
+        ("5sts", 20.0, 17.1, 0),
+        ("10mwt_fast", 1.0, 1.1, 1),
         ("fac", 2, 3, 1),
         ("berg", 40, 44, 0),
     ],
@@ -42,8 +43,8 @@ def test_a_change_counts_from_where_it_is_more_than_chance(slug, before, now, ve
 @pytest.mark.parametrize(
     ("slug", "age", "norm"),
     [
-        ("tug", 65, (8.1, 8.1)),
-        ("tug", 99, (11.3, 11.3)),
+        ("tug", 65, (7.1, 9.0)),
+        ("tug", 99, (10.0, 12.7)),
         ("tug", 40, None),
         ("tug", None, None),
         ("6mwt", 70, (471, 527)),

@@ -74,10 +74,16 @@ def test_a_course_leaves_out_what_was_struck_out(world):
     assert course.spark == "4.0,28.0 116.0,4.0"
     wrong.refresh_from_db()
     assert wrong.struck_at is not None
-    for address in ("sessions", "tests"):
-        page = client.get(f"/patients/{world.patient.pk}/{address}/").content.decode()
-        assert "28.0 s, at first 31.0 s" in page
+    for address, said in (("sessions", "28.0 s, at first 31.0 s"), ("tests", "at first 31.0 s")):
+        assert said in client.get(f"/patients/{world.patient.pk}/{address}/").content.decode()
     assert client.get(f"/patients/{world.patient.pk}/tests/joy/").status_code == 404
+
+
+@pytest.mark.parametrize(("slug", "usual"), [("tug", "8.2–10.2 s"), ("5sts", "up to 12.6 s")])
+def test_what_is_usual_is_a_range_or_a_limit(world, slug, usual):
+    world.patient.birth_year = NOW.year - 75
+    courses = load_courses(world.people[Role.PT], world.patient)
+    assert next(one.usual for one in courses if one.test.slug == slug) == usual
 
 
 def test_another_clinic_neither_sees_nor_strikes_out(world):

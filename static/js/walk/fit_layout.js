@@ -15,7 +15,7 @@ export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * M
 
 export function createFitting(body, scene) {
   const find = (selector) => body.querySelector(selector);
-  const [phrase, words, count, key] = [".phrase", ".words", ".count", ".key"].map(find);
+  const [stage, phrase, words, count, key] = [".stage", ".phrase", ".words", ".count", ".key"].map(find);
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
   let fitted = "";
@@ -43,7 +43,25 @@ export function createFitting(body, scene) {
     return isTooLarge;
   }
 
+  // The phrase's row becomes as high as its longest sample, so that the scene gets all that is left. Return between
+  // which heights the horizon may lie, in shares of the stage.
+  function measureSky(samples) {
+    const was = [...words.childNodes];
+    let height = 0;
+    for (const sample of samples) {
+      words.textContent = sample;
+      height = Math.max(height, words.offsetHeight);
+    }
+    words.replaceChildren(...was);
+    body.style.setProperty("--phrase", `${height}px`);
+    const { top, height: whole } = stage.getBoundingClientRect();
+    const label = [...count.children].find((part) => part.offsetHeight) ?? count;
+    const ends = [phrase.getBoundingClientRect().bottom, label.getBoundingClientRect().top];
+    return ends.map((end) => (end - top) / whole);
+  }
+
   function set(drop, short) {
+    body.style.removeProperty("--phrase");
     body.dataset.drop = drop;
     if (short < 1) body.dataset.short = short.toFixed(4);
     else delete body.dataset.short;
@@ -86,6 +104,6 @@ export function createFitting(body, scene) {
       }
       set(level, fits);
     }
-    scene.layOut(level);
+    scene.layOut(level, isFeedback && level ? measureSky(shown) : null);
   };
 }

@@ -8,19 +8,13 @@ const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 94;
 const TICKS = [0.25, 0.5, 0.75, 1.25];
-// `low`: where the scale ends once words take the room above it.
+const LEAST = 280; // of the scale's height, with its horizon between words and number
+const AIR = 20; // between words and horizon
+// `under`: whether words stand over the thermometer, not beside it.
 const LAYOUTS = {
-  portrait: { box: "0 0 800 1280", x: 600, y150: 484, low: 704, y0: 1068, chart: [60, 476], figure: [400, 930, 1.66] },
-  landscape: {
-    box: "0 0 1280 800",
-    x: 1066,
-    y150: 150,
-    low: 150,
-    y0: 612,
-    chart: [520, 930],
-    figure: [900, 560, 1.36],
-  },
-  column: { box: "0 0 800 1000", x: 600, y150: 456, low: 590, y0: 812, chart: [60, 476], figure: [400, 760, 1.06] },
+  portrait: { high: 1280, x: 600, y150: 484, y0: 1068, under: true, chart: [60, 476], figure: [400, 930, 1.66] },
+  landscape: { high: 800, x: 1066, y150: 150, y0: 612, under: false, chart: [520, 930], figure: [900, 560, 1.36] },
+  column: { high: 1000, x: 600, y150: 456, y0: 812, under: true, chart: [60, 476], figure: [400, 760, 1.06] },
 };
 
 export function createScene(svg) {
@@ -36,26 +30,34 @@ export function createScene(svg) {
 
   const y = (performance) => layout.y0 - ((layout.y0 - layout.y150) * Math.min(Math.max(performance, 0), TOP)) / TOP;
 
-  // Place all for the screen's shape, and for how much of the scene has gone (fit_layout.js).
-  function layOut(dropped = 0) {
-    const { column } = document.body.dataset;
+  // Place all for the screen's shape, and for how much of the scene has gone (fit_layout.js); `sky`: between which
+  // heights the horizon may lie once words are large.
+  function layOut(dropped = 0, sky = null) {
+    const { column, side } = document.body.dataset;
     layout = { ...LAYOUTS[column ? "column" : portrait.matches ? "portrait" : "landscape"] };
-    if (dropped >= 2) layout.y150 = layout.low;
-    const { x, y0, y150, figure } = layout;
+    const { x, y0, high, under, figure } = layout;
+    const box = `0 0 ${high === 800 ? 1280 : 800} ${high}`;
+    const [words, number] = (sky ?? [0, 1]).map((share) => share * high);
+    if (under && sky) layout.y150 = Math.min(words + 56, y0 - LEAST / 2);
+    else if (sky) layout.y150 = Math.max(layout.y150, (3 * (words + AIR) - y0) / 2);
+    if (!under && y0 - layout.y150 < LEAST) layout.y150 = LAYOUTS.landscape.y150;
+    const { y150 } = layout;
     const [goal, top, bottom] = [y(1), y150 - 36, y0 + 78];
+    const horizon = dropped > 2 ? (words + number) / 2 : goal;
+    const crosses = sky && (horizon < words || horizon > number);
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - TUBE_RADIUS ** 2);
     const r = TUBE_RADIUS;
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
     const shell = `${tube}A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
-    for (const drawing of [svg, stage.querySelector(".backdrop")]) drawing.setAttribute("viewBox", layout.box);
-    stage.style.setProperty("--goal", `${goal}px`);
+    for (const drawing of [svg, stage.querySelector(".backdrop")]) drawing.setAttribute("viewBox", box);
+    stage.style.setProperty("--goal", `${crosses ? high + 100 : horizon}px`);
     for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
     find(".glass").setAttribute("transform", `translate(${x} 0)`);
     find(".above").setAttribute("height", goal - 3);
     place(".hatched", 0, top, { height: y0 - top });
     place(".shined", 0, top, { height: y0 - top - 8 });
     place(".bulb", 0, bottom);
-    place(".foot", 0, bottom, {}, " rotate(14) scale(1.08)");
+    place(".foot", 0, bottom, {}, `${side === "left" ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", TUBE_RADIUS + 10, goal);
     place(".sparkles", 0, top);
     for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);

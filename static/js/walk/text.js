@@ -27,9 +27,9 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "waiting":
       return [_("Waiting for the sensor."), _("Please wait. No score yet.")];
     case "lost":
-      return [_("The sensor is silent."), `${KEEP_WALKING} ${safe}`];
+      return [_("No signal from the sensor."), `${KEEP_WALKING} ${safe}`];
     case "still":
-      return [_("No steps are arriving."), `${KEEP_WALKING} ${safe}`];
+      return [_("No steps measured."), `${KEEP_WALKING} ${safe}`];
     case "paused":
       return [
         _("Pause."),
@@ -40,7 +40,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "offline":
       return [fill(_("No connection for %(count)s s."), { count: silent_s }), KEEP_WALKING];
     case "fell":
-      return [_("Stand still."), _("Help is coming.")];
+      return [_("Stay where you are."), _("Help is coming.")];
     case "ended":
       return [_("You have finished."), _("Next: your scores.")];
     case "closed":
