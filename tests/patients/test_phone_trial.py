@@ -70,6 +70,19 @@ def test_opening_it_again_keeps_the_leg(pt, world: World):
     assert (again.trained_side, again != right) == ("right", True)
 
 
+@pytest.mark.django_db(transaction=True)  # the writer has its own connection
+def test_one_tap_starts_it_and_leads_to_the_therapists_page(pt, world: World):
+    trial = begin(pt)
+    page = pt.get(TRIAL, {"step": "start"}).content.decode()
+    assert 'name="start"' in page
+    there = f"/sessions/{trial.pk}/monitor/"
+    for _again in range(2):
+        assert pt.post(TRIAL, {"start": ""}).headers["Location"] == there
+        trial.refresh_from_db()
+        assert trial.state == "running"
+    assert f'href="{there}"' in pt.get(TRIAL, {"step": "start"}).content.decode()
+
+
 def test_a_taken_station_leads_to_its_session(pt, world: World):
     station = first_station(world.clinic)
     TrainingSession.everywhere.filter(station=station).update(state="finished")
