@@ -148,7 +148,7 @@ def test_the_same_on_a_tablet_and_a_phone_of_ones_own(new_clinic: Server, browse
     day.tap(day.pt, "text=Let phones and tablets in")
     picture(day.pt, "scan-with-the-tablet")
     tablet = day.let_in("tablet-landscape", "screen")
-    expect(tablet.locator("body")).to_have_attribute("data-look", "waiting")
+    expect(tablet.locator("body")).to_have_attribute("data-look", "ready")
     expect(day.pt.locator("[data-live=screen]")).to_have_text("A screen shows Demo")
     picture(day.pt, "scan-with-the-phone")
     phone = day.let_in("phone", "phone")

@@ -152,7 +152,7 @@ def test_http_leads_others_to_https(client: Client, lead: Client, clinic_folder,
     assert client.post("/sign-in/", **away).status_code == 403
     # A browser may not trust the certificate yet: its page says so, and goes on where it does.
     asked = {"HTTP_ACCEPT": "text/html,*/*", "HTTP_HOST": "192.168.1.20:8000"} | away
-    settings.ALLOWED_HOSTS = ["192.168.1.20"]
+    settings.ALLOWED_HOSTS = ["192.168.1.20", "testserver"]
     there = client.get("/tablet/", **asked).headers["Location"]
     assert there == "http://192.168.1.20:8443/certificate/?next=%2Ftablet%2F"
     page = client.get(there, **asked).content.decode()
