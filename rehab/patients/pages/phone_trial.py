@@ -25,7 +25,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import StationTaken, change_session
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.device_trust import NotTrusted, check_approval
-from rehab.stations.models import Device, Station
+from rehab.stations.models import Device
 from rehab.stations.pages.pairing import let_in, tablet_address
 from rehab.stations.pages.phones import LEGS, trial_path
 from rehab.training.changes import ChangeKind, State

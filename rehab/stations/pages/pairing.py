@@ -51,9 +51,7 @@ def pair(request: HttpRequest) -> HttpResponse:
     return render(request, "stations/pair.html", context)
 
 
-def let_in(
-    request: HttpRequest, kind: Device.Kind = Device.Kind.TABLET
-) -> dict[str, Any] | None:
+def let_in(request: HttpRequest, kind: Device.Kind = Device.Kind.TABLET) -> dict[str, Any] | None:
     """Let in the device that shows the code that was sent, once a person has compared it.
 
     Return None where that is done; else the context of `stations/pair_form.html`: why not, or what
@@ -95,7 +93,7 @@ def tablet_address(request: HttpRequest) -> dict[str, Any]:
     """Return the address that a tablet opens, its drawing to scan, and where this page is.
 
     With an own certificate it is one of http, which leads on to https once the tablet trusts that
-    (`https.show_certificate`). Without an address: whether a tablet reached the server all the same.
+    (`https.show_certificate`). Without an address: whether a tablet reached the server anyway.
     """
     here, secure = request.get_full_path(), secure_host()
     host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])

@@ -36,8 +36,8 @@ export async function readRecording(file) {
   return [walk, walk];
 }
 
-// Play both parts, the second one again and again. `take(event, isSkipped)`: of a sample that teaches how it is worn, but
-// is not walked. Return { progress, stop }: how far it is, which time and seconds, and how many each time skips.
+// Play both parts, the second one again and again. `take(event, isSkipped)`: of a sample that teaches how it is worn,
+// but is not walked. Return { progress, stop }: how far it is, which time and seconds, and how many each time skips.
 export function walkInstead([first, again], take) {
   const skipped_s = first.length_s > 2 * STARTS_S ? STARTS_S : 0;
   const begin = performance.now() - 1000 * skipped_s;
