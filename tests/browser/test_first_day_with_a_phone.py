@@ -116,9 +116,15 @@ class FirstDay:
         coach = self.pt.locator("[data-show=coach]")
         expect(coach).to_contain_text("Goal at the end of the baseline", timeout=PATIENCE_MS)
         body = tablet.locator("body")
-        expect(body).to_have_attribute("data-step", "12", timeout=PATIENCE_MS)
+        expect(body).to_have_attribute("data-step", "16", timeout=PATIENCE_MS)
         expect(body).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)
-        expect(tablet.locator(".cut")).to_be_visible()  # its scale begins above 0
+        # A share of stance varies by a hundredth: its scale begins above 0, and says so.
+        expect(tablet.locator(".cut")).to_be_visible()
+        heights = tablet.eval_on_selector_all(
+            ".dots circle:not(.gap)", "all => all.map((one) => Number(one.getAttribute('cy')))"
+        )
+        assert max(heights) - min(heights) >= 15  # of 462
+        expect(self.pt.locator("#strip")).to_contain_text("110 %")
         for page, name in ((phone, "phone-playing"), (tablet, "tablet"), (self.pt, "therapist")):
             picture(page, f"{name}-walking")
 
@@ -138,6 +144,10 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic: Server, browser: B
     phone = day.open_here("text=Open the phone’s page here")
     day.walk(phone, tablet)
     day.check(MOST_HERE)
+    day.pt.click("[data-robot=stop]")  # of a robot that nobody has
+    expect(day.pt.locator("[data-show=robot-stop]")).to_have_text("Robot stopped")
+    expect(day.pt.locator("[data-robot=arm]")).to_be_hidden()
+    expect(day.pt.locator("[data-show=robot-why]")).to_have_text("")
     steps = read_steps(new_clinic, 1)
     assert len(steps) >= 12
     assert all(is_valid for is_valid, _ in steps)
