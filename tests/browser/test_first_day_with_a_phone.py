@@ -63,7 +63,7 @@ class FirstDay:
     def let_in(self, size: str, step: str) -> Page:
         """Let a device of ours in, by QR code, certificate and its own code."""
         expect(self.pt.locator(f"[data-step={step}] [aria-current]")).to_be_visible()
-        there = self.pt.locator(".address").inner_text()
+        there = self.pt.locator(".address").first.inner_text()
         self.taps.append(f"scan with the {size}")
         new = self.open(size, trusts=False)
         new.wait_for_timeout(1500)  # until the server listens, less than a scan takes

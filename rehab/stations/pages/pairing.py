@@ -90,10 +90,11 @@ def _network_of(address: str) -> str:
 
 
 def tablet_address(request: HttpRequest) -> dict[str, Any]:
-    """Return the address that a tablet opens, its drawing to scan, and where this page is.
+    """Return the addresses that a tablet opens, each with its drawing to scan, and this page's own.
 
-    With an own certificate it is one of http, which leads on to https once the tablet trusts that
-    (`https.show_certificate`). Without an address: whether a tablet reached the server anyway.
+    One that lacks an own certificate comes by http, which leads on to https once it trusts that
+    (`https.show_certificate`); no other one, since anybody in the network can read and change http.
+    Without an address: whether a tablet reached the server anyway.
     """
     here, secure = request.get_full_path(), secure_host()
     host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
@@ -101,10 +102,12 @@ def tablet_address(request: HttpRequest) -> dict[str, Any]:
         tablets = Device.objects.visible_to(user_of(request)).filter(kind=Device.Kind.TABLET)
         return {"is_reached": tablets.exclude(last_seen_at=None).exists(), "here": here}
     own = certificate_square()
-    scheme = "http" if own else "https" if secure else request.scheme
-    address = f"{scheme}://{host}{reverse('tablet')}"
-    drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
-    return {"address": address, "qr": drawing, "here": here, **own}
+    address = f"{'https' if secure else request.scheme}://{host}{reverse('tablet')}"
+    addresses = [address.replace("https", "http", 1), address] if own else [address]
+    drawn = [
+        (one, segno.make(one, micro=False).svg_inline(omitsize=True, border=2)) for one in addresses
+    ]
+    return {"addresses": drawn, "here": here, **own}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
