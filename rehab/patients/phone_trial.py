@@ -92,7 +92,7 @@ def look_at_trial(trial: TrainingSession, now: datetime) -> dict[str, Found]:
                 _("A screen shows %(name)s") % name,
                 _("No screen shows %(name)s") % name,
             ),
-            ("phone", presence["source"], _("connected"), _("not connected")),
+            ("phone", bool(presence["source"]), _("connected"), _("not connected")),
             ("recording", bool(presence["source_plays"]), _("chosen"), _("none yet")),
         )
     }

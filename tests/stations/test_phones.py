@@ -57,7 +57,7 @@ TRIAL = "/first-steps/phone/"
 WAYS = {"paired": "/phones/pair/", "tried": f"{TRIAL}open/", "by its code": TRIAL}
 
 
-def ask(who: Client, way: str, wish: dict[str, object], **request: Any) -> tuple[str, str]:
+def ask(who: Client, way: str, wish: dict[str, Any], **request: Any) -> tuple[str, str]:
     """Return the token that a way to one gives, and what the person reads then.
 
     It is behind the square, in a trial's address, or where the phone whose code was compared goes.

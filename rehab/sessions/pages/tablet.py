@@ -45,10 +45,11 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
         return render(request, "sessions/tablet.html", context)
     now = timezone.now()
     begun = pairing.find_pairing(request.COOKIES.get(PAIRING_COOKIE, ""), now)
-    if begun is not None and begun.device is None:
-        return _show_code(request, begun.code)
-    if begun is not None and (token := pairing.claim_token(begun)) is not None:
-        return _set_paired(redirect(_way_in(begun.device, token)), begun.device, token)
+    if begun is not None:
+        if (device := begun.device) is None:
+            return _show_code(request, begun.code)
+        if (token := pairing.claim_token(begun)) is not None:
+            return _set_paired(redirect(_way_in(device, token)), device, token)
     agent = describe_browser(request.headers.get("User-Agent", ""))
     try:
         begun, secret = pairing.start_pairing(client_address(request), now, agent)
