@@ -10,7 +10,6 @@ from rehab.patients.first_steps import Found
 from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.payloads import Message
 from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.sessions.setup.protocols import MeasureDefinition
 from rehab.stations.models import Station
@@ -79,22 +78,21 @@ def begin_trial(patient: Patient, station: Station, side: Side | None, by: User)
 
 
 def look_at_trial(trial: TrainingSession, now: datetime) -> dict[str, Found]:
-    """Return which of its screens are there: the patient's, and the phone's."""
+    """Return what of it is there: the patient's screen, the phone's, what the phone will play."""
     running = runtime.peek()
     live = running.sessions.get(trial.pk) if running else None
     presence = live.presence(now) if live else {"tablets": 0, "source": False, "source_plays": ""}
     name = {"name": trial.patient.nickname}
     return {
-        "screen": Found(True, _("A screen shows %(name)s") % name)
-        if presence["tablets"]
-        else Found(False, _("No screen shows %(name)s") % name),
-        "phone": _look_at_phone(presence),
+        slug: Found(is_there, words if is_there else missing)
+        for slug, is_there, words, missing in (
+            (
+                "screen",
+                bool(presence["tablets"]),
+                _("A screen shows %(name)s") % name,
+                _("No screen shows %(name)s") % name,
+            ),
+            ("phone", bool(presence["source"]), _("connected"), _("not connected")),
+            ("recording", bool(presence["source_plays"]), _("chosen"), _("none yet")),
+        )
     }
-
-
-def _look_at_phone(presence: Message) -> Found:
-    if presence["source_plays"]:
-        return Found(True, _("The phone’s page is connected."))
-    if presence["source"]:
-        return Found(False, _("The phone’s page is connected. Play a recording there."))
-    return Found(False, _("No phone’s page is connected yet."))

@@ -239,6 +239,11 @@ class TrainingSession(ClinicModel):
         return self.started_at or self.created_at
 
     @property
+    def simulated_word(self) -> str:
+        """How people read that it was no patient's own walk: a recording may be tried, too."""
+        return gettext("Trial") if self.patient.simulated else gettext("Simulated")
+
+    @property
     def later_valences(self) -> list[str]:
         """The valences that it was changed to while it ran, in order."""
         return self.changed_to.split(",") if self.changed_to else []

@@ -7,7 +7,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import override
 
 from rehab.people.models import Clinic, User
-from rehab.stations.models import WORN_LIFETIME, Device, Station
+from rehab.stations.models import Device, Station
 
 
 def first_station(clinic: Clinic) -> Station:
@@ -19,11 +19,8 @@ def first_station(clinic: Clinic) -> Station:
         return Station.everywhere.create(clinic=clinic, name=_("Station 1"))
 
 
-def issue_builtin_token(station: Station, kind: Device.Kind, by: User | None = None) -> str:
-    """Return a new token of the station's built-in device; the one before stops working.
-
-    A person who gets it (``by``) answers for it, and it ends after a day in the clinic.
-    """
+def builtin_device(station: Station, kind: Device.Kind, by: User | None = None) -> Device:
+    """Return the station's built-in device, not saved; who gets its token answers for it."""
     device = Device.everywhere.filter(station=station, kind=kind, builtin=True).first()
     if device is None:
         with override(station.clinic.language):
@@ -31,11 +28,17 @@ def issue_builtin_token(station: Station, kind: Device.Kind, by: User | None = N
         device = Device(
             clinic_id=station.clinic_id, station=station, kind=kind, name=name, builtin=True
         )
-    token = device.new_token()
     device.revoked_at, device.approver = None, by
-    if by is not None:
-        now = timezone.now()
-        device.note_issuer(by, now)
-        device.token_expires_at = now + WORN_LIFETIME
+    device.note_issuer(by, timezone.now())
+    return device
+
+
+def issue_builtin_token(station: Station, kind: Device.Kind, by: User | None = None) -> str:
+    """Return a new token of the station's built-in device; the one before stops working.
+
+    A person who gets it (``by``) answers for it, and it ends after a day in the clinic.
+    """
+    device = builtin_device(station, kind, by)
+    token = device.new_token()
     device.save()
     return token

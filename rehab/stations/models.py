@@ -119,7 +119,7 @@ class Device(TokenModel):
         """Return whether a person answers for it: a tablet, a phone, what a person tries."""
         return self.kind == self.Kind.TABLET or bool(self.place) or self.approver_id is not None
 
-    def note_issuer(self, by: User, now: datetime) -> None:
+    def note_issuer(self, by: User | None, now: datetime) -> None:
         """Make the person who gives a tablet or phone its token the one who answers for it."""
         if self.is_let_in:
             self.approver, self.approved_at, self.last_seen_at = by, now, None
@@ -128,7 +128,7 @@ class Device(TokenModel):
         """Set and return a new token, as if there had been none before."""
         self.successor_hash = self.retired_hash = self.given_hash = ""
         self.rotated_at = self.token_expires_at = self.copy_seen_at = None
-        if self.place:
+        if self.is_let_in and self.kind != self.Kind.TABLET:
             self.token_expires_at = timezone.now() + WORN_LIFETIME
         return super().new_token()
 

@@ -1,4 +1,7 @@
-"""Pairing of a tablet with a station: it shows a code, and a signed-in person approves it."""
+"""Pairing of a tablet with a station: it shows a code, and a signed-in person approves it.
+
+A phone on which a recording is tried is let in alike.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from rehab.people.row_values import read_values, save_changes
 from rehab.people.sign_in.known import is_known_network
 from rehab.people.sign_in.tokens import hash_token
 from rehab.people.token_buckets import TokenBuckets
+from rehab.stations.builtin import builtin_device
 from rehab.stations.device_trust import check_approval
 from rehab.stations.models import Device, Pairing, Station
 
@@ -100,24 +104,26 @@ def find_by_code(code: str, by: User, now: datetime) -> Pairing:
 
 
 def approve_pairing(
-    pairing: Pairing, station: Station, by: User, address: str, now: datetime
+    pairing: Pairing,
+    station: Station,
+    by: User,
+    address: str,
+    now: datetime,
+    kind: Device.Kind = Device.Kind.TABLET,
 ) -> Device:
-    """Pair a tablet that waits (`find_by_code`) with a station, by a person at an address.
+    """Pair what waits (`find_by_code`) with a station, by a person at an address.
 
-    Raises PairingRefused.
+    A source is the station's built-in one: the one before is left out. Raises PairingRefused.
     """
-    count = Device.everywhere.filter(station=station, kind=Device.Kind.TABLET).count()
-    device = Device(
-        clinic_id=station.clinic_id,
-        station=station,
-        kind=Device.Kind.TABLET,
-        name=_("Tablet %(number)s") % {"number": count + 1},
-        approver=by,
-        approved_at=now,
-        network=truncate_address(pairing.address),
-        browser=pairing.browser,
-    )
-    device.new_token()  # never shown: the tablet claims its own when it asks again
+    if kind == Device.Kind.TABLET:
+        count = Device.everywhere.filter(station=station, kind=kind).count()
+        name = _("Tablet %(number)s") % {"number": count + 1}
+        device = Device(clinic_id=station.clinic_id, station=station, kind=kind, name=name)
+    else:
+        device = builtin_device(station, kind, by)
+    device.approver, device.approved_at = by, now
+    device.network, device.browser = truncate_address(pairing.address), pairing.browser
+    device.new_token()  # never shown: the device claims its own when it asks again
     with transaction.atomic():
         device.save()
         # It has the whole time again to claim its token.
@@ -133,7 +139,7 @@ def approve_pairing(
 def claim_token(pairing: Pairing) -> str | None:
     """Return the token of an approved tablet, once; None without approval or the second time."""
     device = pairing.device
-    if device is None or device.is_revoked:
+    if device is None or device.is_revoked or device.approver_id is None:
         return None
     deleted, _ = Pairing.everywhere.filter(pk=pairing.pk).delete()
     if not deleted:  # another request claimed it

@@ -80,6 +80,11 @@ class Measure:
         return TYPICAL_SD.get(self.channel)
 
     @property
+    def span(self) -> float:
+        """How far below the goal a drawing's scale begins, as a share of the goal."""
+        return SPANS.get(self.slug, 1.0)
+
+    @property
     def goal_step(self) -> float:
         """By how much buttons raise a goal: 1, 2 or 5 of a decimal place, of 300 or more steps."""
         place = 10.0 ** math.floor(math.log10(self.goal_max / 300))
@@ -209,6 +214,18 @@ PLATE_MEASURES, WORN_MEASURES = (
     for rows in (_PLATES, _WORN)
 )
 TYPICAL_SD = {row[3]: row[-1] for row in _PLATES}
+# Of measures that never come near 0: eight to ten of a leg's standard deviations after a stroke
+# (stance share 1.2-2.7 % of the value, swing 2-8, cadence 2-5, push-off speed 5-10, lean 3-7;
+# docs/sources.md), else nobody would see one stride differ from another.
+SPANS = {
+    "foot_stance": 0.2,
+    "shank_stance": 0.2,
+    "foot_swing": 0.4,
+    "shank_swing": 0.4,
+    "cadence": 0.3,
+    "push_off_speed": 0.6,
+    "shank_lean": 0.4,
+}
 
 MEASURES: Registry[Measure] = Registry(
     "garry.measures",

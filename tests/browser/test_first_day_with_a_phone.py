@@ -17,98 +17,154 @@ from tests.support.worn_phone import read_steps
 
 pytestmark = [pytest.mark.browser, pytest.mark.server]
 
-TAPS, MINUTES = 10, 5  # of twelve: who is new to it takes a wrong turn
+# Taps of twelve. Scanning a QR code is one, choosing a file two; those in a device's own settings,
+# where it installs the certificate, are not ours (docs/using.md).
+MOST_HERE, MOST_OWN, MINUTES = 7, 12, 5
 
 
 @pytest.fixture
-def new_clinic(tmp_path) -> Iterator[tuple[Server, str]]:
-    """Return a server on a new machine, and where others in its network reach it."""
-    address, port = network_address(), free_port()
-    if address is None:
+def new_clinic(tmp_path) -> Iterator[Server]:
+    """Return a server as `make run` starts it on a new machine."""
+    if network_address() is None:
         pytest.skip("this machine has no network")
-    settings = {"GARRY_HTTPS_PORT": str(port)}
-    with serve(tmp_path, "--https", new_machine=True, settings=settings) as server:
-        yield server, f"https://{address}:{port}"
+    with serve(
+        tmp_path, new_machine=True, settings={"GARRY_HTTPS_PORT": str(free_port())}
+    ) as server:
+        yield server
 
 
-def open_screen(browser: Browser, url: str, size: str) -> Page:
-    """Return a screen of that size, whose person trusts the clinic's own certificate."""
-    width, height = SIZES[size]
-    context = browser.new_context(
-        base_url=url, viewport={"width": width, "height": height}, ignore_https_errors=True
-    )
-    context.set_default_timeout(PATIENCE_MS)
-    return context.new_page()
+class FirstDay:
+    """The therapist's own screen on a clinic's first day, and how often anybody has tapped."""
 
+    def __init__(self, browser: Browser, server: Server) -> None:
+        self.browser, self.taps, self._begin_s = browser, ["sign in"], time.monotonic()
+        self.pt = self.open("laptop", server.url)
+        self.pt.goto("/start/")
+        sign_in(self.pt, server.password)
+        picture(self.pt, "start")
+        self.tap(self.pt, "main >> text=Try a phone")
 
-def test_from_the_first_start_to_a_leg_that_walks(new_clinic, browser: Browser):
-    server, address = new_clinic
-    leg = signals("stroke_imu") / "pp02_001_leftshank.csv.gz"
-    begin_s, taps = time.monotonic(), []
+    def open(self, size: str, url: str = "", *, trusts: bool = True) -> Page:
+        """Return a screen of that size; whether it has the clinic's own certificate."""
+        width, height = SIZES[size]
+        context = self.browser.new_context(
+            base_url=url or None,
+            viewport={"width": width, "height": height},
+            ignore_https_errors=trusts,
+        )
+        context.set_default_timeout(PATIENCE_MS)
+        return context.new_page()
 
-    def tap(page: Page, what: str, name: str) -> None:
-        taps.append(name)
+    def tap(self, page: Page, what: str) -> None:
+        """Tap what a page shows."""
+        self.taps.append(what)
         page.click(what)
 
-    tablet = open_screen(browser, address, "tablet-landscape")
-    tablet.goto("/")
-    picture(tablet, "tablet-front-page")
-    tap(tablet, "text=This is the patient’s tablet", "the patient's tablet")
-    pt = open_screen(browser, server.url, "laptop")
-    pt.goto("/start/")
-    sign_in(pt, server.password)
-    taps.append("sign in")
-    picture(pt, "start")
-    tap(pt, "main >> text=Try a phone", "try a phone")
-    expect(pt.locator("main")).to_contain_text(f"{address}/tablet/")
-    picture(pt, "try-a-phone")
-    pt.fill("[name=code]", tablet.locator(".code").inner_text().replace(" ", ""))
-    tap(pt, "text=Compare the code", "compare")
-    picture(pt, "let-the-tablet-in")
-    tap(pt, "text=It shows this code", "let in")
-    expect(pt.locator("[data-live=screen]")).to_have_text("A screen shows Demo")
+    def let_in(self, size: str, step: str) -> Page:
+        """Let a device of ours in, by QR code, certificate and its own code."""
+        expect(self.pt.locator(f"[data-step={step}] [aria-current]")).to_be_visible()
+        there = self.pt.locator(".address").first.inner_text()
+        self.taps.append(f"scan with the {size}")
+        new = self.open(size, trusts=False)
+        new.wait_for_timeout(1500)  # until the server listens, less than a scan takes
+        new.goto(there)
+        picture(new, f"{size}-certificate")
+        with new.expect_download():
+            self.tap(new, "text=1. Download the certificate")
+        expect(new.locator("[data-goes-on]")).to_be_visible()  # it is not trusted yet
+        new.context.close()
+        page = self.open(size)  # now it is: the same page goes on by itself
+        page.goto(there)
+        code = page.locator(".code")
+        expect(code).to_be_visible()
+        assert page.url.startswith("https://")
+        picture(page, f"{size}-code")
+        self.pt.locator("[name=code]").press_sequentially(code.inner_text())
+        expect(self.pt.get_by_text("It shows this code")).to_be_visible()  # asked for by itself
+        picture(self.pt, f"let-the-{size}-in")
+        self.tap(self.pt, "text=It shows this code")
+        return page
 
-    with pt.expect_popup() as opened:
-        tap(pt, "text=Open the phone’s page", "the phone's page")
-    phone = opened.value
-    phone.set_viewport_size({"width": SIZES["phone"][0], "height": SIZES["phone"][1]})
-    expect(phone.locator("section[data-step=trial]")).to_be_visible()
-    connected = pt.locator("[data-live=phone]")
-    expect(connected).to_have_text("The phone’s page is connected. Play a recording there.")
-    recording = phone.locator("[data-recording]")
-    recording.set_input_files({"name": "a.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
-    expect(phone.locator("[data-show=problem]")).to_contain_text("seven columns")
-    expect(phone.locator("[data-play=recording]")).to_be_hidden()
-    recording.set_input_files(leg)
-    taps.append("choose a recording")
-    picture(phone, "phone-recording")
-    tap(phone, "text=Play this recording", "play")
-    expect(phone.locator("[data-show=playing]")).to_contain_text("Recording, 0:2")
-    expect(connected).to_have_text("The phone’s page is connected.")
-    tap(pt, "text=To the therapist’s page", "the therapist's page")
-    source = pt.locator("[data-presence=source]")
-    expect(source).to_contain_text("recording · connected")
-    expect(pt.locator(".readiness")).to_contain_text("✓ A screen shows Demo✓ Sensor")
-    expect(pt.locator("[data-show=extras]")).to_contain_text("More is better")
-    expect(pt.locator(".whom")).not_to_contain_text("simulated")
-    picture(pt, "therapist-before-the-start")
-    tap(pt, "[data-main]", "start")
-    coach = pt.locator("[data-show=coach]")
-    expect(coach).to_contain_text("Goal at the end of the baseline", timeout=PATIENCE_MS)
+    def open_here(self, what: str) -> Page:
+        """Open a screen in a window beside the therapist's."""
+        with self.pt.expect_popup() as opened:
+            self.tap(self.pt, what)
+        return opened.value
 
-    expect(tablet.locator("body")).to_have_attribute("data-step", "12", timeout=PATIENCE_MS)
-    expect(tablet.locator("body")).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)
-    picture(phone, "phone-playing")
-    picture(tablet, "tablet-walking")
-    picture(pt, "therapist-walking")
-    needed_s = time.monotonic() - begin_s
-    print(f"\n{len(taps)} taps, {needed_s:.0f} s: {', '.join(taps)}")
-    assert len(taps) <= TAPS
-    assert needed_s <= 60 * MINUTES
-    expect(source).to_contain_text("clock")
-    steps = read_steps(server, 1)
+    def walk(self, phone: Page, tablet: Page) -> None:
+        """Choose a leg's recording, start, and see it walk to the patient's goal."""
+        choose = phone.locator("[data-recording]")
+        expect(phone.locator("section[data-step=trial]")).to_be_visible()
+        expect(self.pt.locator("main h2")).to_have_text("On the phone’s page: choose a recording")
+        picture(self.pt, "choose-a-recording")
+        choose.set_input_files({"name": "a.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
+        expect(phone.locator("[data-show=problem]")).to_contain_text("seven columns")
+        choose.set_input_files(signals("stroke_imu") / "pp02_001_leftshank.csv.gz")
+        self.taps += ["choose a recording", "this one"]
+        playing = phone.locator("[data-show=playing]")
+        expect(playing).to_have_text("It walks as soon as the therapist starts the session.")
+        picture(phone, "phone-recording")
+        start = self.pt.locator("[name=start]")
+        expect(start).to_be_visible()
+        expect(phone.locator("[data-show=strides]")).to_have_text("0")
+        picture(self.pt, "start-the-session")
+        self.tap(self.pt, "[name=start]")
+        source = self.pt.locator("[data-presence=source]")
+        expect(source).to_contain_text("recording")
+        expect(self.pt.locator(".whom")).not_to_contain_text("simulated")
+        expect(playing).to_contain_text("without its first 20 s")
+        coach = self.pt.locator("[data-show=coach]")
+        expect(coach).to_contain_text("Goal at the end of the baseline", timeout=PATIENCE_MS)
+        body = tablet.locator("body")
+        expect(body).to_have_attribute("data-step", "16", timeout=PATIENCE_MS)
+        expect(body).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)
+        # A share of stance varies by a hundredth: its scale begins above 0, and says so.
+        expect(tablet.locator(".cut")).to_be_visible()
+        heights = tablet.eval_on_selector_all(
+            ".dots circle:not(.gap)", "all => all.map((one) => Number(one.getAttribute('cy')))"
+        )
+        assert max(heights) - min(heights) >= 15  # of 462
+        expect(self.pt.locator("#strip")).to_contain_text("110 %")
+        for page, name in ((phone, "phone-playing"), (tablet, "tablet"), (self.pt, "therapist")):
+            picture(page, f"{name}-walking")
+
+    def check(self, most: int) -> None:
+        """Fail where that took too many taps, or too long."""
+        needed_s = time.monotonic() - self._begin_s
+        print(f"\n{len(self.taps)} taps, {needed_s:.0f} s: {', '.join(self.taps)}")
+        assert len(self.taps) <= most
+        assert needed_s <= 60 * MINUTES
+
+
+def test_from_the_first_start_to_a_leg_that_walks(new_clinic: Server, browser: Browser):
+    """In windows of one computer."""
+    day = FirstDay(browser, new_clinic)
+    picture(day.pt, "try-a-phone")
+    tablet = day.open_here("text=Open the patient’s screen here")
+    phone = day.open_here("text=Open the phone’s page here")
+    day.walk(phone, tablet)
+    day.check(MOST_HERE)
+    day.pt.click("[data-robot=stop]")  # of a robot that nobody has
+    expect(day.pt.locator("[data-show=robot-stop]")).to_have_text("Robot stopped")
+    expect(day.pt.locator("[data-robot=arm]")).to_be_hidden()
+    expect(day.pt.locator("[data-show=robot-why]")).to_have_text("")
+    steps = read_steps(new_clinic, 1)
     assert len(steps) >= 12
     assert all(is_valid for is_valid, _ in steps)
+
+
+def test_the_same_on_a_tablet_and_a_phone_of_ones_own(new_clinic: Server, browser: Browser):
+    day = FirstDay(browser, new_clinic)
+    day.tap(day.pt, "text=Let phones and tablets in")
+    picture(day.pt, "scan-with-the-tablet")
+    tablet = day.let_in("tablet-landscape", "screen")
+    expect(tablet.locator("body")).to_have_attribute("data-look", "ready")
+    expect(day.pt.locator("[data-live=screen]")).to_have_text("A screen shows Demo")
+    picture(day.pt, "scan-with-the-phone")
+    phone = day.let_in("phone", "phone")
+    day.walk(phone, tablet)
+    day.check(MOST_OWN)
+    assert all(is_valid for is_valid, _ in read_steps(new_clinic, 1))
 
 
 def test_a_recording_says_its_round_and_ends_with_the_session(
@@ -123,10 +179,10 @@ def test_a_recording_says_its_round_and_ends_with_the_session(
         expect(page.locator("section[data-step=trial]")).to_be_visible()
         file: FilePayload = {"name": "short.csv", "mimeType": "text/csv", "buffer": text}
         pt = visit(walk.monitor_path, walk, "laptop")
-        pt.click("[data-main]")
         page.set_input_files("[data-recording]", file)
-        page.click("text=Play this recording")
         playing = page.locator("[data-show=playing]")
+        expect(playing).to_have_text("It walks as soon as the therapist starts the session.")
+        pt.click("[data-main]")
         expect(playing).to_contain_text("Recording, 0:00 of 0:02")
         expect(playing).to_contain_text("Recording again, round 2")
         expect(pt.locator("[data-presence=source]")).to_contain_text("recording, round")

@@ -36,7 +36,7 @@ def test_its_goal_is_the_mean_of_a_short_baseline(pt, world: World, settings):
     page = pt.get(TRIAL, headers={"host": "127.0.0.1:8000"}).content.decode()
     assert "More is better" in page
     assert "No screen shows Demo" in page
-    assert "No phone’s page is connected yet." in page
+    assert "not connected" in page
     assert f'action="/https/?next={quote(TRIAL, safe="")}"' in page
 
 
@@ -70,6 +70,19 @@ def test_opening_it_again_keeps_the_leg(pt, world: World):
     assert (again.trained_side, again != right) == ("right", True)
 
 
+@pytest.mark.django_db(transaction=True)  # the writer has its own connection
+def test_one_tap_starts_it_and_leads_to_the_therapists_page(pt, world: World):
+    trial = begin(pt)
+    page = pt.get(TRIAL, {"step": "start"}).content.decode()
+    assert 'name="start"' in page
+    there = f"/sessions/{trial.pk}/monitor/"
+    for _again in range(2):
+        assert pt.post(TRIAL, {"start": ""}).headers["Location"] == there
+        trial.refresh_from_db()
+        assert trial.state == "running"
+    assert f'href="{there}"' in pt.get(TRIAL, {"step": "start"}).content.decode()
+
+
 def test_a_taken_station_leads_to_its_session(pt, world: World):
     station = first_station(world.clinic)
     TrainingSession.everywhere.filter(station=station).update(state="finished")
@@ -80,7 +93,7 @@ def test_a_taken_station_leads_to_its_session(pt, world: World):
 
 def test_a_trial_is_its_own_clinics(pt, world: World):
     begin(pt)
-    assert set(pt.get(f"{TRIAL}state/").json()) == {"screen", "phone"}
+    assert set(pt.get(f"{TRIAL}state/").json()) == {"screen", "phone", "recording"}
     stranger = build_world("oak").pt
     assert "Which leg was recorded?" in stranger.get(TRIAL).content.decode()
     assert stranger.get(f"{TRIAL}state/").json() == {}

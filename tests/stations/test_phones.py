@@ -14,10 +14,12 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
+from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import WORN_LIFETIME, Device
 from rehab.stations.tokens import find_device
 from rehab.studies.unblinding import Task, give_mark
 from tests.support.studies import running_study
+from tests.support.tablets import shown_code
 from tests.support.world import NOW, World, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -51,16 +53,31 @@ def test_a_new_token_of_a_phone_ends_as_early_as_the_first(pt: Client, world: Wo
     assert first <= device.token_expires_at <= timezone.now() + WORN_LIFETIME
 
 
-WAYS = {"paired": "/phones/pair/", "tried": "/first-steps/phone/open/"}
+TRIAL = "/first-steps/phone/"
+WAYS = {"paired": "/phones/pair/", "tried": f"{TRIAL}open/", "by its code": TRIAL}
 
 
-def ask_for_token(who: Client, way: str, wish: dict[str, object], **request: Any) -> str:
-    """Return the token that a way to one gives: behind the square, or in a trial's address."""
-    if way == "tried":
-        who.post("/first-steps/phone/", {"side": "left"}, **request)
-    answer = who.post(WAYS[way], wish, **request)
-    given = answer.headers.get("Location", "") + answer.content.decode()
-    return given.partition("token=")[2].partition("&")[0]
+def ask(who: Client, way: str, wish: dict[str, Any], **request: Any) -> tuple[str, str]:
+    """Return the token that a way to one gives, and what the person reads then.
+
+    It is behind the square, in a trial's address, or where the phone whose code was compared goes.
+    """
+    if way == "paired":
+        page = who.post(WAYS[way], wish, **request).content.decode()
+        return page.partition("token=")[2].partition("&")[0], page
+    who.post(TRIAL, {"side": "left"}, **request)
+    phone = Client(**request)
+    if way == "by its code":
+        sent = {"step": "phone", "code": shown_code(phone), "station": wish["station"]}
+        page = who.post(TRIAL, sent).content.decode()
+        assert not phone.get("/tablet/state/").json()["go"]  # it has not been compared
+        page += who.post(TRIAL, sent | {"compared": "yes"}).content.decode()
+        go = phone.get("/tablet/state/").json()["go"]
+        assert "garry_tablet" not in phone.cookies
+    else:
+        answer = who.post(WAYS[way], wish, follow=True, **request)
+        page, go = answer.content.decode(), "".join(url for url, _ in answer.redirect_chain)
+    return go.partition("token=")[2].partition("&")[0], page
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -70,10 +87,11 @@ def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
     assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
     give_mark(running_study(world), assessor, Task.ASSESSOR, None, NOW)
     client = signed_in(assessor)
-    assert not ask_for_token(client, way, wish)
+    token, page = ask(client, way, wish)
+    assert not token
     assert AuditEntry.everywhere.filter(act=Act.REFUSED, by=assessor).exists()
-    assert "assessor" in client.post(WAYS[way], wish, follow=True).content.decode()
-    assert ask_for_token(world.pt, way, wish)
+    assert "assessor" in page
+    assert ask(world.pt, way, wish)[0]
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -81,8 +99,8 @@ def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way
     wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
     type(world.clinic).everywhere.update(networks="192.168.7.0/24")
     afar: dict[str, Any] = {"REMOTE_ADDR": "203.0.113.9"}
-    assert not ask_for_token(world.pt, way, wish, **afar)
-    page = world.pt.post(WAYS[way], wish, follow=True, **afar).content.decode()
+    token, page = ask(world.pt, way, wish, **afar)
+    assert not token
     assert "Connect it to the clinic’s network" in page
 
 
@@ -91,7 +109,7 @@ def test_a_phones_token_ends_with_who_paired_it_and_after_a_day(world: World, wa
     """Also one that was only tried: it is the station's, whatever is walked there next."""
     station, who = world.add_station(), world.people[Role.PT]
     wish = {"station": station.pk, "place": "shank", "side": "left"}
-    token = ask_for_token(world.pt, way, wish)
+    token, _page = ask(world.pt, way, wish)
     now = timezone.now()
     assert find_device(token, now) is not None
     assert find_device(token, now + WORN_LIFETIME + timedelta(minutes=1)) is None
@@ -99,6 +117,25 @@ def test_a_phones_token_ends_with_who_paired_it_and_after_a_day(world: World, wa
     assert find_device(token, now) is None
     User.everywhere.filter(pk=who.pk).update(is_active=True)
     assert find_device(token, now) is None
+
+
+def test_a_phone_that_is_late_gets_no_token_that_nobody_answers_for(world: World):
+    """Meanwhile the server has run a source of its own there."""
+    station, phone = first_station(world.clinic), Client()
+    world.pt.post(TRIAL, {"side": "left"})
+    sent = {"step": "phone", "code": shown_code(phone), "station": station.pk, "compared": "yes"}
+    world.pt.post(TRIAL, sent)
+    issue_builtin_token(station, Device.Kind.SOURCE)
+    assert not phone.get("/tablet/state/").json()["paired"]
+
+
+def test_a_phone_that_is_let_in_leaves_the_one_before_out(world: World):
+    wish = {"station": first_station(world.clinic).pk}
+    first, _page = ask(world.pt, "by its code", wish)
+    second, _page = ask(world.pt, "tried", wish)
+    now = timezone.now()
+    assert find_device(first, now) is None
+    assert find_device(second, now) is not None
 
 
 @pytest.mark.parametrize("wrong", [{"station": "0"}, {"place": "head"}, {"side": "both"}])

@@ -152,6 +152,12 @@ def test_each_shipped_measure_says_which_way_is_better_and_why(measure):
     assert why.endswith(".")
 
 
+def test_what_never_comes_near_0_is_drawn_near_its_goal():
+    spans = {one.slug: one.span for one in (A2, *PLATE_MEASURES, *WORN_MEASURES)}
+    assert all(0 < span <= 1 for span in spans.values())
+    assert (spans["a2"], spans["shank_stance"], spans["step_asymmetry"]) == (1, 0.2, 1)
+
+
 def test_a_measure_of_a_clinics_own_says_which_way_is_better():
     own = dataclasses.replace(A2, slug="own", higher_is_better=False)
     assert own.better == "Less is better."

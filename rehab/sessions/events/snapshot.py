@@ -74,6 +74,7 @@ def snapshot(
         "about": about,
         **describe_now(fold),
         "unit": plan.measure.unit,
+        "span": plan.measure.span,
         "streak": fold.feedback.streak
         if fold.valence.rewards or audience is Audience.MONITOR
         else None,

@@ -18,7 +18,9 @@ from rehab.people.sign_in.devices import describe_browser
 from rehab.sessions.models import TrainingSession
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device
+from rehab.stations.pages.phones import trial_path
 from rehab.training.changes import OPEN_STATES
+from rehab.training.steps import Side
 
 PAIRING_COOKIE = "garry_pairing"
 
@@ -43,10 +45,11 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
         return render(request, "sessions/tablet.html", context)
     now = timezone.now()
     begun = pairing.find_pairing(request.COOKIES.get(PAIRING_COOKIE, ""), now)
-    if begun is not None and begun.device is None:
-        return _show_code(request, begun.code)
-    if begun is not None and (token := pairing.claim_token(begun)) is not None:
-        return _set_paired(redirect("tablet"), token)
+    if begun is not None:
+        if (device := begun.device) is None:
+            return _show_code(request, begun.code)
+        if (token := pairing.claim_token(begun)) is not None:
+            return _set_paired(redirect(_way_in(device, token)), device, token)
     agent = describe_browser(request.headers.get("User-Agent", ""))
     try:
         begun, secret = pairing.start_pairing(client_address(request), now, agent)
@@ -65,9 +68,18 @@ def _show_code(request: HttpRequest, code: str) -> HttpResponse:
     return render(request, "sessions/tablet.html", context)
 
 
-def _set_paired(response: HttpResponse, token: str) -> HttpResponse:
-    """Let the browser of an approved tablet store its token."""
-    tablets.set_secret_cookie(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
+def _way_in(device: Device, token: str) -> str:
+    """Return the page of what was let in: a tablet's own, of a phone that where it is tried."""
+    if device.kind == Device.Kind.TABLET:
+        return reverse("tablet")
+    session = current_session(device)
+    return trial_path(device.clinic, token, Side(session.trained_side) if session else Side.LEFT)
+
+
+def _set_paired(response: HttpResponse, device: Device, token: str) -> HttpResponse:
+    """Let the browser of an approved tablet store its token; a phone's page has it already."""
+    if device.kind == Device.Kind.TABLET:
+        tablets.set_secret_cookie(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
     response.delete_cookie(PAIRING_COOKIE)
     return response
 
@@ -108,5 +120,7 @@ def tablet_state(request: HttpRequest) -> HttpResponse:
     if begun is None:
         return JsonResponse({"paired": False, "go": reverse("tablet")})  # for a new code
     token = pairing.claim_token(begun)
-    response = JsonResponse({"paired": token is not None, "go": reverse("tablet") if token else ""})
-    return response if token is None else _set_paired(response, token)
+    if begun.device is None or token is None:
+        return JsonResponse({"paired": False, "go": ""})
+    answer = JsonResponse({"paired": True, "go": _way_in(begun.device, token)})
+    return _set_paired(answer, begun.device, token)

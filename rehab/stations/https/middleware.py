@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from ipaddress import ip_address
+from urllib.parse import urlencode
 
 from django.conf import settings
 from django.http import HttpRequest, HttpResponse, HttpResponseBase, HttpResponseRedirect
@@ -16,6 +17,8 @@ from rehab.stations.https.certificate import is_encrypting
 class EncryptionMiddleware:
     """Sends others than this machine from http to https, and keeps cookies of https there.
 
+    A browser that may not trust an own certificate yet first gets the page that says so.
+
     Without HSTS: who removes an own authority must not be locked out. Keeps no state.
     """
 
@@ -27,6 +30,11 @@ class EncryptionMiddleware:
         if self._has_to_move(request):
             name, _ = split_domain_port(request.get_host())
             address = f"https://{name}:{settings.HTTPS_PORT}{request.get_full_path()}"
+            is_page = "text/html" in request.headers.get("Accept", "")
+            if request.method == "GET" and is_page and not settings.CERTIFICATE:
+                place = urlencode({"next": request.get_full_path()})
+                page = f"{reverse('certificate')}?{place}"
+                return HttpResponseRedirect(f"http://{name}:{settings.HTTPS_PORT}{page}")
             if request.method in {"GET", "HEAD"}:
                 return HttpResponseRedirect(address)
             return HttpResponse(f"Use {address}: this server encrypts.\n", status=403)

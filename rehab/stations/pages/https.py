@@ -35,7 +35,7 @@ from rehab.stations.https.certificate import (
 def set_up_https(request: HttpRequest) -> HttpResponse:
     """Make a certificate of the clinic's own; then show how phones and tablets get it.
 
-    ``next`` in the address is the page that led here, and that this one leads back to.
+    ``next`` in the address is the page that led here, and goes on once it is made.
     """
     user = user_of(request)
     network = network_address()
@@ -45,7 +45,7 @@ def set_up_https(request: HttpRequest) -> HttpResponse:
         make_own(now)
         address, about = client_address(request), "https: a certificate of the clinic's own"
         record(Act.CHANGE, user, clinic_id=user.clinic_id, about=about, address=address, now=now)
-        return redirect(request.get_full_path())
+        return redirect(step_up.way_back(request) or request.path)
     context: dict[str, Any] = {
         "is_hosted": settings.HOSTED,
         "is_encrypting": is_encrypting() or request.is_secure(),
@@ -81,8 +81,15 @@ def certificate_square() -> dict[str, str]:
 @never_cache
 @require_safe
 def show_certificate(request: HttpRequest) -> HttpResponse:
-    """Show how a phone or tablet comes to trust this server: read before it does."""
-    context = {"secure_address": secure_address(), **certificate_square()}
+    """Show how a phone or tablet comes to trust this server: read before it does.
+
+    ``next`` is where it goes on by https, as soon as it does.
+    """
+    context = {
+        "secure_address": secure_address(),
+        "next": step_up.way_back(request),
+        **certificate_square(),
+    }
     return render(request, "stations/certificate.html", context)
 
 

@@ -26,6 +26,7 @@ from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import NotTrusted
 from rehab.stations.https.certificate import network_address, secure_host
 from rehab.stations.models import Device, Station
+from rehab.stations.pages.https import certificate_square
 from rehab.stations.pairing import PairingRefused, approve_pairing, find_by_code
 from rehab.stations.pins import PinRefused, check_pin
 from rehab.stations.tablets import COOKIE
@@ -35,27 +36,23 @@ from rehab.stations.tablets import COOKIE
 @step_up.required
 @require_http_methods(["GET", "HEAD", "POST"])
 def pair(request: HttpRequest) -> HttpResponse:
-    """Approve the tablet that shows a code, for a station of the person's own clinic.
-
-    ``next`` in the address is the page that led here, and that this one leads back to.
-    """
+    """Approve the tablet that shows a code, for a station of the person's own clinic."""
     user = user_of(request)
     first_station(clinic_of(user))
-    back = step_up.way_back(request) or reverse("start")
     asked = let_in(request) if request.method == "POST" else {}
     if asked is None:
-        return redirect(back)
+        return redirect("start")
     context = {
         "stations": Station.objects.visible_to(user),
-        "back": back,
+        "back": reverse("start"),
         **asked,
         **tablet_address(request),
     }
     return render(request, "stations/pair.html", context)
 
 
-def let_in(request: HttpRequest) -> dict[str, Any] | None:
-    """Let in the tablet that shows the code that was sent, once a person has compared it.
+def let_in(request: HttpRequest, kind: Device.Kind = Device.Kind.TABLET) -> dict[str, Any] | None:
+    """Let in the device that shows the code that was sent, once a person has compared it.
 
     Return None where that is done; else the context of `stations/pair_form.html`: why not, or what
     there is to compare.
@@ -77,11 +74,12 @@ def let_in(request: HttpRequest) -> dict[str, Any] | None:
                 "own": {"network": own, "browser": agent},
                 "is_elsewhere": theirs != own and not station.clinic.networks,
             }
-        device = approve_pairing(pairing, station, user, here, now)
+        device = approve_pairing(pairing, station, user, here, now, kind)
     except (PairingRefused, NotTrusted) as refused:
         return {"code": code, "problem": str(refused)}
-    names = {"tablet": device.name, "station": station}
-    messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
+    if kind == Device.Kind.TABLET:
+        names = {"tablet": device.name, "station": station}
+        messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
     return None
 
 
@@ -91,26 +89,25 @@ def _network_of(address: str) -> str:
     return truncate_address((is_own and network_address()) or address)
 
 
-def address_for_others(request: HttpRequest) -> str | None:
-    """Return where other devices open this server; None where only this computer can."""
-    secure = secure_host()
-    host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
-    return f"{'https' if secure else request.scheme}://{host}" if host else None
-
-
 def tablet_address(request: HttpRequest) -> dict[str, Any]:
-    """Return the address that a tablet opens, its drawing to scan, and where this page is.
+    """Return the addresses that a tablet opens, each with its drawing to scan, and this page's own.
 
-    Without an address: whether a tablet reached the server all the same.
+    One that lacks an own certificate comes by http, which leads on to https once it trusts that
+    (`https.show_certificate`); no other one, since anybody in the network can read and change http.
+    Without an address: whether a tablet reached the server anyway.
     """
-    server, here = address_for_others(request), request.get_full_path()
-    if server is None:
+    here, secure = request.get_full_path(), secure_host()
+    host = secure or reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
+    if host is None:
         tablets = Device.objects.visible_to(user_of(request)).filter(kind=Device.Kind.TABLET)
         return {"is_reached": tablets.exclude(last_seen_at=None).exists(), "here": here}
-    address = server + reverse("tablet")
-    drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
-    own_certificate = secure_host() is not None and not settings.CERTIFICATE
-    return {"address": address, "qr": drawing, "own_certificate": own_certificate, "here": here}
+    own = certificate_square()
+    address = f"{'https' if secure else request.scheme}://{host}{reverse('tablet')}"
+    addresses = [address.replace("https", "http", 1), address] if own else [address]
+    drawn = [
+        (one, segno.make(one, micro=False).svg_inline(omitsize=True, border=2)) for one in addresses
+    ]
+    return {"addresses": drawn, "here": here, **own}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)

@@ -89,13 +89,19 @@ def _pair(request: HttpRequest, user: User) -> dict[str, Any]:
     page = sensor_path(clinic_of(user))
     worn = f"#token={token}&place={place}&side={side}"
     drawing = segno.make(f"{here}{page}{worn}", micro=False).svg_inline(omitsize=True, border=2)
-    trial = f"{page}&trial{worn}"
+    trial = trial_path(clinic_of(user), token, Side(side))
     return {"device": device, "qr": drawing, "trial": trial, **certificate_square()}
 
 
 def sensor_path(clinic: Clinic) -> str:
     """Return the path of a phone's page in a clinic's language."""
     return f"{reverse('sensor')}?language={clinic.language}"
+
+
+def trial_path(clinic: Clinic, token: str, side: Side) -> str:
+    """Return the path of a phone's page on which a recording is tried."""
+    # Behind the # nothing of it reaches a server's log.
+    return f"{sensor_path(clinic)}&trial#token={token}&place=shank&side={side}"
 
 
 @public

@@ -10,10 +10,10 @@ const HATCH = shape(
   shape("path", { class: "gap", d: "M0 0V7" }),
 );
 
-export function drawLastStrides(svg, strides, count, performanceOf) {
+export function drawLastStrides(svg, strides, count, performanceOf, span) {
   const [fullWidth, fullHeight] = fitViewBox(svg);
   const goal = fullHeight * 0.55;
-  const scale = fullHeight * 0.95;
+  const scale = (fullHeight * 0.95) / span;
   const dx = fullWidth / count;
   const width = dx * 0.68;
 

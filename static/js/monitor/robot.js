@@ -177,7 +177,7 @@ export class RobotPanel {
   #drawWords() {
     const { show } = this.#page;
     const share = this.#decision?.activated_share;
-    const isOther = this.#isHeld || this.#orderFailure; // than what it decides
+    const isOther = this.#isHeld || this.#orderFailure || !this.#isConnected; // than what it decides
     show(
       "share",
       share == null || isOther ? "" : fill(_("So far it celebrates %(share)s of the time."), { share: percent(share) }),
@@ -217,7 +217,7 @@ export class RobotPanel {
 
   // Whether a person has to arm it before it moves.
   get #isHeld() {
-    if (this.#isStopped) return true;
+    if (this.#isStopped) return this.#isConnected || this.#page.state.hadRobot;
     if (this.#isRecovering) return false;
     const { state, reason } = this.#status ?? {};
     return this.#isConnected && (WAITING_STATES.has(state) || reason === "place_unknown");

@@ -63,7 +63,7 @@ export function createStrideCharts({ state, show }) {
       drawStrip(strip, state.strides, state.annotations, session);
       drawLegend();
       show("of-twenty", describeLast());
-      drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session));
+      drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session), session.span);
       drawHitRing(ring, session.hit_rate, session.target.hit_rate);
       describeRate(session);
     },

@@ -7,7 +7,6 @@ import { phaseName } from "garry/shared/labels";
 import { fitViewBox, shape, text } from "garry/shared/svg";
 import { drawAnnotations } from "garry/monitor/strip_annotations";
 
-const RANGE = [0.5, 1.5]; // performance
 const SPACING = 4; // pixels between strides, at least
 const FEWEST = 60; // strides that the width is made for
 const LETTER = 8; // pixels
@@ -43,23 +42,28 @@ export function performanceOf(strides, { goal, higher_is_better: isHigherBetter 
 
 // Return what is plotted: [lowest, highest], the value of a stride, and the lines of the scale.
 function scaleOf(shown, strides, session) {
-  const { goal, unit } = session;
+  const { goal, unit, span } = session;
   if (goal !== null || shown.some(({ performance }) => performance != null)) {
-    const lines = [0.5, 1, 1.5].map((share) => [share, percent(share)]);
-    return { range: RANGE, isJudged: true, valueOf: performanceOf(strides, session), lines };
+    const range = [1 - span / 2, 1 + span / 2]; // performance
+    const lines = [range[0], 1, range[1]].map((share) => [share, percent(share)]);
+    return { range, isJudged: true, valueOf: performanceOf(strides, session), lines };
   }
   const valueOf = ({ valid, value }) => (valid ? (value ?? null) : null);
-  const highest = Math.max(0, ...shown.map((stride) => valueOf(stride) ?? 0));
+  const values = shown.map(valueOf).filter((value) => value !== null);
+  const highest = Math.max(0, ...values);
   if (!highest) return { range: [0, 1], isJudged: false, valueOf, lines: [] };
-  const size = 10 ** Math.floor(Math.log10(highest / 2));
-  const step = [1, 2, 5, 10].map((n) => n * size).find((one) => highest / one <= 4);
-  const top = step * Math.ceil(highest / step);
+  const bottom = span < 1 ? Math.min(...values, (1 - span / 2) * highest) : 0;
+  const room = highest - bottom;
+  const size = 10 ** Math.floor(Math.log10(room / 2));
+  const step = [1, 2, 5, 10].map((n) => n * size).find((one) => room / one <= 4);
+  const [low, top] = [step * Math.floor(bottom / step), step * Math.ceil(highest / step)];
   const places = Math.max(0, -Math.floor(Math.log10(step)));
-  const lines = Array.from({ length: Math.round(top / step) + 1 }, (_each, n) => [
-    n * step,
-    number(n * step, places) + (n * step === top ? ` ${unit}` : ""),
+  const count = Math.round((top - low) / step);
+  const lines = Array.from({ length: count + 1 }, (_each, n) => [
+    low + n * step,
+    number(low + n * step, places) + (n === count ? ` ${unit}` : ""),
   ]);
-  return { range: [0, top], isJudged: false, valueOf, lines };
+  return { range: [low, top], isJudged: false, valueOf, lines };
 }
 
 export function drawStrip(svg, strides, annotations, session) {

@@ -1,4 +1,4 @@
-// The first steps of a clinic: what is there is looked at every two seconds.
+// The first steps of a clinic, and those of a trial: what is there is looked at every two seconds.
 
 const EVERY_MS = 2_000;
 const root = document.querySelector("[data-state]");
@@ -14,6 +14,7 @@ async function look() {
 }
 
 function draw(slug, isDone, words) {
+  if (isDone && root.dataset.now === slug) location.replace(location.pathname); // to the next one
   const step = root.querySelector(`[data-step=${slug}]`);
   const sign = step?.querySelector("[data-sign]");
   step?.classList.toggle("done", isDone);

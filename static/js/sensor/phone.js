@@ -59,10 +59,12 @@ const recent = new RecentSamples();
 const lastPlace = new LastPlace(place, side);
 let elsewhere_deg = 0; // by how much it sits otherwise than last time
 let plays = ""; // instead of a leg: "recording" or "simulated"
+let chosen = null; // what will play
 let walk = null; // what plays, as long as it does
 let sender;
 let link = "no session";
-let count = 0;
+let count = 0; // strides, for the check
+let walked = 0; // those of a session
 let battery = 1;
 let movedUntil_s = 0;
 let heard_s = null; // the newest sample
@@ -92,7 +94,9 @@ function findTrouble() {
   return motion.trouble(now_s()) || minor;
 }
 
-function take(event) {
+const isWalking = () => ["running", "paused"].includes(sender?.state);
+
+function take(event, isSkipped = false) {
   const sample = motion.read(event);
   if (!sample) return;
   const { time_s, rate, acceleration } = sample;
@@ -104,6 +108,8 @@ function take(event) {
   else if (speed > LIFT_RAD_S) hasLifted = true;
   for (const stride of detector.add(time_s, rate, acceleration)) {
     count += 1;
+    if (isSkipped) continue;
+    walked += Number(isWalking());
     if (stride.reasons.includes("sensor_moved")) movedUntil_s = time_s + 5;
     const trouble = findTrouble();
     // What the therapist sees in amber does not count either.
@@ -121,22 +127,27 @@ function describeClock(stride) {
 
 let said = "";
 function tick() {
-  const round = plays === "recording" ? walk.progress().time : 1;
+  if (chosen && isWalking()) startPlay();
+  const round = walk && plays === "recording" ? walk.progress().time : 1;
   const state = { trouble: findTrouble(), plays, round };
   if (sender && said !== (said = JSON.stringify(state))) sender.say({ ...state, rate_hz: motion.rate_hz });
   if (body.dataset.step === "check") drawCheck();
-  show("strides", String(count));
+  show("strides", String(walked));
   const rate = motion.rate_hz === null ? "–" : Math.round(motion.rate_hz);
   const waiting = sender?.waiting ?? 0;
   show("state", fill(_("%(link)s · %(rate)s Hz · %(waiting)s waiting"), { link: LINKS[link], rate, waiting }));
   if (walk) show("playing", describePlayed(walk.progress()));
+  else if (chosen) show("playing", _("It walks as soon as the therapist starts the session."));
 }
 
 const toMinutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")}`;
 
-function describePlayed({ time, at_s, length_s }) {
+function describePlayed({ time, at_s, length_s, skipped_s }) {
   if (plays === "simulated") return _("Simulated leg");
-  const values = { time, at: toMinutes(at_s), of: toMinutes(length_s) };
+  const values = { time, at: toMinutes(at_s), of: toMinutes(length_s), skipped: skipped_s };
+  if (skipped_s && time === 1) {
+    return fill(_("Recording, %(at)s of %(of)s, without its first %(skipped)s s, in which a belt speeds up"), values);
+  }
   if (time === 1) return fill(_("Recording, %(at)s of %(of)s"), values);
   return fill(_("Recording again, round %(time)s: %(at)s of %(of)s"), values);
 }
@@ -200,21 +211,26 @@ async function begin() {
   step("check");
 }
 
-// Nobody stands or lifts a foot in a recording: it is not checked.
+// Nobody stands or lifts a foot in a recording: it is not checked, and walks once the session has started.
 function play(what, leg) {
   if (plays) return;
-  plays = what;
-  walk = walkInstead(leg, take);
+  [plays, chosen] = [what, leg];
   slots.get("playing").hidden = false;
+  if (what === "simulated") startPlay();
   tick();
   step(what === "recording" ? "locked" : "check");
 }
 
+function startPlay() {
+  walk = walkInstead(chosen, take);
+  chosen = null;
+}
+
 // Nothing walks on in a session that is over.
 function endPlay() {
-  if (!walk) return;
-  walk.stop();
-  [plays, walk] = ["", null];
+  if (!plays) return;
+  walk?.stop();
+  [plays, chosen, walk] = ["", null, null];
   show("playing", _("The session has ended. Leave, to choose what plays in the next one."));
   step("locked");
 }
@@ -238,22 +254,16 @@ async function connect() {
 
 // What plays in a trial: a file that a person chooses, or the simulated leg.
 function offerTrial() {
-  let leg = null;
-  const [recording, simulated] = document.querySelectorAll("[data-play]");
   document.querySelector("[data-recording]").addEventListener("change", async ({ target }) => {
     const [file] = target.files;
     if (!file) return;
     try {
-      leg = await readRecording(file);
-      show("problem", "");
-      show("file", `${file.name}, ${toMinutes(leg[0].length_s)}`);
+      play("recording", await readRecording(file));
     } catch (problem) {
-      leg = null;
       show("problem", problem.message);
     }
-    recording.hidden = !leg;
   });
-  recording.addEventListener("click", () => play("recording", leg));
+  const simulated = document.querySelector("[data-play]");
   simulated.addEventListener("click", async () => play("simulated", await fetchLeg(body.dataset.trial)));
   show("leg", fill(_("%(side)s %(place)s: try a recording"), { side: SIDES[side], place: PLACES[place] }));
   step("trial");

@@ -36,7 +36,8 @@ export async function readRecording(file) {
   return [walk, walk];
 }
 
-// Play both parts, the second one again and again. Return { progress, stop }: how far it is, which time and seconds.
+// Play both parts, the second one again and again. `take(event, isSkipped)`: of a sample that teaches how it is worn,
+// but is not walked. Return { progress, stop }: how far it is, which time and seconds, and how many each time skips.
 export function walkInstead([first, again], take) {
   const skipped_s = first.length_s > 2 * STARTS_S ? STARTS_S : 0;
   const begin = performance.now() - 1000 * skipped_s;
@@ -46,17 +47,18 @@ export function walkInstead([first, again], take) {
     const now_s = played_s();
     while (start_s + part.rows[next][0] <= now_s) {
       const [at_s, ax, ay, az, gx, gy, gz] = part.rows[next];
-      take({
+      const event = {
         timeStamp: begin + 1000 * (start_s + at_s),
         accelerationIncludingGravity: { x: ax, y: ay, z: az },
         rotationRate: { beta: gx, gamma: gy, alpha: gz },
-      });
+      };
+      take(event, at_s < skipped_s);
       next += 1;
       if (next < part.rows.length) continue;
-      start_s += part.length_s;
-      [part, next, time] = [again, 0, time + 1];
+      start_s += part.length_s - skipped_s;
+      [part, next, time] = [again, again.rows.findIndex(([later_s]) => later_s >= skipped_s), time + 1];
     }
   }, EVERY_MS);
-  const progress = () => ({ time, at_s: Math.max(0, played_s() - start_s), length_s: part.length_s });
+  const progress = () => ({ time, at_s: Math.max(0, played_s() - start_s), length_s: part.length_s, skipped_s });
   return { progress, stop: () => clearInterval(timer) };
 }

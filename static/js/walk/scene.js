@@ -57,6 +57,7 @@ export function createScene(svg) {
     place(".hatched", 0, top, { height: y0 - top });
     place(".shined", 0, top, { height: y0 - top - 8 });
     place(".bulb", 0, bottom);
+    place(".cut", 0, y0 - 14);
     place(".foot", 0, bottom, {}, `${side === "left" ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", TUBE_RADIUS + 10, goal);
     place(".sparkles", 0, top);
@@ -76,8 +77,10 @@ export function createScene(svg) {
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
-  function show({ performance, hit, close, strides: entries }) {
-    shown = { performance, hit, close, strides: entries };
+  // `isCut`: whether the scale begins above 0.
+  function show({ performance, hit, close, strides: entries, isCut }) {
+    shown = { performance, hit, close, strides: entries, isCut };
+    thermometer.toggleAttribute("data-cut", isCut);
     const level = y(performance ?? 0);
     const height = performance === null ? layout.y0 + 60 : level;
     for (const liquid of liquids) liquid.style.transform = `translateY(${height}px)`;

@@ -44,7 +44,7 @@ const socket = connect(body.dataset.socket, {
     watchServer();
     if (event.kind === "step" && event.live && !document.hidden) {
       confetti = event.confetti;
-      sound(event);
+      sound({ ...event, performance: stretch(event.performance) });
     }
     if (NOT_WALKING.has(event.kind)) redraw();
     else awaitStep();
@@ -72,6 +72,9 @@ function awaitStep() {
   redraw();
 }
 
+// What never comes near 0 is drawn on a scale that begins `span` below the goal (training/measures.py).
+const stretch = (performance) => (performance == null ? performance : 1 + (performance - 1) / session.span);
+
 function redraw() {
   frame ??= requestAnimationFrame(draw);
 }
@@ -91,10 +94,11 @@ function draw() {
   if (screen === "feedback") {
     const { last, steps } = session;
     scene.show({
-      performance: last?.kind === "missing" ? null : last?.performance,
+      performance: last?.kind === "missing" ? null : stretch(last?.performance),
       hit: last?.hit ?? false,
       close: last?.close ?? false,
-      strides: steps,
+      strides: steps.map((stride) => ({ ...stride, performance: stretch(stride.performance) })),
+      isCut: session.span < 1,
     });
     celebrate(confetti);
   } else clear();
