@@ -43,38 +43,6 @@ def describe(analyzer, contact, stance, push_off) -> dict[str, float]:
     cut_n = force_n[end - round(plausibility.CUT_S * stance.rate_hz)]
     moment_lag = stance.index(analysis.LATE_FROM) - half
     jump_rad = continuity.ANGLE_JUMP[0] + continuity.ANGLE_JUMP[1] / stance.rate_hz
-    swing = np.abs(push_off.moment_nm_kg[: begin - round(plausibility.SWING_S * stance.rate_hz)])
-    angle = push_off.angle_rad[begin : end + 1]
-    last = end - round(plausibility.BACKWARD_S * stance.rate_hz)
-    share = (push_off.a2_time_s - stance.begin_s) / (stance.end_s - stance.begin_s)
-    lever_m = plausibility._find_lever(late_n, late_nm, int(late_nm.argmax()))
-    cut_n = force_n[end - round(plausibility.CUT_S * stance.rate_hz)]
-    moment_lag = stance.index(analysis.LATE_FROM) - half
-    jump_rad = continuity.ANGLE_JUMP[0] + continuity.ANGLE_JUMP[1] / stance.rate_hz
-    swing = np.abs(push_off.moment_nm_kg[: begin - round(plausibility.SWING_S * stance.rate_hz)])
-    angle = push_off.angle_rad[begin : end + 1]
-    last = end - round(plausibility.BACKWARD_S * stance.rate_hz)
-    share = (push_off.a2_time_s - stance.begin_s) / (stance.end_s - stance.begin_s)
-    lever_m = plausibility._find_lever(late_n, late_nm, int(late_nm.argmax()))
-    cut_n = force_n[end - round(plausibility.CUT_S * stance.rate_hz)]
-    moment_lag = stance.index(analysis.LATE_FROM) - half
-    jump_rad = continuity.ANGLE_JUMP[0] + continuity.ANGLE_JUMP[1] / stance.rate_hz
-    swing = np.abs(push_off.moment_nm_kg[: begin - round(plausibility.SWING_S * stance.rate_hz)])
-    angle = push_off.angle_rad[begin : end + 1]
-    last = end - round(plausibility.BACKWARD_S * stance.rate_hz)
-    share = (push_off.a2_time_s - stance.begin_s) / (stance.end_s - stance.begin_s)
-    lever_m = plausibility._find_lever(late_n, late_nm, int(late_nm.argmax()))
-    cut_n = force_n[end - round(plausibility.CUT_S * stance.rate_hz)]
-    moment_lag = stance.index(analysis.LATE_FROM) - half
-    moved = np.abs(np.diff(stance.signals[1:, begin:end])).max(axis=1)
-    jumps = [
-        float(most) / (at_once + by_time / stance.rate_hz)
-        for most, (at_once, by_time) in zip(
-            moved / (analyzer._mass_kg, 1),
-            (continuity.MOMENT_JUMP, continuity.ANGLE_JUMP),
-            strict=True,
-        )
-    ]
     return {
         "force": contact.peak_n / analyzer._weight_n,
         "lever": float((moment_nm[toes][loaded] / force_n[toes][loaded]).max()),
