@@ -91,7 +91,8 @@ SIGNS = (
 )
 UNITS = {
     "n": "N", "newton": "N", "newtons": "N", "kn": "kN", "mn": "mN", "kgf": "kgf", "lbf": "lbf",
-    "n/kg": "N/kg", "bw": "body weights", "nm": "Nm", "nmm": "Nmm", "knm": "kNm",
+    "n/kg": "N/kg", "bw": "body weights", "%bw": "% body weight", "nm": "Nm", "nmm": "Nmm",
+    "knm": "kNm",
     "nm/kg": "Nm/kg", "nmm/kg": "Nmm/kg", "lbfft": "lbf·ft", "lbfin": "lbf·in", "rad": "rad",
     "radians": "rad", "mrad": "mrad", "deg": "°", "degree": "°", "degrees": "°", "°": "°",
 }  # fmt: skip
