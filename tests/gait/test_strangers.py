@@ -131,6 +131,15 @@ def test_moments_by_body_weight_and_height_are_told(walk):
     assert "not by body weight and height" in guess.doubt
 
 
+def test_a_marker_s_position_is_no_moment_nor_angle(walk):
+    """HBM's example has markers and a plate in one table, and nothing else."""
+    columns = {"TimeStamp": walk.t_s} | NAMES["HBM"].label(walk)
+    markers = {"RLEK.PosX": "RAnkleFlexion.Mom", "RMT5.PosY": "RAnkleFlexion.Ang"}
+    columns |= {name: columns.pop(other) for name, other in markers.items()}
+    guesses = propose(Table(columns), walk.mass_kg).guesses
+    assert not set(markers) & {guess.column for guess in guesses.values()}
+
+
 def test_a_count_of_frames_is_no_time(walk):
     columns = {"Frame": np.arange(len(walk.t_s)) + 1.0} | NAMES["HBM"].label(walk)
     with pytest.raises(GaitInputError, match="No column is a time"):

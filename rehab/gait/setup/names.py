@@ -143,7 +143,7 @@ def names_another(column: str, channel: str) -> bool:
     return (
         any(other in words for other in OTHER)
         or any(form.search(words) for form in OTHERS[channel])
-        or bool(re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words))
+        or bool(re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b|\bpos", words))
     )
 
 
