@@ -43,8 +43,8 @@ HIDDEN = {
         "scatter by 8 ms: an angle that is out of time from the first stride on is another "
         "person's, as is a moment within 30 ms; a drift is seen by what strides scatter",
         "a file's plates and markers, the moment's from 10 and the angle's from 10 to 16 ms on; a "
-        "synchronization pulse or heel drops; beyond what is known of people, strides are marked as "
-        "unusual and their A2 as less sure",
+        "synchronization pulse or heel drops; beyond what is known of people, strides are marked "
+        "as unusual and their A2 as less sure",
         ("angle +", "angle -", "moment +", "moment -", "drift of"),
     ),
     4: Hidden(
