@@ -85,7 +85,11 @@ def judge(walk: CorpusWalk) -> Row:
         if one.file_a2_w_kg:
             file_errors.append(abs(near[0].a2_w_kg / one.file_a2_w_kg - 1))
     check = check_signals(
-        walk.t_s, walk.legs["left"], walk.legs["right"], rate_hz=walk.rate_hz, mass_kg=walk.mass_kg
+        walk.t_s,
+        walk.legs.get("left"),
+        walk.legs.get("right"),
+        rate_hz=walk.rate_hz,
+        mass_kg=walk.mass_kg,
     )
     assert not any(finding.doubt for finding in check.findings)
     return Row(

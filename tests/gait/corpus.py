@@ -1,7 +1,9 @@
 """Walks of people and systems that GARRY was not built with, and people made up between them.
 
 Read from ``../shared/data``: moore2013 (HBM, split belt), gaitalytics (Nexus, Plug-in Gait, split
-belt), BTK's two (Plug-in Gait, overground), OpenSim's subject01 (plates, overground). A stride is
+belt), BTK's two (Plug-in Gait, overground), OpenSim's subject01 (plates, overground), subject 7 of
+HBM's paper (one leg on a treadmill, with the inverse dynamics that GaitAnalysisToolKit tests
+itself by; its folder is not everywhere). A stride is
 clean where the file's own events agree with the plates on both feet and nothing is missing.
 Nothing here uses detectors of ``rehab.gait``.
 """
@@ -15,12 +17,13 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.io import loadmat
 from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, Stride, measure_strides
 from rehab.gait.recordings.readers import read_any_table
 from tests.gait.walks import read_moore
-from tests.support.data import signals
+from tests.support.data import DATA, signals
 
 SIDES = ("left", "right")
 DEGREES = np.pi / 180
@@ -150,13 +153,28 @@ def _read_moore() -> CorpusWalk:
     return CorpusWalk("moore2013", walk.t_s, legs, walk.mass_kg, False)
 
 
+def _read_hbm() -> CorpusWalk:
+    """GaitAnalysisToolKit 0.2.0, octave/2d_inverse_dynamics/test: markers, plate, and results."""
+    folder, mass_kg = signals(HBM), 67.2
+    raw = np.loadtxt(folder / "rawdata.txt", comments="%")
+    found = loadmat(folder / "refresults.mat")["refresults"]  # hip, knee, ankle of each figure
+    angle, velocity, moment = found[:, 2], found[:, 5], found[:, 8]
+    legs = {"right": LegSamples(raw[:, 14], moment * mass_kg, angle)}
+    return CorpusWalk(
+        "HBM subject 7", raw[:, 0], legs, mass_kg, False, {"right": moment * velocity}
+    )
+
+
+HBM = "hbm_subject7"
 READERS = {
     "moore2013": _read_moore,
     "gaitalytics treadmill": _read_gaitalytics,
     "BTK flatfoot": lambda: _read_vicon("btk_pig_flatfoot_full.c3d", 47.5, "", is_overground=True),
     "BTK motion3": lambda: _read_vicon("btk_pig_motion3_ff.c3d", 74.0, "V", is_overground=True),
     "OpenSim subject01": _read_opensim,
+    "HBM subject 7": _read_hbm,
 }
+PRESENT = [name for name in READERS if name != "HBM subject 7" or (DATA / "raw" / HBM).exists()]
 
 
 @cache
@@ -185,7 +203,7 @@ def find_stances(walk: CorpusWalk, side: str) -> list[tuple[float, float]]:
 def find_clean(walk: CorpusWalk) -> list[CleanStride]:
     """Return the strides that any detector should measure, with their A2."""
     known = find_clean_stances(walk) if walk.known is None else walk.known
-    powers = {side: filter_power(walk, side) for side in SIDES}
+    powers = {side: filter_power(walk, side) for side in walk.legs}
     found = []
     for side, begin_s, end_s in known:
         late_s = (begin_s + 0.4 * (end_s - begin_s), end_s)
@@ -198,12 +216,13 @@ def find_clean(walk: CorpusWalk) -> list[CleanStride]:
 
 def find_clean_stances(walk: CorpusWalk) -> tuple[tuple[str, float, float], ...]:
     """Return side, begin and end of the stances of which nothing is missing or on both plates."""
-    stances = {side: find_stances(walk, side) for side in SIDES}
+    stances = {side: find_stances(walk, side) for side in walk.legs}
     found = []
-    for side, other in (SIDES, SIDES[::-1]):
+    for side, own in stances.items():
+        other = SIDES[side == "left"]
         leg = np.array([np.asarray(row, dtype=float) for row in walk.legs[side][:3]])
         off_s = -math.inf
-        for begin_s, end_s in stances[side]:
+        for begin_s, end_s in own:
             was_free, off_s = begin_s - off_s > FREE_S, end_s
             first, stop = np.searchsorted(walk.t_s, (begin_s - BEFORE_S, end_s + AFTER_S))
             steps_s = np.diff(walk.t_s[first:stop])

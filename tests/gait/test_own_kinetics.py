@@ -146,6 +146,26 @@ def test_a_moment_with_a_wrong_gain_is_told_by_plates_and_markers(name, factor):
     assert {one.doubt for one in moments if not one.is_certain} == set(told)  # none is "sure"
 
 
+@pytest.mark.parametrize(
+    ("name", "column", "late_ms", "sides"),
+    [
+        *((name, "Moment", ms, 2) for name in FILES for ms in (-10, 10)),
+        *((name, "Angles", ms, 2) for name in FILES for ms in (-20, 20)),
+        ("BTK motion3", "Angles", -10, 2),
+        ("gaitalytics treadmill", "Angles", -10, 0),  # its own come 5 to 9 ms late
+        *((name, column, 0, 0) for name in FILES for column in ("Moment", "Angles")),
+    ],
+)
+def test_a_moment_or_angle_out_of_time_is_told_by_plates_and_markers(name, column, late_ms, sides):
+    """No stride shows it, as people differ by more; the file's own markers do."""
+    table = read_any_table(read_lab_file(FILES[name]))
+    time_s = table["time"]
+    for one in [one for one in table if f"Ankle{column}" in one and one.endswith(".X")]:
+        table[one] = np.interp(time_s - late_ms / 1000, time_s, table[one])
+    told = [text for text in check_setup(table).findings if "markers make it" in text]
+    assert len(told) == sides
+
+
 def test_a_c3d_whose_second_axis_is_upward_gets_its_plates(tmp_path):
     path = read_lab_file(FILES["BTK motion3"])
     file, turned = ezc3d.c3d(str(path)), tmp_path / "y_up.c3d"

@@ -58,9 +58,11 @@ def test_moore_is_recognized_by_itself():
     assert all(0.04 < found.timing_s[side, "angle"] < 0.06 for side in ("left", "right"))
 
 
-@pytest.mark.parametrize(("factor", "unit"), [(1, "N"), (-1, "N"), (0.001, "kN")])
-def test_units_and_signs_of_force(walk, factor, unit):
-    guess = check_setup(columns_of(walk, force=factor)).proposal.guesses["left", "force"]
+@pytest.mark.parametrize(
+    ("factor", "unit", "mass_kg"), [(1, "N", None), (-1, "N", None), (0.001, "kN", MASS)]
+)
+def test_units_and_signs_of_force(walk, factor, unit, mass_kg):
+    guess = check_setup(columns_of(walk, force=factor), mass_kg).proposal.guesses["left", "force"]
 
     assert guess.unit == unit
     assert guess.factor == pytest.approx(1 / factor)

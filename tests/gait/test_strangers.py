@@ -1,5 +1,6 @@
 """Files of labs that GARRY has never seen: one command each to the same A2."""
 
+import numpy as np
 import pytest
 
 from rehab.gait import GaitInputError
@@ -96,3 +97,50 @@ def test_markers_by_any_name(label, place):
 def test_labels_that_are_no_markers_of_a_joint(label):
     places = {place for _, place in find_markers([label])}
     assert not places & {"ank", "ankle", "mm", "kne", "knee", "toe", "hee"}
+
+
+FORCES = ("FP1.ForY", "FP2.ForY")
+
+
+def label_by(walk, factors):
+    """Return a walk's columns by HBM's names, times a factor by what a name has in it."""
+    columns = {"time": walk.t_s} | NAMES["HBM"].label(walk)
+    return {
+        name: values * next((f for part, f in factors.items() if part in name), 1.0)
+        for name, values in columns.items()
+    }
+
+
+def test_forces_by_body_weight_are_no_mass(walk):
+    """In kN they would carry everybody's 102 kg."""
+    weights = {"For": 1 / (walk.mass_kg * 9.81)}
+    with pytest.raises(GaitInputError, match="give the mass"):
+        propose(Table(label_by(walk, weights)))
+    percent = Table(label_by(walk, {"For": 100 * weights["For"]}), dict.fromkeys(FORCES, "%BW"))
+    for table in (Table(label_by(walk, weights)), percent):
+        guesses = propose(table, walk.mass_kg).guesses
+        assert guesses["left", "force"].factor == pytest.approx(
+            1 / weights["For"] / (100 if table is percent else 1)
+        )
+
+
+def test_moments_by_body_weight_and_height_are_told(walk):
+    """In kNm they would be a weak ankle's."""
+    table = Table(label_by(walk, {"Mom": 1 / (walk.mass_kg * 9.81 * 1.75)}))
+    guess = propose(table, walk.mass_kg).guesses["left", "moment"]
+    assert "not by body weight and height" in guess.doubt
+
+
+def test_a_marker_s_position_is_no_moment_nor_angle(walk):
+    """HBM's example has markers and a plate in one table, and nothing else."""
+    columns = {"TimeStamp": walk.t_s} | NAMES["HBM"].label(walk)
+    markers = {"RLEK.PosX": "RAnkleFlexion.Mom", "RMT5.PosY": "RAnkleFlexion.Ang"}
+    columns |= {name: columns.pop(other) for name, other in markers.items()}
+    guesses = propose(Table(columns), walk.mass_kg).guesses
+    assert not set(markers) & {guess.column for guess in guesses.values()}
+
+
+def test_a_count_of_frames_is_no_time(walk):
+    columns = {"Frame": np.arange(len(walk.t_s)) + 1.0} | NAMES["HBM"].label(walk)
+    with pytest.raises(GaitInputError, match="No column is a time"):
+        propose(Table(columns), walk.mass_kg)

@@ -13,6 +13,7 @@ from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 TIME = re.compile(r"time|zeit|temps|tiempo|tempo|tijd")
+COUNT = re.compile(r"frame|sample|bild|cadre|cuadro")
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
 RATE_MOST_HZ = 100_000.0  # of any sensor; a larger one is damage
 OVERLAP_S = 0.5  # a stance; files that share less are of different walks
@@ -63,10 +64,13 @@ def resample_channel(values: Floats, rate_hz: float, time_s: Floats) -> Floats:
 def find_time(columns: Mapping[str, Floats]) -> tuple[str, float] | None:
     """Return the column that is a time, and its factor to seconds; None where there is none.
 
-    What counts by one is a time only if nothing else is.
+    What counts by one is a time only if nothing else is, and a count of frames is none.
     """
     counts = [name for name, values in columns.items() if find_period(values[:1000]) == 1.0]
-    ranked = sorted(columns, key=lambda name: (name in counts, not TIME.search(name.lower())))
+    ranked = sorted(
+        (name for name in columns if not (name in counts and COUNT.search(name.lower()))),
+        key=lambda name: (name in counts, not TIME.search(name.lower())),
+    )
     for name in ranked:
         values = columns[name]
         if len(values) < 30 or not np.isfinite(values).all():

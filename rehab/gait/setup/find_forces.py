@@ -253,7 +253,7 @@ def find_force_unit(
     low, high = MASS_USUAL_KG
     if unit in masses and MASS_MIN_KG <= masses[unit] <= MASS_MAX_KG:
         return factors[unit], unit, masses[unit], ""
-    for unit in ("N", "kN", "mN"):
+    for unit in ("N", "mN"):  # not kN, as a force in body weights would carry 102 kg in it
         if low <= masses[unit] <= high:
             return factors[unit], unit, masses[unit], ""
     if MASS_MIN_KG <= masses["N"] <= MASS_MAX_KG:

@@ -91,7 +91,8 @@ SIGNS = (
 )
 UNITS = {
     "n": "N", "newton": "N", "newtons": "N", "kn": "kN", "mn": "mN", "kgf": "kgf", "lbf": "lbf",
-    "n/kg": "N/kg", "bw": "body weights", "nm": "Nm", "nmm": "Nmm", "knm": "kNm",
+    "n/kg": "N/kg", "bw": "body weights", "%bw": "% body weight", "nm": "Nm", "nmm": "Nmm",
+    "knm": "kNm",
     "nm/kg": "Nm/kg", "nmm/kg": "Nmm/kg", "lbfft": "lbf·ft", "lbfin": "lbf·in", "rad": "rad",
     "radians": "rad", "mrad": "mrad", "deg": "°", "degree": "°", "degrees": "°", "°": "°",
 }  # fmt: skip
@@ -142,7 +143,7 @@ def names_another(column: str, channel: str) -> bool:
     return (
         any(other in words for other in OTHER)
         or any(form.search(words) for form in OTHERS[channel])
-        or bool(re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b", words))
+        or bool(re.search(r"\bground|\bcop\b|\bm[xyz]\d?\b|\bpos", words))
     )
 
 

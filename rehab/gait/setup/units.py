@@ -16,14 +16,14 @@ from rehab.gait.signals.filters import Floats
 # What one of each is in N, Nm and rad; of units by body mass, for 1 kg.
 FORCE_UNITS = {
     "N": 1.0, "kN": 1e3, "kgf": GRAVITY_M_S2, "lbf": 4.44822, "mN": 1e-3, "N/kg": 1.0,
-    "body weights": GRAVITY_M_S2,
+    "body weights": GRAVITY_M_S2, "% body weight": GRAVITY_M_S2 / 100,
 }  # fmt: skip
 MOMENT_UNITS = {
     "Nm": 1.0, "Nmm": 1e-3, "kNm": 1e3, "lbf·ft": 1.35582, "lbf·in": 0.112985, "Nm/kg": 1.0,
     "Nmm/kg": 1e-3,
 }  # fmt: skip
 IMPERIAL = {"lbf·ft", "lbf·in"}
-BY_MASS = {"N/kg", "body weights", "Nm/kg", "Nmm/kg"}
+BY_MASS = {"N/kg", "body weights", "% body weight", "Nm/kg", "Nmm/kg"}
 ANGLE_UNITS = {"rad": 1.0, "°": math.pi / 180, "mrad": 1e-3}
 # Mean vertical force of a stance by body weight: half of a stride by its stance. Of the five
 # people of the corpus 0.77 to 0.84 (medians of a leg): enough to tell units apart, not a mass.
@@ -56,8 +56,8 @@ def find_unit(
     """Return a moment's or an angle's unit, its factor, and what speaks against it.
 
     A unit that the file says stands, but for moments by body mass, which many a file does not
-    write: the size of both decides, which differ by tens. Feet and inches are nobody's whose file
-    does not say so: a leg that is weaker by a quarter is usual after a stroke.
+    write: the size of both decides, which differ by tens. Of feet and inches: a leg that is weaker
+    by a quarter is usual after a stroke.
 
     Parameters
     ----------
@@ -80,10 +80,12 @@ def find_unit(
         expected, units, spread = ANGLE_RAD, ANGLE_UNITS, ANGLE_SPREAD
         size = float(np.ptp(profile))
     off = {unit: abs(math.log(max(size * f, 1e-300) / expected)) for unit, f in units.items()}
-    metric = [one for one in units if one not in IMPERIAL]
-    unit = min(metric, key=lambda one: off[one])
-    second = min((one for one in units if one != unit), key=lambda one: off[one])
     written = read_unit(name, table.units)
+    if written != "kNm":  # in which a moment by body weight and height is as large
+        off.pop("kNm", None)
+    metric = [one for one in off if one not in IMPERIAL]
+    unit = min(metric, key=lambda one: off[one])
+    second = min((one for one in off if one != unit), key=lambda one: off[one])
     doubts = []
     if written in units:
         near = unit
@@ -94,5 +96,8 @@ def find_unit(
     elif off[second] < off[unit] + 2 * spread and off[second] < 2 * spread:
         doubts.append(f"{second} would be as likely as {unit}")
     if off[unit] > spread and not doubts:
-        doubts.append(f"its size is {math.exp(min(off[unit], 99)):.1f} times off what is usual")
+        size_off = f"its size is {math.exp(min(off[unit], 99)):.1f} times off what is usual"
+        by_height = channel == "moment" and off[unit] > math.log(5)
+        cure = "; export it in Nm or Nm/kg, not by body weight and height" if by_height else ""
+        doubts.append(size_off + cure)
     return unit, units[unit], doubts

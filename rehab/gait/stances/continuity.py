@@ -28,8 +28,8 @@ MOMENT_FROZEN_S, ANGLE_FROZEN_S = 0.02, 0.04
 # second squared, in late stance [Nm, rad]; noise, and walkers, bend by a hundred times that.
 STRAIGHT_S = 0.06
 STRAIGHT_TO = np.array([[4.0], [0.02]])
-# At once [Nm/kg, rad], and by time: the five people of ``plausibility`` reach 13-23 Nm/kg/s (75
-# from one sample to the next at 1 kHz, which is 0.07 at once) and 4-9 rad/s.
+# At once [Nm/kg, rad], and by time: the six people of ``plausibility`` reach 13-23 Nm/kg/s and 4-9
+# rad/s. Gaitalytics' unfiltered moment jumps by 0.75 Nm/kg once within 10 ms.
 MOMENT_JUMP = (0.15, 40.0)
 ANGLE_JUMP = (0.05, 15.0)
 
@@ -40,8 +40,10 @@ ANGLE_JUMP = (0.05, 15.0)
 # in the time that they take more than in form. Added to that: a constant, and a multiple of the
 # median, for the sensor's noise. Beyond these, where nothing was wrong, k was for the angle 0
 # (BTK's two), 40 (moore2013, OpenSim's subject01) and 225 (gaitalytics, unfiltered) at most; for
-# the moment 110 (moore2013; synthetic people of 0.3 to 6.5 W/kg) and 37 (BTK's motion3). Of an
-# unfiltered channel (gaitalytics, resampled to 120 and 148 Hz) the largest is 7 times the median.
+# the moment 110 (moore2013; synthetic people of 0.3 to 6.5 W/kg) and 37 (BTK's motion3). Eight
+# medians are 5.4 sd of white noise, once in 10 million samples; of the unfiltered angles that the
+# markers of four people make (gaitalytics, BTK's two, HBM's) none exceeds k, of gaitalytics' own
+# the largest is 7.6 medians beyond it.
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 8.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 8.0)  # Nm/kg

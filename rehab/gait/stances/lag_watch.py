@@ -26,21 +26,23 @@ from rehab.gait.signals.filters import (
 )
 
 # A foot that has left the floor stops plantarflexing: from when to when the ankle brakes hardest,
-# after terminal contact. Of seven or eight people and five systems [ms]: moore2013 49 to 61;
-# gaitalytics -2 to 13 (treadmill), 4 to 10 (overground); BTK's two -2 to 22; OpenSim's two 27 to
-# 35; an HBM subject 14. The margins, 18 and 14 ms, are for people who are not among them. Outside,
-# a stride is marked as unusual and stays valid: nothing proves that no person walks so.
+# after terminal contact. Of eleven people and six systems [ms]: moore2013 49 to 61; gaitalytics -2
+# to 13 (treadmill), 4 to 10 (overground); BTK's two -2 to 22; OpenSim's two 27 to 35; HBM's subject
+# 7 14; by markers alone (gaitkit 1.5) a person after a stroke 20 to 40, one with Parkinson's
+# disease 13 to 33, a healthy one 20. The margins, 18 and 14 ms, are for people who are not among
+# them. Outside, a stride is marked as unusual and stays valid: nothing proves that no person walks
+# so.
 BRAKING_S = (-0.02, 0.075)
-PACE_S = 1.1  # a fifth more than the longest usual stance of the five people of all limits here
+PACE_S = 1.1  # a fifth more than the longest usual stance of the people of all limits here
 BRAKING_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.1, 0.2)
 SETTLE_S = 0.05  # of the filter
 AROUND_S = 0.4
 GRID_HZ = 200.0
 CUTOFF_HZ = 8.0
-# Moment and force fall to half of their late peaks together. Medians of five people [ms]: moore2013
-# 8, gaitalytics 2, BTK's two 0 and -3, OpenSim's subject01 3; simulated -11 to -3. Beyond 30 ms the
-# lever of the force would have to double or halve while the foot leaves.
+# Moment and force fall to half of their late peaks together. Medians of six people [ms]: moore2013
+# 8, gaitalytics 2, BTK's two 0 and -3, OpenSim's subject01 3, HBM's 3; simulated -11 to -3. Beyond
+# 30 ms the lever of the force would have to double or halve while the foot leaves.
 HALF = 0.5
 MOMENT_LAG_S = (-0.03, 0.03)
 

@@ -1,8 +1,8 @@
 """Whether a person can have walked a stance: physiological limits, and channels that must agree.
 
-A limit refuses only what lies well beyond the clean strides of the *five people*: moore2013,
-gaitalytics, BTK's two and OpenSim's subject01, four systems, 72 strides. Each names what these
-reach; ``tests/gait/test_limits.py`` measures it again.
+A limit refuses only what lies well beyond the clean strides of the *six people*: moore2013,
+gaitalytics, BTK's two, OpenSim's subject01 and subject 7 of HBM's paper, five programs, 74 strides.
+Each names what these reach; ``tests/gait/test_limits.py`` measures it again.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from rehab.gait.strides import RejectionReason
 STANCE_MIN_S = 0.2
 STANCE_MAX_S = 4.0  # 0.15 m/s after a stroke: strides of 3.4 to 5 s with 75-80 % stance
 # A force that falls from half the body weight to nothing in 20 ms was cut off: 20 ms before
-# terminal contact 0.15 of the weight is left at most (five people).
+# terminal contact 0.15 of the weight is left at most (six people).
 CUT_S = 0.02
 CUT_SHARE = 0.5
-FORCE_MAX = 2.0  # of body weight; 1.0-1.14 (five people), fast walking reaches 1.5
+FORCE_MAX = 2.0  # of body weight; 1.0-1.14 (six people), fast walking reaches 1.5
 # Mean force of one plate over a cycle, by body weight, where the other plate is not known: half of
 # what two may carry (``two_legs``) and, as the sound leg carries more after a stroke (60 ± 7 % when
 # standing, PMC4777057), rather more than half of the weight. Pounds for kilograms give 0.23.
@@ -36,32 +36,33 @@ LOAD_MIN, LOAD_MAX = 0.25, 0.75
 # fast runner 3.5.
 MOMENT_MIN = 0.1  # below, the force passes within 1 cm of the ankle all through stance
 MOMENT_MAX = 3.5
-MOMENT_SWING = 0.4  # of the stance's peak, at any time of the swing before; 0.04 (five people)
+MOMENT_SWING = 0.4  # of the stance's peak, at any time of the swing before; 0.04 (six people)
 MOMENT_DRIFT = 0.08  # Nm/kg, for most of that swing; the foot's weight alone gives 0.035 (the same)
-LEVER_MAX_M = 0.3  # moment by force in late stance; ankle to toes: 0.14-0.24 (five people)
+LEVER_MAX_M = 0.3  # moment by force in late stance; ankle to toes: 0.14-0.24 (six people)
 LEVER_FROM = 0.7  # of stance
 LEVER_FORCE = 0.15  # of body weight
 # A moment is its force times a lever, which passes over the foot steadily: when 30 % of the force
-# are left it is 0.65-1.22 of that at the moment's peak (five people; 0.50 in one stride with the
+# are left it is 0.65-1.22 of that at the moment's peak (six people; 0.50 in one stride with the
 # other foot on the plate). A lever that halves or doubles is another force's. A moment that comes
 # 30 ms early has 0.4 to 0.7 in moore2013, one that comes 50 ms late 1.5 to 2.2.
 LEAVING_SHARE = 0.3
 LEVER_CHANGE = (0.45, 2.5)
-# rad. A stiff ankle in an orthosis moves by 0.05, a free one by 0.31-0.61 in stance (five people).
+# rad. A stiff ankle in an orthosis moves by 0.05, a free one by 0.31-0.61 in stance (six people).
 ANGLE_RANGE_MIN = 0.02
 ANGLE_RANGE_MAX = 2.5  # of degrees even a stiff ankle's 0.05 rad are 2.9
 A2_MAX = 12.0  # W/kg: 2 Nm/kg at 6 rad/s
-PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.86-0.91 of it (five people)
-# Of the peak: an ankle that pushed brakes by 0.05 of it at most before it leaves (five people).
+PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.86-0.91 of it (six people)
+# Of the peak: an ankle that pushed brakes by 0.05 of it at most before it leaves (six people).
 REVERSED_SHARE = 0.5
 # A foot that leaves the floor has been plantarflexing, or resting, to the last: there the ankle
-# turns 0.13 to 1.96 times as fast as at A2 (five people; all plantarflex). What turns back while
-# it pushes is the other leg's, which rolls over its foot by then (0.75 and more), or 100 ms early
-# (0.2-0.7).
+# turns 0.13 to 1.96 times as fast as at A2 (six people; all plantarflex), and 0.56 to 0.89 times as
+# fast as ever in stance by the markers of three others, one after a stroke, one with Parkinson's
+# disease (examples of gaitkit 1.5). What turns back while it pushes is the other leg's, which rolls
+# over its foot by then (0.75 and more), or 100 ms early (0.2-0.7).
 BACKWARD_RAD_S = (0.05, 0.8)
 BACKWARD_SHARE = 0.15  # of the velocity at A2, between these limits
 BACKWARD_S = 0.04
-FULL_LOAD = 0.8  # of body weight; 1.0-1.14 (five people), even slow walking reaches 95 %
+FULL_LOAD = 0.8  # of body weight; 1.0-1.14 (six people), even slow walking reaches 95 %
 CLONUS_TO = 0.8  # of stance; then the ankle pushes off
 CLONUS_RAD_S, CLONUS_TURNS = 0.25, 4
 SWING_S = 0.03  # before initial contact; later, the filter has some of the stance

@@ -42,8 +42,9 @@ HIDDEN = {
         "people brake from 2 ms before to 61 ms after the foot has left, and strides of one "
         "scatter by 8 ms: an angle that is out of time from the first stride on is another "
         "person's, as is a moment within 30 ms; a drift is seen by what strides scatter",
-        "a synchronization pulse or heel drops; beyond what is known of people, strides are marked "
-        "as unusual and their A2 as less sure; the moment's time from 12 ms on",
+        "a file's plates and markers, the moment's from 10 and the angle's from 10 to 16 ms on; a "
+        "synchronization pulse or heel drops; beyond what is known of people, strides are marked "
+        "as unusual and their A2 as less sure",
         ("angle +", "angle -", "moment +", "moment -", "drift of"),
     ),
     4: Hidden(
