@@ -198,16 +198,27 @@ def test_falls_and_stops_of_the_robot_are_proposed_until_they_are_judged(world):
 @pytest.mark.parametrize(
     ("grade", "serious", "relation", "expected", "days"),
     [
-        (3, False, "certain", False, None),
-        (2, True, "possible", False, 15),
-        (4, False, "probable", False, 7),
-        (5, True, "certain", True, 1),
-        (3, True, "none", False, 1),
+        (3, False, "certain", False, (None, None)),
+        (2, True, "possible", False, (1, 15)),  # the sponsor hears of each within a day
+        (4, False, "probable", False, (1, 7)),
+        (5, True, "certain", True, (1, None)),
+        (3, True, "none", False, (1, None)),
     ],
 )
 def test_deadlines_follow_from_how_an_event_is_judged(grade, serious, relation, expected, days):
     event = AdverseEvent(grade=grade, serious=serious, relation=relation, expected=expected, at=NOW)
-    assert event.due_at == (None if days is None else NOW + timedelta(days=days))
+    ends = tuple(day and NOW + timedelta(days=day) for day in days)
+    assert (event.due_at, event.authority_due_at) == ends
+
+
+def test_a_judged_fall_that_was_none_hides_no_other_one(world):
+    study, enrollment = fallen(world, "fall", "fall")
+    [first, second] = [event for _whose, event in propose(study)]
+    record(AdverseEvent(enrollment=enrollment, entry=second, grade=0, relation="none"), NOW)
+    log = {"session": first.session, "after_number": 0, "at": NOW}
+    SessionEvent.everywhere.create(kind="fall_withdrawn", **log)
+    SessionEvent.everywhere.create(kind="pain", value=0.0, **log)  # none was felt
+    assert [event for _whose, event in propose(study)] == [first]
 
 
 def test_who_treats_judges_and_reports_and_only_a_monitor_sees_arms(world):
