@@ -109,7 +109,7 @@ class AdverseEvent(AppendOnlyModel):
 
     @property
     def authority_due_at(self) -> datetime | None:
-        """By when authority and ethics board have to know; None of a known risk, or another cause."""
+        """By when authority and ethics board have to know; None unless related, unexpected."""
         if not self.is_serious or self.expected or self.relation == Relation.NONE:
             return None
         is_fatal = self.grade >= LIFE_THREATENING
