@@ -18,9 +18,9 @@ from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
-from rehab.studies.record.facts import ASKED
 from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
+from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.lifecycle import close, register, revise
 from rehab.studies.results.results import read_results
 from rehab.studies.unblinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms

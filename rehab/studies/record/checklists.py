@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from textwrap import fill
 
 from rehab.studies.models import Study
-from rehab.studies.record.facts import ASKED
 from rehab.studies.record.known import UNMASKED, know
+from rehab.studies.registration.facts import ASKED
 from rehab.studies.results.results import Results
 
 INDENT = "    "

@@ -13,7 +13,7 @@ from rehab.sessions.forms.names import refuse_names
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.record.adverse_events import AdverseEvent
-from rehab.studies.record.facts import ASKED
+from rehab.studies.registration.facts import ASKED
 
 LETTERS_MAX = 4000
 
