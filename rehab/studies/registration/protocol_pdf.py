@@ -168,7 +168,7 @@ def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
     factors = (f"{row['name']}: {', '.join(row['levels'])}" for row in allocation["factors"])
     months = document["months_since_stroke_at_least"]
     secondary = ", ".join(str(outcomes[slug]) for slug in document["secondary_outcomes"])
-    analysis = document.get("analysis", {})
+    analysis, crossed = document.get("analysis", {}), document["design"] == "crossover"
     rows = [
         (gettext("Participants"), document["participants"]),
         (gettext("Months since the stroke, at least"), months),
@@ -180,7 +180,7 @@ def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Factors"), "; ".join(factors)),
         (gettext("Visits in each period"), visits["in_each_period"]),
         (gettext("Days between visits"), visits["days_between"]),
-        (gettext("Days between periods"), visits["days_between_periods"]),
+        (gettext("Days between periods"), visits["days_between_periods"] if crossed else None),
         (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
         (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
