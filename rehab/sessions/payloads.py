@@ -108,9 +108,7 @@ def describe_cue(fold: SessionFold) -> Message:
         "window_s": timing.window_s,
         "count": timing.count,
         "rest_s": timing.rest_s,
-        "intensity": fold.robot_intensity
-        if not spares
-        else min(fold.robot_intensity, ROBOT_LEVELS["gentle"]),
+        "intensity": min(fold.robot_intensity, ROBOT_LEVELS["gentle"] if spares else 1.0),
         "only_informs": not fold.valence.has_points,
         "idles": has_free_robot(fold),
         "seed": fold.plan.seed or None,
