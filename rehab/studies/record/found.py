@@ -102,8 +102,8 @@ def _sensitivity(results: Results) -> str:
     for one in outcome.differences:
         followed, point = outcome.of_protocol(one), results.tipping_point(results.primary, one)
         kept = _text(followed.difference) if followed else "not told"
-        shift = "none does" if point is None else f"{point:.3g}"
-        parts.append(f"{one.group} - {one.reference} {kept}, tipping point {shift}")
+        shift = "no tipping point" if point is None else f"tipping point {point:.3g}"
+        parts.append(f"{one.group} - {one.reference} {kept}, {shift}")
     told = (
         "Primary outcome per protocol, and the shift of missing visits that changes the conclusion"
     )

@@ -27,7 +27,13 @@ export function createGoalCoach({ show, onPress, change }) {
     return `${told} ${fill(text, { goal: number(goal, 2), unit })}`;
   }
 
-  function describeSuggestion({ suggested_goal: goal, wanted_hit_rate: wanted, is_strained: strained, unit, goal: now }) {
+  function describeSuggestion({
+    suggested_goal: goal,
+    wanted_hit_rate: wanted,
+    is_strained: strained,
+    unit,
+    goal: now,
+  }) {
     if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
     if (goal === null || now === null || goal === now) return "";
     const text = _("By the last 20 strides, a goal of %(goal)s %(unit)s gives %(hits)s hits.");
