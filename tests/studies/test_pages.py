@@ -322,7 +322,7 @@ def test_groups_are_told_once_the_study_is_closed(world):
     study = running_study(world)
     enrolled(study, new_patient(world))
     lead, url = client_of(world, Role.LEAD), reverse("study", args=[study.pk])
-    row = f"{study.enrollments.get().allocation.group} ·"
+    row = f"<td>{study.enrollments.get().allocation.group}</td>"
     assert row not in text_of(lead.get(url))
     close(study, None, NOW)
     assert row in text_of(lead.get(url))
