@@ -11,6 +11,7 @@ from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Tally
 from rehab.training.phases import find_phase_kind
+from rehab.training.plans import ROBOT_LEVELS
 from rehab.training.valences import VALENCES
 from robot.wire.cue_limits import VARIED
 
@@ -98,6 +99,7 @@ def describe_cue(fold: SessionFold) -> Message:
     """Return the robot's order for this session, as of now."""
     cue, timing = fold.valence.cue, fold.plan.cue_timing
     named = {cue.above, cue.below}
+    spares = fold.is_strained and not fold.plan.locked  # a study's arm decides how its robot acts
     return {
         "above": cue.above,
         "below": cue.below,
@@ -106,7 +108,7 @@ def describe_cue(fold: SessionFold) -> Message:
         "window_s": timing.window_s,
         "count": timing.count,
         "rest_s": timing.rest_s,
-        "intensity": fold.robot_intensity,
+        "intensity": min(fold.robot_intensity, ROBOT_LEVELS["gentle"] if spares else 1.0),
         "only_informs": not fold.valence.has_points,
         "idles": has_free_robot(fold),
         "seed": fold.plan.seed or None,
@@ -157,6 +159,7 @@ def describe_coaching(fold: SessionFold) -> Message:
     return {
         "wanted_hit_rate": fold.following.wanted_hit_rate,
         "suggested_goal": None if goal is None else round(goal, fold.plan.measure.goal_places),
+        "is_strained": fold.is_strained,
         "baseline": _describe_baseline(fold) if fold.phase.kind == "baseline" else None,
     }
 

@@ -20,7 +20,7 @@ from rehab.training.measures import InvalidSetting
 
 @dataclass(frozen=True, slots=True)
 class Assessed:
-    """How many were assessed for eligibility, and what became of them (CONSORT 2010, item 13a).
+    """How many were assessed for eligibility, and what became of them (CONSORT 2025, item 22a).
 
     Attributes
     ----------

@@ -158,6 +158,8 @@ def test_several_clinics_are_analyzed_together_with_the_clinic_as_a_stratum(worl
         ):
             assert row[name] == pytest.approx(value, rel=1e-9)
         assert row["participants"] == 36
+    # Which clinic looked first nobody knows: no level is made up, nor that it is not inferior.
+    assert (rows[0]["level"], rows[0]["not_inferior"]) == (None, None)
 
 
 @pytest.mark.skipif(shutil.which("Rscript") is None, reason="R is not installed here")

@@ -182,7 +182,13 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     ).update(goal_percent=110, robot=False, rest_s=90)
     own, _is_new = FeedbackType.everywhere.get_or_create(clinic=world.clinic, slug="negative")
     own.bands.update_or_create(from_percent=0, defaults={"words": {"en": "Push, please."}})
-    study = running_study(world, factors=[["severity", ["mild", "severe"]]])
+    study = running_study(
+        world,
+        factors=[["severity", ["mild", "severe"]]],
+        margin=2.5,
+        spending="pocock",
+        facts={"ethics": "BASEC 2026-01234"},
+    )
     lead, url = client_of(world, Role.LEAD), reverse("study-protocol-pdf", args=[study.pk])
     answer = lead.get(url)
     assert answer["Content-Type"] == "application/pdf"
@@ -198,6 +204,11 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     lines = " ".join(re.findall(r"\((.*?)\) Tj", told))
     for words in ("goal at 110 %", "without the robot", "then a rest of 90 s", "Push, please."):
         assert words in lines
+    for words in ("Margin of non-inferiority", "2.5", "Pocock", "BASEC 2026-01234", "Kenward"):
+        assert words in lines
+    page = lead.get(reverse("study", args=[study.pk])).content.decode()
+    assert "Margin of non-inferiority" in page
+    assert "severity: mild, severe" in page
     assert hide_from(study, world).get(url).status_code == 403
 
 
@@ -311,7 +322,7 @@ def test_groups_are_told_once_the_study_is_closed(world):
     study = running_study(world)
     enrolled(study, new_patient(world))
     lead, url = client_of(world, Role.LEAD), reverse("study", args=[study.pk])
-    row = f"{study.enrollments.get().allocation.group} ·"
+    row = f"<td>{study.enrollments.get().allocation.group}</td>"
     assert row not in text_of(lead.get(url))
     close(study, None, NOW)
     assert row in text_of(lead.get(url))

@@ -18,9 +18,9 @@ from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
-from rehab.studies.record.facts import ASKED
 from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
+from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.lifecycle import close, register, revise
 from rehab.studies.results.results import read_results
 from rehab.studies.unblinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms
@@ -94,12 +94,50 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     close(study, None, NOW)
     rows = list(checklist_rows(study, read_results(study, NOW)))
     consort = {row["item"]: row["answer"] for row in rows if row["list"] == "CONSORT 2025"}
+    assert "1 assessed, 0 turned away (0 not eligible; 0 declined)" in consort["22a"]
     assert "1 allocated" in consort["22a"]
     assert "fall: A 0 events in 0 of 0 participants (0 visits), B" in consort["27"]
-    assert "one visit (0 of 1), as allocated" in consort["21b"]
+    assert "walked no visit (1 of 1) adds nothing" in consort["21b"]
     assert "B: 1 never began, 0 left later, 0 removed; 2 visits missed" in consort["22b"]
+    assert "Deviations: arm revealed A 0 in 0, B 1 in 1." in consort["24a"]
+    assert "with 1 of 20 participants" in consort["23b"]
+    assert "last enrollment 2026" in consort["23a"]
+    assert "Sizes of blocks: 2, 4." in consort["17b"]
+    assert consort["20b"] == "Nobody is blinded: no assessor is marked."
     assert "robot stop: A 0 events" in consort["27"]
     assert "1 arms revealed, 1 of them by one person alone" in consort["20a"]
+
+
+def test_a_report_tells_looks_nobody_planned_events_as_judged_and_who_took_part(world):
+    study = running_study(world)
+    researcher = world.people[Role.RESEARCHER]
+    people = [enrolled(study, new_patient(world, number)) for number in range(8)]
+    Patient.everywhere.update(birth_year=1960, severity="mild")
+    judged = {"grade": 3, "serious": True, "relation": "possible"}
+    record(AdverseEvent(enrollment=people[0], what="fell at home", **judged), NOW)
+    give_mark(study, researcher, Task.INTERIM, None, NOW)
+    client_of(world, Role.RESEARCHER).get(reverse("study-results", args=[study.pk]))
+    close(study, None, NOW)
+    rows = list(checklist_rows(study, read_results(study, NOW)))
+    consort = {row["item"]: row["answer"] for row in rows if row["list"] == "CONSORT 2025"}
+    assert "None is planned. Looked at results before the end after 0/20" in consort["16b"]
+    group = people[0].allocation.group
+    told = f"{group} fell at home: 1 in 1 participants, highest grade 3, 1 serious, 1 related, 1 un"
+    assert told in consort["27"]
+    assert "A: 4 people, years of age: 4 60-69, months since the stroke" in consort["25"]
+    assert "severity: 4 mild, paretic side: 4 left" in consort["25"]
+    assert "a2 (" not in consort["13"]
+    assert "feedback of ankle push-off power A2 (" in consort["13"]
+
+
+def test_an_adverse_event_names_nobody_whom_a_monitor_must_not_know(world):
+    study, enrollment = fallen(world)
+    sent = {"enrollment": enrollment.pk, "grade": 2, "relation": "none"}
+    url = reverse("study-harms", args=[study.pk])
+    named = sent | {"what": f"{enrollment.patient.nickname} fell on the ward"}
+    refused = client_of(world, Role.PT).post(url, named).content.decode()
+    assert "researchers read this too" in refused
+    assert not AdverseEvent.everywhere.filter(enrollment=enrollment).exists()
 
 
 def test_every_outcome_has_an_estimand_in_the_registered_study(world):
@@ -198,16 +236,27 @@ def test_falls_and_stops_of_the_robot_are_proposed_until_they_are_judged(world):
 @pytest.mark.parametrize(
     ("grade", "serious", "relation", "expected", "days"),
     [
-        (3, False, "certain", False, None),
-        (2, True, "possible", False, 15),
-        (4, False, "probable", False, 7),
-        (5, True, "certain", True, 1),
-        (3, True, "none", False, 1),
+        (3, False, "certain", False, (None, None)),
+        (2, True, "possible", False, (1, 15)),  # the sponsor hears of each within a day
+        (4, False, "probable", False, (1, 7)),
+        (5, True, "certain", True, (1, None)),
+        (3, True, "none", False, (1, None)),
     ],
 )
 def test_deadlines_follow_from_how_an_event_is_judged(grade, serious, relation, expected, days):
     event = AdverseEvent(grade=grade, serious=serious, relation=relation, expected=expected, at=NOW)
-    assert event.due_at == (None if days is None else NOW + timedelta(days=days))
+    ends = tuple(day and NOW + timedelta(days=day) for day in days)
+    assert (event.due_at, event.authority_due_at) == ends
+
+
+def test_a_judged_fall_that_was_none_hides_no_other_one(world):
+    study, enrollment = fallen(world, "fall", "fall")
+    [first, second] = [event for _whose, event in propose(study)]
+    record(AdverseEvent(enrollment=enrollment, entry=second, grade=0, relation="none"), NOW)
+    log = {"session": first.session, "after_number": 0, "at": NOW}
+    SessionEvent.everywhere.create(kind="fall_withdrawn", **log)
+    SessionEvent.everywhere.create(kind="pain", value=0.0, **log)  # none was felt
+    assert [event for _whose, event in propose(study)] == [first]
 
 
 def test_who_treats_judges_and_reports_and_only_a_monitor_sees_arms(world):

@@ -2,6 +2,8 @@
 
 python reanalyze.py FOLDER [FOLDER …]. Needs Python 3.11, NumPy and SciPy. Several folders are the
 same study at several clinics: their participants are analyzed together, the clinic as a stratum.
+Whose looks came first at several clinics no folder tells: where looks spend alpha, such a study has
+no level, and is not found to be not inferior.
 """
 
 from __future__ import annotations
@@ -49,13 +51,15 @@ class Trial:
         self.labels = {row["arm"]: row["group"] for row in self.rows}
         self.arms = [arm["code"] for arm in last["arms"] if arm["code"] in self.labels]
         self.status = {row["outcome"]: row["status"] for row in self.rows}
-        looks = read(folders[0] / "looks.csv") if len(folders) == 1 else []
-        counts = [int(row["participants"]) for row in looks]
+        looks = [len(read(folder / "looks.csv")) for folder in folders]
         spending = self.plan.get("spending")
-        at_looks = (
-            levels(spending, counts, self.planned, is_last=True) if spending and counts else []
-        )
-        self.level = at_looks[-1] if at_looks else ALPHA
+        self.level: float | None = ALPHA
+        if spending and len(folders) > 1 and max(looks) > 1:  # each folder's last one is the end
+            self.level = None
+        elif spending and len(folders) == 1:
+            counts = [int(row["participants"]) for row in read(folders[0] / "looks.csv")]
+            at_looks = levels(spending, counts, self.planned, is_last=True) if counts else [ALPHA]
+            self.level = at_looks[-1]
 
     def observations(self, outcome: str, *, per_protocol: bool = False) -> list[Observation]:
         """Return an outcome of all visits, or of those without a deviation."""
@@ -102,7 +106,7 @@ class Trial:
     def _row(self, slug: str, one: Difference) -> dict[str, Any]:
         is_primary, margin = slug == self.primary, self.plan.get("margin")
         answer = None
-        if is_primary and margin:
+        if is_primary and margin and self.level is not None:
             better, confidence = slug not in LOWER_IS_BETTER, 1 - self.level
             answer = one.is_not_inferior(margin, higher_is_better=better, confidence=confidence)
         missing = one.missing

@@ -41,6 +41,11 @@ def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
     return event_for(fold, patient=patient, monitor=monitor, robot=_cue(fold))
 
 
+def cue_event(fold: SessionFold) -> LiveEvent:
+    """Return the event that the robot's order is another one."""
+    return event_for(fold, robot=_cue(fold))
+
+
 def source_message(fold: SessionFold, kind: str) -> Message | None:
     """Return the message to a source about a change, as of now; None for none."""
     control = CONTROLS[kind]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import NamedTuple
 
-from rehab.sessions.events.change import change_event, phase_event
+from rehab.sessions.events.change import change_event, cue_event, phase_event
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.events.step import StepContext, step_event
 from rehab.training.changes import Change, ChangeKind, State
@@ -24,6 +24,7 @@ class Before(NamedTuple):
     obstacle: str
     switches: int
     state: State
+    is_strained: bool
 
     @classmethod
     def of(cls, fold: SessionFold) -> Before:
@@ -35,11 +36,13 @@ class Before(NamedTuple):
             fold.obstacle,
             len(fold.valences.switches),
             fold.state,
+            fold.is_strained,
         )
 
     def is_still_so(self, fold: SessionFold) -> bool:
         """Return whether a step has changed nothing of this, as most do."""
-        return fold.state is self.state and not self.has_moved(fold)
+        as_before = (fold.state, fold.is_strained) == (self.state, self.is_strained)
+        return as_before and not self.has_moved(fold)
 
     def has_moved(self, fold: SessionFold) -> bool:
         """Return whether phase, goal or what is in the plan's way are others since then."""
@@ -78,6 +81,8 @@ def events_of_step(
     only_adapted = fold.following.moved and fold.phase_index == before.phase_index
     if before.has_moved(fold) and not only_adapted:
         events.append(phase_event(fold, switched=len(fold.valences.switches) > before.switches))
+    elif fold.is_strained != before.is_strained:
+        events.append(cue_event(fold))
     changed = before.changed_by_step(fold)
     return events + [change_event(fold, kind) for kind in changed if kind != ChangeKind.PHASE]
 

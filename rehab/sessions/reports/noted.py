@@ -23,12 +23,25 @@ REMARKS = frozenset(Remark) - {*ABOUT_A_FALL, *ACKNOWLEDGMENTS.values()}
 
 @dataclass(slots=True, eq=False)
 class Noted:
-    """A remark: with its ``value`` where it has one, of a fall with its ``severity``."""
+    """A remark of the log, ``event``; of a fall with its ``severity``."""
 
-    kind: Remark
-    at: datetime
-    value: float | None
+    event: SessionEvent
     severity: FallSeverity | None = None
+
+    @property
+    def kind(self) -> Remark:
+        """What was noted."""
+        return Remark(self.event.kind)
+
+    @property
+    def at(self) -> datetime:
+        """When."""
+        return self.event.at
+
+    @property
+    def value(self) -> float | None:
+        """How strong, where that is asked."""
+        return self.event.value
 
     @property
     def is_adverse(self) -> bool:
@@ -48,7 +61,7 @@ def read_noted(events: Iterable[SessionEvent]) -> list[Noted]:
     for event in events:
         falls = [one for one in noted if one.kind == Remark.FALL]
         if event.kind in REMARKS:
-            noted.append(Noted(Remark(event.kind), event.at, event.value))
+            noted.append(Noted(event))
         elif event.kind == Remark.FALL_SEVERITY and falls:
             falls[-1].severity = FallSeverity(int(event.value or 0))
         elif event.kind == Remark.FALL_WITHDRAWN and falls:

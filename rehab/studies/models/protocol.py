@@ -146,7 +146,7 @@ class Study(ClinicModel):
             "spread of all together needs."
         ),
     )
-    facts = models.JSONField(default=dict, editable=False)  # what `record.facts` asks, by slug
+    facts = models.JSONField(default=dict, editable=False)  # to what `registration.facts` asks
     created_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
     created_at = models.DateTimeField(default=timezone.now, editable=False)
     registered_at = models.DateTimeField(null=True, editable=False)

@@ -25,15 +25,17 @@ from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
+from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import may_monitor
+from rehab.studies.registration.document import describe
 from rehab.studies.registration.lifecycle import close, register, revise, start
 from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
 from rehab.studies.registration.protocol_json import write_json
-from rehab.studies.registration.protocol_pdf import write_pdf
+from rehab.studies.registration.protocol_pdf import plan_rows, write_pdf
 from rehab.studies.results.results import may_look
 from rehab.studies.unblinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
 from rehab.studies.visits import next_visit
@@ -90,7 +92,12 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
             return redirect("study", study_id=study.pk)
     if data is not None:
         log_refusal(request)
-    context = {"form": form, "arms": arms, "study": study if study_id else None}
+    context = {
+        "form": form,
+        "arms": arms,
+        "study": study if study_id else None,
+        "outcomes": define_outcomes(),
+    }
     return render(request, "studies/form.html", context)
 
 
@@ -121,12 +128,22 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),
         "primary": dict(OUTCOMES)[first_primary(study)],
+        "plan": () if blind else _plan(study),
         "changes": outcome_changes(study),
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
         "tasks": _markable(study) if is_lead else (),
     }
+
+
+def _plan(study: Study) -> list[tuple[object, ...]]:
+    """Return the plan as it is registered, of a draft as it would be; nothing if it could not."""
+    version = study.versions.last()
+    try:
+        return plan_rows(version.document if version else describe(study))
+    except InvalidSetting:
+        return []
 
 
 def _participants(study: Study, user: User) -> list[dict[str, Any]]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
+from itertools import groupby
+from operator import attrgetter
 from typing import Any, ClassVar
 
 from django.db import models
@@ -15,16 +17,17 @@ from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import User
-from rehab.sessions.log import Remark, RobotEntry, SessionEvent
+from rehab.sessions.log import RobotEntry, SessionEvent
+from rehab.sessions.reports.noted import ABOUT_A_FALL, read_noted
 from rehab.studies.models import Study, StudyMark, has_mark
 from rehab.studies.participants import Enrollment
 from rehab.studies.results.harms_and_deviations import HARMS
 from rehab.training.measures import InvalidSetting
 
-# Days until a serious event has to be reported: ICH E2A, III.A and B (7 days where a life was in
-# danger or lost, else 15, both of related and unexpected ones); any other serious one within a day
-# to the sponsor (ICH E6 (R2) 4.11.1 says at once, Regulation (EU) 536/2014, article 41, 24 hours).
-FATAL_DAYS, UNEXPECTED_DAYS, SERIOUS_DAYS = 7, 15, 1
+# Days until a serious event has to be reported: each one to the sponsor (ICH E6 (R2), 4.11.1, at
+# once; Regulation (EU) 536/2014, article 41, 24 hours); by the sponsor to authority and ethics
+# board, if related and unexpected: 7 where a life was in danger or lost, else 15 (ICH E2A, III.B).
+SPONSOR_DAYS, FATAL_DAYS, UNEXPECTED_DAYS = 1, 7, 15
 LIFE_THREATENING = 4
 
 
@@ -101,34 +104,31 @@ class AdverseEvent(AppendOnlyModel):
 
     @property
     def due_at(self) -> datetime | None:
-        """By when it has to be reported; None of one that is not serious."""
-        if not self.is_serious:
+        """By when the sponsor has to know; None of one that is not serious."""
+        return self.at + timedelta(days=SPONSOR_DAYS) if self.is_serious else None
+
+    @property
+    def authority_due_at(self) -> datetime | None:
+        """By when authority and ethics board have to know; None unless related, unexpected."""
+        if not self.is_serious or self.expected or self.relation == Relation.NONE:
             return None
-        if self.expected or self.relation == Relation.NONE:
-            return self.at + timedelta(days=SERIOUS_DAYS)
         is_fatal = self.grade >= LIFE_THREATENING
         return self.at + timedelta(days=FATAL_DAYS if is_fatal else UNEXPECTED_DAYS)
 
 
 def propose(study: Study) -> list[tuple[Enrollment, SessionEvent]]:
     """Return the falls, other harms and robot's stops of a study that nobody has judged yet."""
-    kinds = (*map(str, HARMS), RobotEntry.STOP.value, Remark.FALL_WITHDRAWN.value)
-    of_study = {"session__study_visit__enrollment__study": study, "adverse_event__isnull": True}
-    related = ("session__study_visit__enrollment",)
-    events = SessionEvent.everywhere.filter(kind__in=kinds, **of_study).select_related(*related)
-    found: list[tuple[Enrollment, SessionEvent]] = []
-    for event in events.order_by("session", "pk"):
-        if event.kind != Remark.FALL_WITHDRAWN:
-            found.append((event.session.study_visit.enrollment, event))
-            continue
-        falls = [
-            index
-            for index, (_enrollment, one) in enumerate(found)
-            if (one.session_id, one.kind) == (event.session_id, Remark.FALL)
-        ]
-        if falls:
-            del found[falls[-1]]
-    return found
+    kinds = (*HARMS, *ABOUT_A_FALL, RobotEntry.STOP.value)
+    of_study = {"session__study_visit__enrollment__study": study, "kind__in": kinds}
+    related = ("session__study_visit__enrollment", "adverse_event")
+    events = SessionEvent.everywhere.filter(**of_study).select_related(*related)
+    found: list[SessionEvent] = []
+    for _session, of_session in groupby(events.order_by("session", "pk"), attrgetter("session_id")):
+        logged = list(of_session)
+        harms = [one.event for one in read_noted(logged) if one.is_adverse]
+        found += [one for one in logged if one.kind == RobotEntry.STOP or one in harms]
+    unjudged = [event for event in found if getattr(event, "adverse_event", None) is None]
+    return [(event.session.study_visit.enrollment, event) for event in unjudged]
 
 
 def record(event: AdverseEvent, now: datetime) -> AdverseEvent:
@@ -182,7 +182,12 @@ def listing_rows(study: Study, *, by_arm: bool) -> Iterator[dict[str, Any]]:
     related = ("enrollment__allocation", "entry__session__study_visit")
     for one in events.select_related(*related).order_by("pk"):
         began = one.enrollment.enrolled_at
-        moments = {"known": one.at, "due": one.due_at, "reported": one.reported_at}
+        moments = {
+            "known": one.at,
+            "due": one.due_at,
+            "authority_due": one.authority_due_at,
+            "reported": one.reported_at,
+        }
         yield {
             "participant": one.enrollment.code,
             "arm": arm_of(one) if by_arm else "",

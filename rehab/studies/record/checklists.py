@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from textwrap import fill
 
 from rehab.studies.models import Study
-from rehab.studies.record.facts import ASKED
 from rehab.studies.record.known import UNMASKED, know
+from rehab.studies.registration.facts import ASKED
 from rehab.studies.results.results import Results
 
 INDENT = "    "
@@ -30,8 +30,8 @@ ITEMS = {
         3c | part of sponsor and funders | sponsor funding
         3d | committees | committees
         4 | registration | registry
-        5 | where protocol and analysis plan are | plan
-        6 | data and code that are shared | sharing
+        5 | where protocol and analysis plan are | version plan
+        6 | data and code that are shared | exportable sharing
         7a | funding | funding
         7b | conflicts of interest | conflicts
         8 | dissemination | dissemination
@@ -40,7 +40,7 @@ ITEMS = {
         10 | objectives | question
         11 | patients and public | involvement
         12 | design | design
-        13 | setting | clinic setting
+        13 | setting | clinic setting countries
         14a | eligibility of participants | eligibility
         14b | eligibility of sites and providers | provider
         15a | interventions | arms phases
@@ -50,7 +50,7 @@ ITEMS = {
         16 | outcomes | primary secondary
         17 | harms | harms_defined harms
         18 | timeline | timeline
-        19 | sample size | participants size
+        19 | sample size | participants power size
         20 | recruitment | recruitment
         21a | who makes the sequence | sequence
         21b | type of randomization | allocation
@@ -67,7 +67,7 @@ ITEMS = {
         27c | missing data | missing
         27d | further analyses | further
         28a | data monitoring committee | data_monitoring
-        28b | interim analyses, stopping | looks stopping
+        28b | interim analyses, stopping | looks looks_made stopping
         29 | monitoring of the conduct | monitoring
         30 | ethics approval | ethics
         31 | amendments | changes
@@ -79,8 +79,8 @@ ITEMS = {
         1a | title says randomized | simulated scientific_title masked
         1b | structured summary | -
         2 | registration | registry
-        3 | protocol and analysis plan | plan
-        4 | sharing | sharing
+        3 | protocol and analysis plan | version plan
+        4 | sharing | exportable sharing
         5a | funding | funding
         5b | conflicts of interest | conflicts
         6 | background | background
@@ -88,16 +88,16 @@ ITEMS = {
         8 | patients and public | involvement
         9 | design | design
         10 | changes after the start | changes
-        11 | setting | clinic setting
+        11 | setting | clinic setting countries
         12a | eligibility of participants | eligibility
         12b | sites and providers | provider
         13 | interventions | arms phases
         14 | outcomes | primary secondary
         15 | how harms were assessed | harms_defined harms
-        16a | sample size | participants size
-        16b | interim analyses, stopping | looks stopping
+        16a | sample size | participants power size
+        16b | interim analyses, stopping | looks looks_made looks_level stopping
         17a | sequence | sequence
-        17b | type of randomization | allocation
+        17b | type of randomization | allocation sizes
         18 | concealment | concealment
         19 | implementation | implementation
         20a | who was blinded | masked blinding unblinded
@@ -114,8 +114,8 @@ ITEMS = {
         24b | concomitant care | concomitant
         25 | baseline data | baseline
         26 | numbers, outcomes, estimates | estimates
-        27 | harms | harms_found
-        28 | ancillary analyses | further
+        27 | harms | harms_found adverse
+        28 | ancillary analyses | ancillary further
         29 | interpretation | -
         30 | limitations | -""",
     "TIDieR": """

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from django import forms
+from django.core.exceptions import ValidationError
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
+from rehab.sessions.forms.names import refuse_names
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.record.adverse_events import AdverseEvent
-from rehab.studies.record.facts import ASKED
+from rehab.studies.registration.facts import ASKED
 
 LETTERS_MAX = 4000
 
@@ -55,3 +57,13 @@ class AdverseEventForm(forms.ModelForm):
         seen = Enrollment.objects.visible_to(by).filter(study=study).order_by("pk")
         fields["enrollment"].queryset = seen
         fields["enrollment"].label = _("Participant")
+
+    def clean(self) -> Any:
+        """Return the answers. Refuses the patient's name: researchers and monitors read them."""
+        data: Any = super().clean()
+        if data.get("what") and data.get("enrollment"):
+            try:
+                refuse_names(data["what"], data["enrollment"].patient)
+            except ValidationError as problem:
+                self.add_error("what", problem)
+        return data

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 from xml.sax.saxutils import escape
 
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import getSampleStyleSheet
@@ -16,7 +17,9 @@ from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, T
 from rehab.sessions.formatting import format_schedule
 from rehab.studies.allocation.draws import RULE
 from rehab.studies.allocation.scheme import Method
-from rehab.studies.models import METHODS, OUTCOMES, Study, StudyVersion
+from rehab.studies.models import METHODS, OUTCOMES, SPENDINGS, Study, StudyVersion
+from rehab.studies.registration.estimands import METHOD, summary
+from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.training.schedules import Schedule, ScheduleKind
 
@@ -91,7 +94,11 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
             asked_of = {"arm": arm["code"], "questionnaire": asked["title"]}
             yield _text(gettext("Asked after sessions of %(arm)s: %(questionnaire)s") % asked_of)
     yield _text(gettext("Plan"), "Heading2")
-    yield _table(_plan_rows(document))
+    yield _table([(gettext("What"), gettext("Planned")), *plan_rows(document)])
+    yield _text(f"{summary(document)} {METHOD}")
+    if asked := document.get("facts"):
+        yield _text(gettext("Record of the study"), "Heading2")
+        yield _table([(ASKED[slug], asked[slug]) for slug in ASKED if slug in asked])
     yield _text(gettext("Seals (SHA-256)"), "Heading2")
     yield _text(gettext("Of this version, as JSON with sorted keys and without blanks:"))
     yield _text(version.digest, "Code")
@@ -155,14 +162,14 @@ def _feedback_text(feedback: dict[str, Any]) -> str:
     return "; ".join((points.replace("None", "–"), *bands))
 
 
-def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
-    """Return everything else as rows of name and value."""
+def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
+    """Return what is planned beside the arms: name and value, without what is left open."""
     outcomes, visits, allocation = dict(OUTCOMES), document["visits"], document["allocation"]
     factors = (f"{row['name']}: {', '.join(row['levels'])}" for row in allocation["factors"])
     months = document["months_since_stroke_at_least"]
     secondary = ", ".join(str(outcomes[slug]) for slug in document["secondary_outcomes"])
-    return [
-        (gettext("What"), gettext("Planned")),
+    analysis, crossed = document.get("analysis", {}), document["design"] == "crossover"
+    rows = [
         (gettext("Participants"), document["participants"]),
         (gettext("Months since the stroke, at least"), months),
         (gettext("Criteria of inclusion"), "\n".join(document.get("inclusion", ()))),
@@ -173,10 +180,14 @@ def _plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Factors"), "; ".join(factors)),
         (gettext("Visits in each period"), visits["in_each_period"]),
         (gettext("Days between visits"), visits["days_between"]),
-        (gettext("Days between periods"), visits["days_between_periods"]),
+        (gettext("Days between periods"), visits["days_between_periods"] if crossed else None),
         (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
         (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
         (gettext("Secondary outcomes (others are exploratory)"), secondary),
+        (Study._meta.get_field("margin").verbose_name, analysis.get("margin")),
+        (Study._meta.get_field("spending").verbose_name, SPENDINGS.get(analysis.get("spending"))),
+        (Study._meta.get_field("planned_sd").verbose_name, analysis.get("planned_sd")),
         (gettext("Version of the scoring rules"), document["scoring_rules_version"]),
     ]
+    return [(capfirst(name), value) for name, value in rows if value not in (None, "")]

@@ -12,21 +12,23 @@ from dataclasses import dataclass
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent
+from rehab.sessions.log import EVENTS, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.noted import ABOUT_A_FALL, ADVERSE, read_noted
 from rehab.studies.analysis.participants import Attendance, Participant
 from rehab.studies.models import Study
 from rehab.studies.participants import StudyEvent, StudyVisit
 from rehab.training.changes import ChangeKind, State
 from rehab.training.controls import CONTROLS
 
-HARMS = (Remark.FALL, Remark.NEAR_FALL, Remark.DIZZINESS, Remark.PAIN)
+HARMS = ADVERSE
 # The course of a session as it is planned; whoever changes anything else of it deviates.
 PLANNED = (
     *(ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME, ChangeKind.FINISH),
     *(ChangeKind.ABORT, ChangeKind.CHART_STYLE),
 )
 CHANGES = tuple(str(kind) for kind in CONTROLS if kind not in PLANNED)
+DEVIATIONS = (*CHANGES, RobotEntry.STOP.value)
 ENDED_EARLY, UNWALKED = "ended_early", "phases_not_walked"
 EXCLUDED, UNBLINDED = "excluded", "unblinded"
 OTHERS = {
@@ -114,20 +116,12 @@ def _make(place: tuple[str, str, int], what: str, value: float | None = None) ->
 
 def _of_session(session: TrainingSession, make: Callable[..., Occurrence]) -> Iterator[Occurrence]:
     """Yield what happened in a session; falls that were none are left out."""
-    watched = (*map(str, HARMS), *CHANGES, RobotEntry.STOP.value)
-    about_falls = (Remark.FALL_SEVERITY.value, Remark.FALL_WITHDRAWN.value)
-    events = SessionEvent.everywhere.filter(session=session, kind__in=(*watched, *about_falls))
-    falls: list[float | None] = []
-    for kind, value in events.order_by("pk").values_list("kind", "value"):
-        if kind == Remark.FALL:
-            falls.append(None)
-        elif kind == Remark.FALL_SEVERITY and falls:
-            falls[-1] = value
-        elif kind == Remark.FALL_WITHDRAWN and falls:
-            falls.pop()
-        elif kind in watched and not (kind == Remark.PAIN and value == 0):  # none was felt
-            yield make(kind, value)
-    yield from (make(Remark.FALL.value, severity) for severity in falls)
+    events = SessionEvent.everywhere.filter(session=session).order_by("pk")
+    for one in read_noted(events.filter(kind__in=(*HARMS, *ABOUT_A_FALL))):
+        if one.is_adverse:
+            yield make(one.kind.value, one.value if one.severity is None else float(one.severity))
+    for kind, value in events.filter(kind__in=DEVIATIONS).values_list("kind", "value"):
+        yield make(kind, value)
     if session.state == State.ABORTED:
         yield make(ENDED_EARLY)
     if session.excluded:

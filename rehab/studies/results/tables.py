@@ -43,7 +43,7 @@ HEADERS: dict[str, tuple[str, ...]] = {
     "guesses": ("guesser", "group", "do_not_know", "index", "estimate", *INTERVAL),
     "adverse_events": (
         *("participant", "arm", "what", "grade", "serious", "relation", "expected"),
-        *("known_on_day", "due_on_day", "reported_on_day"),
+        *("known_on_day", "due_on_day", "authority_due_on_day", "reported_on_day"),
     ),
 }
 

@@ -46,7 +46,7 @@ def find_or_plan(
     now
         The time of its registration and start.
     facts
-        What it is registered with of `record.facts`.
+        What it is registered with of `registration.facts`.
 
     Raises
     ------

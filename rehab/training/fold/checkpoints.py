@@ -18,12 +18,12 @@ from rehab.training.schedules import FeedbackSummary
 from rehab.training.steps import Side
 
 # Rises with every change of the fold that an older checkpoint would not fit; such a one is ignored.
-CHECKPOINT_VERSION = 6
+CHECKPOINT_VERSION = 7
 # What is plain data already.
 PLAIN = (
     *("last_number", "last_time_s", "active_s", "goal", "was_walking"),
     *("phase_index", "phase_strides", "phase_s", "gain", "obstacle", "completed"),
-    "rest_s",
+    *("rest_s", "is_strained"),
 )
 
 

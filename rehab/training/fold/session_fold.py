@@ -19,7 +19,7 @@ from rehab.training.fold.goal_following import GoalFollowing
 from rehab.training.fold.tallies import Block, Tally
 from rehab.training.fold.valence_course import ValenceCourse
 from rehab.training.goals import GoalRule
-from rehab.training.heart_rate_limit import is_above_limit
+from rehab.training.heart_rate_limit import is_above_limit, is_near_limit
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.scoring import RULES_VERSION, score_measurement
@@ -75,6 +75,7 @@ class SessionFold:
         self.valences = ValenceCourse(plan)
         self.pause_reason: PauseReason | None = None
         self.rest_s: float | None = None  # planned length of the present rest
+        self.is_strained = False  # whether the heart rate is near its limit
         self.was_walking = False  # whether the time since the last step was walked
         self.following = GoalFollowing(plan)
         self.delivery = FeedbackDelivery(plan.schedule)
@@ -112,7 +113,11 @@ class SessionFold:
         """The goal that the latest strides would have reached as often as wanted; None without."""
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
             return None
-        return self.following.suggest(self.gain)
+        goal = self.following.suggest(self.gain)
+        if self.is_strained and goal is not None and self.goal is not None:
+            is_higher = goal > self.goal
+            return None if is_higher == self.plan.measure.higher_is_better else goal
+        return goal
 
     @property
     def score(self) -> int | None:
@@ -194,7 +199,9 @@ class SessionFold:
         self.was_walking = running and not backwards
         if running and self.phase.is_over(self.phase_strides, self.phase_s):
             self._advance_phase()
-        if self.state is State.RUNNING and is_above_limit(scored, self.plan.heart_rate_limit):
+        limit = self.plan.heart_rate_limit
+        self.is_strained = is_near_limit(scored, limit, self.is_strained)
+        if self.state is State.RUNNING and is_above_limit(scored, limit):
             self.state = State.PAUSED
             self.pause(PauseReason.HEART_RATE)
         return scored

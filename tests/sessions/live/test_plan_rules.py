@@ -191,6 +191,35 @@ async def test_a_heart_rate_above_the_limit_pauses_until_it_is_below(place, begu
     assert stored == [[], []]
 
 
+@pytest.mark.parametrize("locked", [False, True])
+async def test_near_the_limit_of_the_heart_rate_no_harder_goal_and_a_gentle_robot(
+    place, begun, locked
+):
+    session = await begun(
+        place, TRAINING, heart_rate_limit=120, goal=GoalRule(value=3.0), locked=locked
+    )
+    source, monitor = await place.source().open(), await place.monitor(session).open()
+    robot = place.robot()
+    assert (await (await robot.dial()).hello())["cue"]["intensity"] == 1
+    await source.walk(*[4.0] * 20, extra={"heart_rate": 107})
+    told = await monitor.until_step(20)
+    assert (told["is_strained"], told["suggested_goal"]) == (False, 4.0)
+    await source.walk(4.0, extra={"heart_rate": 108})
+    told = await monitor.until_step(21)
+    assert (told["is_strained"], told["suggested_goal"]) == (True, None)
+    if not locked:  # a study's arm decides how its robot acts
+        assert (await robot.hear("cue"))["cue"]["intensity"] == 0.5
+    await restart()
+    again = await place.monitor(session).watch()
+    assert (again["is_strained"], again["suggested_goal"]) == (True, None)
+    robot, source = place.robot(), await place.source().open()
+    expected = 1 if locked else 0.5
+    assert (await (await robot.dial()).hello())["cue"]["intensity"] == expected
+    await source.walk(4.0, extra={"heart_rate": 101})
+    if not locked:
+        assert (await robot.hear("cue"))["cue"]["intensity"] == 1
+
+
 async def test_every_third_step_is_told_and_the_score_counts_them_all(place, begun):
     session = await begun(place, TRAINING, schedule=Schedule(interval=3))
     source, tablet = await place.source().open(), await place.tablet(session).open()

@@ -5,7 +5,7 @@ import { percent } from "garry/shared/format";
 import { _, fill, number } from "garry/shared/language";
 import { update } from "garry/monitor/state";
 
-const FIELDS = ["suggested_goal", "wanted_hit_rate", "baseline"];
+const FIELDS = ["suggested_goal", "wanted_hit_rate", "is_strained", "baseline"];
 
 export function createGoalCoach({ show, onPress, change }) {
   const line = document.querySelector(".coach");
@@ -27,7 +27,14 @@ export function createGoalCoach({ show, onPress, change }) {
     return `${told} ${fill(text, { goal: number(goal, 2), unit })}`;
   }
 
-  function describeSuggestion({ suggested_goal: goal, wanted_hit_rate: wanted, unit, goal: now }) {
+  function describeSuggestion({
+    suggested_goal: goal,
+    wanted_hit_rate: wanted,
+    is_strained: strained,
+    unit,
+    goal: now,
+  }) {
+    if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
     if (goal === null || now === null || goal === now) return "";
     const text = _("By the last 20 strides, a goal of %(goal)s %(unit)s gives %(hits)s hits.");
     return fill(text, { goal: number(goal, 2), unit, hits: percent(wanted) });
@@ -41,8 +48,8 @@ export function createGoalCoach({ show, onPress, change }) {
       const suggestion = session.goal_adaptation === "suggest" ? describeSuggestion(session) : "";
       line.hidden = !(text || suggestion);
       show("coach", text || suggestion);
-      button.hidden = !suggestion || Boolean(text);
-      button.textContent = suggestion ? fill(_("Set %(goal)s"), { goal: number(session.suggested_goal, 2) }) : "";
+      button.hidden = !suggestion || Boolean(text) || session.suggested_goal === null;
+      button.textContent = !button.hidden ? fill(_("Set %(goal)s"), { goal: number(session.suggested_goal, 2) }) : "";
     },
     events: {
       step: (session, event) => update(session, event, FIELDS),
