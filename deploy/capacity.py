@@ -38,8 +38,8 @@ class Measured:
         From a batch to the commit, by COPY [µs a row], in one connection.
     row_bytes, index_bytes, parquet_bytes
         Of a step in PostgreSQL, in its indexes, and archived.
-    frame_bytes
-        Of a step as text: from the source, to tablet, monitor and robot.
+    sent_bytes
+        Of a step as text, to tablet, monitor and robot together.
     """
 
     planned_sessions: float
@@ -51,43 +51,38 @@ class Measured:
     row_bytes: float
     index_bytes: float
     parquet_bytes: float
-    frame_bytes: dict[str, float]
+    sent_bytes: float
 
     @classmethod
     def read(cls, performance: str, hosting: str) -> Measured:
         """Return the figures in the texts of the two pages. Raises ValueError."""
 
         def find(pattern: str, text: str = performance) -> tuple[float, ...]:
-            match = re.search(pattern, text, re.MULTILINE)
+            match = re.search(pattern, " ".join(text.split()))
             if match is None:
                 raise ValueError(f"The documentation has no figure like {pattern!r}.")
             return tuple(float(figure.replace(",", "")) for figure in match.groups())
 
         (planned,) = find(r"Plan (\d+) sessions at once", hosting)
-        many, of_two = find(r"^\| ([\d,]+) \| two processes \|[^|]*\| ([\d,]+) \|")
-        few, of_ten = find(r"^\| ([\d,]+) \| ten processes \|[^|]*\| ([\d,]+) \|")
+        many, of_two = find(r"\| ([\d,]+) \| two processes \|[^|]*\| ([\d,]+) \|")
+        few, of_ten = find(r"\| ([\d,]+) \| ten processes \|[^|]*\| ([\d,]+) \|")
         own_us = (of_ten - of_two) / (10 / few - 2 / many)  # for each session's steps: both share
-        (row,) = find(r"^\| 50 \| \d+ \(\d+\) \| \d+ \((\d+)\) \|$")
-        frames = {
-            whom: find(rf"^\| a step, {words} \| (\d+) \|$")[0]
-            for whom, words in {
-                "source": "from the source",
-                "tablet": "to the tablet",
-                "monitor": "to the monitor",
-                "robot": "to the robot",
-            }.items()
-        }
+        beat, thorough = find(r"takes ([\d.]+) ms each second, thoroughly .*? ([\d.]+) ms twice")
+        (row,) = find(r"50 rows by COPY .*? \((\d+) of wall time\)")
+        sizes = r"a row of (\d+) bytes and (\d+) of two indexes, as Parquet \(zstd\) (\d+)"
+        row_bytes, index_bytes, parquet_bytes = find(sizes)
+        to = {whom: find(rf"to the {whom} (\d+)")[0] for whom in ("tablet", "monitor", "robot")}
         return cls(
             planned_sessions=planned,
             server_us=of_two - own_us * 2 / many,
             process_cores=own_us * STEPS_S / 1e6,
-            beat_ms=find(r"^\| a look after what dead servers left \| ([\d.]+) ms \|$")[0],
-            thorough_ms=find(r"^\| the thorough look, 10,000 clinics \| ([\d.]+) ms \|$")[0],
+            beat_ms=beat,
+            thorough_ms=thorough,
             row_us=row,
-            row_bytes=find(r"^\| a row of `rehab_step`, PostgreSQL \| (\d+) \|$")[0],
-            index_bytes=find(r"^\| its two indexes \| (\d+) \|$")[0],
-            parquet_bytes=find(r"^\| archived as Parquet, zstd \| (\d+) \|$")[0],
-            frame_bytes=frames,
+            row_bytes=row_bytes,
+            index_bytes=index_bytes,
+            parquet_bytes=parquet_bytes,
+            sent_bytes=sum(to.values()),
         )
 
 
@@ -160,8 +155,7 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     index_gb = online * measured.index_bytes / GB
     online_gb = online * (measured.row_bytes + measured.index_bytes) * a.other / GB
     archive_gb = 12 * rows_month * measured.parquet_bytes / GB
-    sent = sum(size for whom, size in measured.frame_bytes.items() if whom != "source")
-    egress_gb = rows_month * sent / GB
+    egress_gb = rows_month * measured.sent_bytes / GB
     cores = processes + (a.copies - 1) * database_cores + 2  # HAProxy
     cost = (
         cores * a.core_month
