@@ -17,6 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 SIZES = (10, 100, 1000, 10_000)  # clinics
 GB = 1e9
+STEPS_S = 2  # of each session in the measured runs
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class Measured:
     ----------
     planned_sessions
         How many sessions at once docs/hosting.md plans for a process.
-    server_us
-        Processor time of a hosted process that has so many, each with tablet, monitor and robot
-        [µs a step].
+    server_us, process_cores
+        Processor time of a hosted process: of each step, with tablet, monitor and robot [µs], and
+        of itself [cores], from the two runs that share steps among two and ten.
     beat_ms, thorough_ms
         Processor time of the database for each look of one server after what dead ones left: every
         second, and twice a minute for owners without a lease, with 10,000 clinics.
@@ -37,52 +38,51 @@ class Measured:
         From a batch to the commit, by COPY [µs a row], in one connection.
     row_bytes, index_bytes, parquet_bytes
         Of a step in PostgreSQL, in its indexes, and archived.
-    frame_bytes
-        Of a step as text: from the source, to tablet, monitor and robot.
+    sent_bytes
+        Of a step as text, to tablet, monitor and robot together.
     """
 
     planned_sessions: float
     server_us: float
+    process_cores: float
     beat_ms: float
     thorough_ms: float
     row_us: float
     row_bytes: float
     index_bytes: float
     parquet_bytes: float
-    frame_bytes: dict[str, float]
+    sent_bytes: float
 
     @classmethod
     def read(cls, performance: str, hosting: str) -> Measured:
         """Return the figures in the texts of the two pages. Raises ValueError."""
 
         def find(pattern: str, text: str = performance) -> tuple[float, ...]:
-            match = re.search(pattern, text, re.MULTILINE)
+            match = re.search(pattern, " ".join(text.split()))
             if match is None:
                 raise ValueError(f"The documentation has no figure like {pattern!r}.")
-            return tuple(float(figure) for figure in match.groups())
+            return tuple(float(figure.replace(",", "")) for figure in match.groups())
 
         (planned,) = find(r"Plan (\d+) sessions at once", hosting)
-        (server,) = find(rf"^\| {planned:g} \| one process \|.*\| (\d+) \| [\d.]+ \|$")
-        (row,) = find(r"^\| 50 \| \d+ \(\d+\) \| \d+ \((\d+)\) \|$")
-        frames = {
-            whom: find(rf"^\| a step, {words} \| (\d+) \|$")[0]
-            for whom, words in {
-                "source": "from the source",
-                "tablet": "to the tablet",
-                "monitor": "to the monitor",
-                "robot": "to the robot",
-            }.items()
-        }
+        many, of_two = find(r"\| ([\d,]+) \| two processes \|[^|]*\| ([\d,]+) \|")
+        few, of_ten = find(r"\| ([\d,]+) \| ten processes \|[^|]*\| ([\d,]+) \|")
+        own_us = (of_ten - of_two) / (10 / few - 2 / many)  # for each session's steps: both share
+        beat, thorough = find(r"takes ([\d.]+) ms each second, thoroughly .*? ([\d.]+) ms twice")
+        (row,) = find(r"50 rows by COPY .*? \((\d+) of wall time\)")
+        sizes = r"a row of (\d+) bytes and (\d+) of two indexes, as Parquet \(zstd\) (\d+)"
+        row_bytes, index_bytes, parquet_bytes = find(sizes)
+        to = {whom: find(rf"to the {whom} (\d+)")[0] for whom in ("tablet", "monitor", "robot")}
         return cls(
             planned_sessions=planned,
-            server_us=server,
-            beat_ms=find(r"^\| a look after what dead servers left \| ([\d.]+) ms \|$")[0],
-            thorough_ms=find(r"^\| the thorough look, 10,000 clinics \| ([\d.]+) ms \|$")[0],
+            server_us=of_two - own_us * 2 / many,
+            process_cores=own_us * STEPS_S / 1e6,
+            beat_ms=beat,
+            thorough_ms=thorough,
             row_us=row,
-            row_bytes=find(r"^\| a row of `rehab_step`, PostgreSQL \| (\d+) \|$")[0],
-            index_bytes=find(r"^\| its two indexes \| (\d+) \|$")[0],
-            parquet_bytes=find(r"^\| archived as Parquet, zstd \| (\d+) \|$")[0],
-            frame_bytes=frames,
+            row_bytes=row_bytes,
+            index_bytes=index_bytes,
+            parquet_bytes=parquet_bytes,
+            sent_bytes=sum(to.values()),
         )
 
 
@@ -146,7 +146,7 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     sessions = a.peak * walked_s / a.day_s
     steps_s = sessions / a.step_every_s
     rows_month = walked_s * a.days_a_month / a.step_every_s
-    work = steps_s * measured.server_us / 1e6 / a.busy
+    work = steps_s * measured.server_us / 1e6 / (a.busy - measured.process_cores)
     processes = max(2.0, math.ceil(work), math.ceil(sessions / measured.planned_sessions))
     row_s = measured.row_us / 1e6 * a.database_rows_at_once * a.other
     beats = beat_cores(processes, clinics, measured)
@@ -155,8 +155,7 @@ def need(clinics: float, measured: Measured, assumed: Assumed = Assumed()) -> Ne
     index_gb = online * measured.index_bytes / GB
     online_gb = online * (measured.row_bytes + measured.index_bytes) * a.other / GB
     archive_gb = 12 * rows_month * measured.parquet_bytes / GB
-    sent = sum(size for whom, size in measured.frame_bytes.items() if whom != "source")
-    egress_gb = rows_month * sent / GB
+    egress_gb = rows_month * measured.sent_bytes / GB
     cores = processes + (a.copies - 1) * database_cores + 2  # HAProxy
     cost = (
         cores * a.core_month
@@ -190,42 +189,42 @@ Limit = tuple[str, str, Callable[[Need, Measured, Assumed], float]]
 LIMITS: tuple[Limit, ...] = (
     (
         "two server processes",
-        "add processes and hosts: clinics spread by themselves",
+        "more processes and hosts",
         lambda n, m, a: n.sessions / m.planned_sessions / 2,
     ),
     (
-        "restoring one database takes longer than clinics may wait",
-        "archive older months, and shard: each shard is restored by itself",
+        "a restore within four hours",
+        "archive, or shard",
         lambda n, m, a: n.online_gb * 1000 / a.restore_mb_s / 3600 / a.restore_h,
     ),
     (
-        "indexes of the steps no longer fit half of the database's memory",
-        "partition by month: only the newest partition's index is written",
+        "half of the database's memory, by the steps' indexes",
+        "partition: only the newest index is written",
         lambda n, m, a: n.index_gb / (a.memory_gb / 2),
     ),
     (
         "connections to one database",
-        "max_connections 500, then PgBouncer for pages; writers and leases keep their own",
+        "max_connections 500, then PgBouncer for pages",
         lambda n, m, a: n.processes * a.connections_a_process / a.connections,
     ),
     (
         "one disk",
-        "archive months to Parquet, or shard",
+        "archive, or shard",
         lambda n, m, a: n.online_gb / a.one_disk_gb,
     ),
     (
         "connections of one HAProxy (maxconn 20,000)",
-        "raise maxconn and the files that it may open",
+        "raise it, and open files",
         lambda n, m, a: n.sessions * a.sockets_a_session / a.proxy_connections,
     ),
     (
-        "sockets from one HAProxy to one address of a server",
-        "more addresses or hosts",
+        "sockets from one HAProxy to a server",
+        "more addresses",
         lambda n, m, a: n.sessions * a.sockets_a_session / n.processes / a.sockets_a_host,
     ),
     (
         "commits of one server's writer",
-        "more processes: each has a writer",
+        "more processes",
         lambda n, m, a: n.steps_s / n.processes * m.row_us / 1e6,
     ),
     (

@@ -38,7 +38,8 @@ def test_sessions_go_on_beside_an_import(tmp_path, vendor, monkeypatch):
         monkeypatch.setattr(
             "tests.bench.driving.clean_environment", lambda *a: clean_environment(*a) | settings
         )
-        rows.write_text(json.dumps(seed(server, RUNNING)))
+        sessions = seed(server, 2 * RUNNING)  # each load numbers its steps from 1
+        rows.write_text(json.dumps(sessions[:RUNNING]))
         pid = server.process.pid
         quiet = drive("garry", server.port, pid, rows, 1, seconds=SECONDS)
         key = str(tmp_path / "key.txt")
@@ -49,6 +50,7 @@ def test_sessions_go_on_beside_an_import(tmp_path, vendor, monkeypatch):
             cwd=ROOT,
             env=clean_environment(folder, server.port) | settings,
         )
+        rows.write_text(json.dumps(sessions[RUNNING:]))
         time.sleep(3.0)  # it reads the whole file first
         beside = drive("garry", server.port, pid, rows, 1, seconds=SECONDS)
         still = importing.poll() is None
