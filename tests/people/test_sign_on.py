@@ -31,7 +31,7 @@ def hospital(settings, monkeypatch):
     known = SimpleNamespace(
         fetch_jwk_set=lambda: keys, load_server_metadata=lambda: {"issuer": ISSUER}
     )
-    monkeypatch.setattr(sign_on, "client", lambda: known)
+    monkeypatch.setattr(sign_on, "client", lambda *_: known)
 
 
 @pytest.fixture
