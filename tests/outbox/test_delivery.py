@@ -255,3 +255,30 @@ def test_over_a_real_socket_where_the_host_allows_the_network(world, settings):
         assert deliver_due(NOW) == 1
         server.shutdown()
     assert json.loads(Hook.received[0])["type"] == "export.ready"
+
+
+def test_a_receivers_page_asks_for_what_its_kind_has(world, endpoint):
+    fhir = add_endpoint(world, name="EHR", kind=Endpoint.Kind.FHIR)
+    shown = {
+        row.kind: world.lead.get(
+            reverse("admin:rehab_endpoint_change", args=[row.pk])
+        ).content.decode()
+        for row in (endpoint, fhir)
+    }
+    assert ("id_token" in shown["webhook"], "id_wants_falls" in shown["webhook"]) == (False, True)
+    assert ("id_token" in shown["fhir"], "id_wants_falls" in shown["fhir"]) == (True, False)
+    before = fhir.open_secret()
+    address = reverse("admin:rehab_endpoint_changelist")
+    form = {"action": "renew_secrets", "_selected_action": [fhir.pk]}
+    assert "its own" in world.lead.post(address, form, follow=True).content.decode()
+    assert Endpoint.everywhere.get(pk=fhir.pk).open_secret() == before
+
+
+def test_only_what_waits_has_a_next_attempt(world, endpoint):
+    notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    message = messages(endpoint).get()
+    page = reverse("admin:rehab_outboxmessage_change", args=[message.pk])
+    assert world.lead.get(page).context["adminform"].model_admin.next_at(message) == message.due_at
+    deliver_due(NOW, Receiver(400))
+    message.refresh_from_db()
+    assert world.lead.get(page).context["adminform"].model_admin.next_at(message) is None
