@@ -17,7 +17,6 @@ from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
 from rehab.people.web.row_forms import ClinicForm
 from rehab.people.web.token_admin import show_once
 
-
 WANTS = ("wants_sessions", "wants_falls", "wants_incidents", "wants_backups", "wants_exports")
 
 

@@ -60,7 +60,7 @@ def tour(context: dict[str, Any]) -> dict[str, object]:
 
 @register.simple_tag(takes_context=True)
 def left_tour(context: dict[str, Any]) -> int:
-    """Return the step at which the tour was left; 0 where there was none, negative while it runs."""
+    """Return the step at which the tour was left; 0 for none, negative while it runs."""
     return -where_in_tour(context["request"])
 
 

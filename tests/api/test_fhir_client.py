@@ -13,7 +13,17 @@ from tests.support.servers import ROOT, run_python, serve
 
 pytestmark = [pytest.mark.server, pytest.mark.long]
 READER = ROOT / "tests" / "support" / "fhir_client.mjs"
-WALK = "runsession --synthetic 7 --valence positive --strides 100 --speed max".split()
+WALK = [
+    "runsession",
+    "--synthetic",
+    "7",
+    "--valence",
+    "positive",
+    "--strides",
+    "100",
+    "--speed",
+    "max",
+]
 
 
 def test_it_reads_a_session_and_finds_nothing_wrong(tmp_path: Path) -> None:

@@ -51,7 +51,8 @@ def record(settings, monkeypatch) -> Record:
 
 @pytest.fixture
 def pt(world) -> User:
-    return world.people[Role.PT]
+    found: User = world.people[Role.PT]
+    return found
 
 
 def test_a_patient_is_found_by_the_clinics_code(world, pt, record):

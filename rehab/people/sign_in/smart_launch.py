@@ -1,7 +1,7 @@
 """Which patient a health record has open, where GARRY is launched from it (SMART App Launch 2.2.0).
 
-Who signs in is found as by the hospital's sign-on, which issues the record's tokens, too; the patient
-by the identifier that is the clinic's code. Nobody is opened unless exactly one fits.
+Who signs in is found as by the hospital's sign-on, which issues the record's tokens, too; the
+patient by the identifier that is the clinic's code. Nobody is opened unless exactly one fits.
 """
 
 from __future__ import annotations

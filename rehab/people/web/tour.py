@@ -1,7 +1,7 @@
 """A tour of five minutes, which goes along on the pages themselves, from the start to a report.
 
-Where somebody is in it stands in a cookie of the browser, which the page's script sets: -3 is a tour
-that was left at its third step. It names nothing and nobody.
+Where somebody is in it stands in a cookie of the browser, which the page's script sets: -3 is a
+tour that was left at its third step. It names nothing and nobody.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ class Step(NamedTuple):
 
 
 STEPS = (
-    Step(frozenset({"start"}), _("Tap “Try a demo”: a simulated patient comes, who needs no sensor.")),
+    Step(
+        frozenset({"start"}), _("Tap “Try a demo”: a simulated patient comes, who needs no sensor.")
+    ),
     Step(
         frozenset({"patient"}),
         _("A set-up is suggested. Tap “Therapist’s page”; with a paired tablet the blue button."),
@@ -43,13 +45,15 @@ STEPS = (
         frozenset({"monitor"}),
         _("Change the goal by − and +: it holds from the next step on. “Stop robot” works always."),
     ),
-    Step(frozenset({"monitor"}), _("Tap “End”. What was walked is stored; nothing has to be saved.")),
+    Step(
+        frozenset({"monitor"}), _("Tap “End”. What was walked is stored; nothing has to be saved.")
+    ),
     Step(
         frozenset({"session", "report", "patient"}),
         _("Report, figures and course of what was walked stay with the patient."),
     ),
     Step(
-        frozenset({"first-steps"}),
+        frozenset(),
         _("Now your own: station, tablet, sensor, patient. “?” explains the page that you are on."),
     ),
 )
@@ -65,18 +69,18 @@ def where_in_tour(request: HttpRequest) -> int:
 
 
 def show_step(request: HttpRequest | None) -> dict[str, object]:
-    """Return what the page shows of the tour: its next step, if the page is of that one."""
+    """Return what the page shows of the tour: a later step, if the page is of a later one."""
     if request is None or (number := where_in_tour(request)) < 1:
         return {}
     page = request.resolver_match.url_name if request.resolver_match else None
-    is_here = page in STEPS[number - 1].pages
-    if not is_here and number < len(STEPS) and page in STEPS[number].pages:
-        number, is_here = number + 1, True
+    if page not in STEPS[number - 1].pages:
+        later = (n for n in range(number, len(STEPS)) if page in STEPS[n].pages)
+        number = next(later, number - 1) + 1
     return {
         "number": number,
         "count": len(STEPS),
         "words": STEPS[number - 1].words,
-        "is_here": is_here,
+        "is_here": page in STEPS[number - 1].pages,
         "next": number + 1 if number < len(STEPS) else 0,
         "left": -number,
     }
