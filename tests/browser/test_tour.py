@@ -22,7 +22,7 @@ def test_it_goes_along_can_be_left_and_is_taken_up_again(visit) -> None:
     page.click("text=Go on with the tour")
     expect(tour).to_contain_text("2 / 8")
     page.click(".all .tap")
-    page.click("text=Therapist’s page")
+    page.click("button[value=monitor]")
     expect(tour).to_contain_text("Tap “Start”")
     expect(page.locator("[data-main]")).to_be_in_viewport(ratio=1)  # what is to be tapped
     for number in range(4, 7):
