@@ -9,6 +9,7 @@ from django.contrib import admin, messages
 from django.db.models import QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.utils import timezone
+from django.utils.formats import localize
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -102,7 +103,7 @@ class EndpointAdmin(ScopedAdmin):
 class OutboxMessageAdmin(ScopedAdmin):
     """What was sent, and what waits or was refused."""
 
-    list_display = ("at", "endpoint", "topic", "state", "attempts", "next_at", "answer")
+    list_display = ("at", "endpoint", "topic", "state", "next_at", "answer")
     list_filter = ("state", "topic")
     list_select_related = ("endpoint",)
     actions = row_actions = viewer_actions = ("send_again",)
@@ -111,9 +112,10 @@ class OutboxMessageAdmin(ScopedAdmin):
     fields = ("endpoint", "topic", "body", "at", "state", "attempts", "next_at", "answer", "key")
 
     @admin.display(description=_("next attempt"))
-    def next_at(self, row: OutboxMessage) -> Any:
+    def next_at(self, row: OutboxMessage) -> str:
         """Return when a message that waits is sent again."""
-        return row.due_at if row.state == OutboxMessage.State.WAITING else None
+        is_waiting = row.state == OutboxMessage.State.WAITING
+        return str(localize(timezone.localtime(row.due_at))) if is_waiting else "–"
 
     @admin.action(description=_("Send again"), permissions=["view"])
     def send_again(self, request: HttpRequest, rows: QuerySet[OutboxMessage]) -> None:

@@ -26,13 +26,13 @@ def test_it_goes_along_can_be_left_and_is_taken_up_again(visit) -> None:
     expect(tour).to_contain_text("Tap “Start”")
     expect(page.locator("[data-main]")).to_be_in_viewport(ratio=1)  # what is to be tapped
     for number in range(4, 7):
-        tour.get_by_text("Next step").click()
+        tour.get_by_role("button", name="Next step").click()
         expect(tour).to_contain_text(f"{number} / 8")
-    tour.get_by_text("Next step").click()
-    tour.get_by_text("Next step").click()
+    tour.get_by_role("button", name="Next step").click()
+    tour.get_by_role("button", name="Next step").click()
     expect(tour).to_contain_text("Now your own")
-    tour.get_by_text("First steps").click()
-    tour.get_by_text("End the tour").click()
+    tour.get_by_role("link", name="First steps").click()
+    tour.get_by_role("button", name="End the tour").click()
     expect(tour).to_have_count(0)
     page.goto("/help/")
     expect(page.get_by_text("Five-minute tour")).to_be_visible()
