@@ -204,6 +204,21 @@ OIDC_MFA_ACR = string_list(
 OIDC_ORIGIN = "{0.scheme}://{0.netloc}".format(urlsplit(OIDC_ISSUER))
 if OIDC_ISSUER and urlsplit(OIDC_ISSUER).scheme != "https" and HOSTED:
     raise ImproperlyConfigured("GARRY_OIDC_ISSUER must begin with https:// on a hosted server.")
+SMART_FHIR = text(
+    "GARRY_SMART_FHIR", "", "address of the hospital's FHIR server, whose record may launch GARRY"
+).rstrip("/")
+SMART_IDENTIFIER = text(
+    "GARRY_SMART_IDENTIFIER", "", "system of the patients' identifier there that is the code here"
+)
+SMART_SCOPE = text(
+    "GARRY_SMART_SCOPE",
+    "launch openid profile patient/Patient.read",
+    "what a launch asks the health record for",
+)
+if SMART_FHIR and not (OIDC_ISSUER and SMART_IDENTIFIER):
+    raise ImproperlyConfigured("GARRY_SMART_FHIR needs GARRY_OIDC_ISSUER, GARRY_SMART_IDENTIFIER.")
+if SMART_FHIR and urlsplit(SMART_FHIR).scheme != "https" and HOSTED:
+    raise ImproperlyConfigured("GARRY_SMART_FHIR must begin with https:// on a hosted server.")
 SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
 SESSION_COOKIE_AGE = 12 * 3600  # one working day, whatever the activity
 SESSION_COOKIE_SAMESITE = "Lax"

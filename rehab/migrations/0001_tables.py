@@ -280,6 +280,14 @@ class Migration(migrations.Migration):
                     "subject",
                     models.CharField(editable=False, max_length=255, null=True, unique=True),
                 ),
+                (
+                    "is_service",
+                    models.BooleanField(
+                        default=False,
+                        help_text="Of a program: nobody signs in; any lead makes tokens for it.",
+                        verbose_name="service account",
+                    ),
+                ),
                 ("sign_in_generation", models.PositiveIntegerField(default=0, editable=False)),
                 (
                     "groups",

@@ -9,6 +9,7 @@ from django.contrib import admin, messages
 from django.db.models import QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.utils import timezone
+from django.utils.formats import localize
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -17,12 +18,14 @@ from rehab.people.web.admin_base import ScopedAdmin, asks_who_it_is
 from rehab.people.web.row_forms import ClinicForm
 from rehab.people.web.token_admin import show_once
 
+WANTS = ("wants_sessions", "wants_falls", "wants_incidents", "wants_backups", "wants_exports")
+
 
 class EndpointForm(ClinicForm):
     """A receiver, with the token that a FHIR server asks for."""
 
     token = forms.CharField(
-        label=_("token of the FHIR server"),
+        label=_("Token of the FHIR server"),
         required=False,
         widget=forms.PasswordInput,
         help_text=_("Sent as a Bearer token; empty to leave it as it is."),
@@ -48,15 +51,19 @@ class EndpointAdmin(ScopedAdmin):
 
     form = EndpointForm
     list_display = ("name", "kind", "url", "active")
-    fields = (
-        *("name", "kind", "url", "token", "active"),
-        *("wants_sessions", "wants_falls", "wants_incidents", "wants_backups", "wants_exports"),
-    )
     actions = row_actions = ("renew_secrets",)
 
     def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return the fixed fields: another kind is another receiver."""
         return () if obj is None else ("kind",)
+
+    def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fields of its kind; of a new receiver, those of all kinds."""
+        kind = obj and obj.kind
+        token = () if kind == Endpoint.Kind.WEBHOOK else ("token",)
+        told = (_("A webhook is told when"), {"fields": WANTS})
+        main = (None, {"fields": ("name", "kind", "url", *token, "active")})
+        return (main,) if kind == Endpoint.Kind.FHIR else (main, told)
 
     @asks_who_it_is
     def changeform_view(self, *args: Any, **kwargs: Any) -> HttpResponse:
@@ -81,9 +88,12 @@ class EndpointAdmin(ScopedAdmin):
 
     @admin.action(description=_("Give new secrets (old ones stop at once)"), permissions=["change"])
     @asks_who_it_is
-    def renew_secrets(self, request: HttpRequest, rows: QuerySet[Endpoint]) -> HttpResponse:
+    def renew_secrets(self, request: HttpRequest, rows: QuerySet[Endpoint]) -> HttpResponse | None:
         """Replace what signs the messages to the chosen webhooks, and show it."""
         issued = [(row, row.new_secret()) for row in rows.filter(kind=Endpoint.Kind.WEBHOOK)]
+        if not issued:
+            messages.error(request, gettext("A FHIR server’s token is its own: type it there."))
+            return None
         for row, _secret in issued:
             row.save(update_fields=["secret"])
         return show_once(self, request, issued, gettext("New secrets"), is_kept=True)
@@ -93,10 +103,19 @@ class EndpointAdmin(ScopedAdmin):
 class OutboxMessageAdmin(ScopedAdmin):
     """What was sent, and what waits or was refused."""
 
-    list_display = ("at", "endpoint", "topic", "state", "attempts", "answer", "due_at")
+    list_display = ("at", "endpoint", "topic", "state", "next_at", "answer")
     list_filter = ("state", "topic")
     list_select_related = ("endpoint",)
     actions = row_actions = viewer_actions = ("send_again",)
+
+    readonly_fields = ("next_at",)
+    fields = ("endpoint", "topic", "body", "at", "state", "attempts", "next_at", "answer", "key")
+
+    @admin.display(description=_("next attempt"))
+    def next_at(self, row: OutboxMessage) -> str:
+        """Return when a message that waits is sent again."""
+        is_waiting = row.state == OutboxMessage.State.WAITING
+        return str(localize(timezone.localtime(row.due_at))) if is_waiting else "–"
 
     @admin.action(description=_("Send again"), permissions=["view"])
     def send_again(self, request: HttpRequest, rows: QuerySet[OutboxMessage]) -> None:

@@ -12,6 +12,7 @@ urlpatterns = [
     path("sign-in/hospital/", sign_on.begin, name="sign-on"),
     path("sign-in/hospital/back/", sign_on.complete, name="sign-on-complete"),
     path("sign-in/hospital/ended/", sign_on.end, name="sign-on-ended"),
+    path("launch/", sign_on.launch, name="launch"),
     path("account/confirm/hospital/", sign_on.confirm, name="sign-on-confirm"),
     path("account/hospital/", sign_on.link, name="sign-on-link"),
     path("sign-out/", sign_in.sign_out, name="sign-out"),

@@ -10,6 +10,7 @@ from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
 from rehab.people.web.help_pages import find_part
+from rehab.people.web.tour import show_step, where_in_tour
 from rehab.sessions.formatting import (
     format_duration,
     format_rate,
@@ -49,6 +50,18 @@ def help_address(context: dict[str, Any]) -> str:
     match = getattr(context.get("request"), "resolver_match", None)
     part = find_part(match.url_name or "") if match else ""
     return f"{reverse('help')}#{part}" if part else reverse("help")
+
+
+@register.inclusion_tag("people/tour.html", takes_context=True)
+def tour(context: dict[str, Any]) -> dict[str, object]:
+    """Return what the page shows of the tour."""
+    return show_step(context.get("request"))
+
+
+@register.simple_tag(takes_context=True)
+def left_tour(context: dict[str, Any]) -> int:
+    """Return the step at which the tour was left; 0 for none, negative while it runs."""
+    return -where_in_tour(context["request"])
 
 
 @register.filter

@@ -13,6 +13,8 @@ from django.test import Client
 from django.utils import timezone
 
 from rehab.people.access import UndeclaredView
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import LIFETIME, ApiToken
 from rehab.people.token_buckets import TokenBuckets
@@ -213,3 +215,42 @@ def test_a_call_that_declares_nothing_stops_the_start():
 
     with pytest.raises(UndeclaredView, match="silent.*@for_roles"):
         api_base.check_roles(silent)
+
+
+def test_a_service_account_outlives_who_makes_its_tokens(world):
+    """Nobody can sign in there; the logs name it, and no other clinic's lead gets its token."""
+    service = User.everywhere.create_user(
+        "bookings", role=Role.PT, clinic=world.clinic, is_service=True
+    )
+    other = build_world("basil")
+    form = filled(user=service.pk)
+    other.lead.post("/admin/rehab/apitoken/add/", form)
+    assert ApiToken.everywhere.filter(name="Export", user=service).count() == 0
+    token = issued(world.lead.post("/admin/rehab/apitoken/add/", form))
+    status, me = Program(token).get("/me")
+    assert (status, me["username"]) == (200, "bookings")
+    noted = AuditEntry.everywhere.filter(act=Act.TOKEN_USE, by=service)
+    assert [(one.by, one.through) for one in noted] == [(service, "Export")]
+    lead = world.people[Role.LEAD]
+    lead.is_active = False
+    lead.save()
+    assert Program(token).get("/me")[0] == 200
+    service.is_active = False
+    service.save()
+    assert Program(token).get("/me")[0] == 401
+
+
+def test_nobody_signs_in_to_a_service_account(world):
+    form = {"username": "bookings", "role": "pt", "is_service": "on", "usable_password": "true"}
+    form |= {"password1": "a-password-that-is-long", "password2": "a-password-that-is-long"}
+    world.lead.post("/admin/rehab/user/add/", form)
+    service = User.everywhere.get(username="bookings")
+    assert service.is_service
+    service.subject = "4711"
+    service.set_password("a-password-that-is-long")
+    service.save()
+    service.refresh_from_db()
+    assert (service.has_usable_password(), service.subject) == (False, None)
+    world.lead.post(f"/admin/rehab/user/{service.pk}/change/", {"username": "x", "role": "pt"})
+    service.refresh_from_db()
+    assert (service.username, service.is_service) == ("x", True)  # its tokens are not a person's

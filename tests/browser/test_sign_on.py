@@ -20,6 +20,10 @@ GROUP = """
 from rehab.people.models import Clinic, SignOnGroup
 SignOnGroup.everywhere.create(name="gait", clinic=Clinic.everywhere.get(), role="pt")
 """
+PATIENT = """
+from rehab.people.models import Clinic, Patient
+Patient.everywhere.create(clinic=Clinic.everywhere.get(), nickname="Rosa", code="K7-204")
+"""
 ROLES = """
 from rehab.people.models import User
 print(sorted(User.everywhere.values_list("username", "role")))
@@ -36,6 +40,10 @@ class Hospital:
         """Say who works there now, in which groups."""
         self.staff.write_text(json.dumps({name: {"groups": own} for name, own in groups.items()}))
 
+    def open_patient(self, number: str) -> None:
+        """Say whom the health record has open."""
+        Path(f"{self.staff}.number").write_text(number)
+
 
 @pytest.fixture
 def hospital(tmp_path: Path) -> Iterator[Hospital]:
@@ -48,6 +56,8 @@ def hospital(tmp_path: Path) -> Iterator[Hospital]:
         "GARRY_OIDC_CLIENT_SECRET": "a secret between the two of them, of this test",
         "GARRY_OIDC_NAME": "City Hospital",
         "GARRY_OIDC_CREATE": "1",
+        "GARRY_SMART_FHIR": f"http://localhost:{port}/fhir",
+        "GARRY_SMART_IDENTIFIER": "urn:city-hospital:mrn",
     }
     with serve(tmp_path / "data", settings=settings) as server:
         made = Hospital(tmp_path, server, settings["GARRY_OIDC_ISSUER"])
@@ -151,3 +161,22 @@ def test_a_stranger_of_a_group_gets_an_account_and_another_none(
     sign_on(page, "eve")
     expect(page.locator(".notes")).to_contain_text("No account here is linked to your hospital")
     assert "eve" not in roles(hospital.server)
+
+
+def test_the_health_record_opens_its_patient(hospital: Hospital, page: Page) -> None:
+    hospital.employ(ben=["gait"])
+    hospital.server.run_shell(GROUP + PATIENT)
+    hospital.open_patient("K7-204")
+    page.goto(f"{hospital.issuer}/ehr/launch")
+    sign_on(page, "ben")
+    page.wait_for_url("**/patients/*/")
+    expect(page.get_by_role("heading", name="Rosa")).to_be_visible()
+    # The same person, and a patient whom nobody here knows.
+    hospital.open_patient("K7-999")
+    page.goto(f"{hospital.issuer}/ehr/launch")
+    page.wait_for_url("**/start/")
+    expect(page.locator(".notes")).to_contain_text("No patient here has the number")
+    # Another server's record launches nothing here.
+    answer = page.goto(f"{hospital.issuer}/ehr/launch?iss=https://elsewhere.example/fhir")
+    assert answer is not None
+    assert answer.status == 404

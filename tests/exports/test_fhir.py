@@ -73,6 +73,17 @@ def test_a_hospital_finds_its_patient_by_code_and_what_was_walked(world):
     assert score["encounter"] == {"reference": f"Encounter/session-{session.pk}"}
 
 
+def test_a_hospital_finds_its_patient_by_its_own_identifier(world, settings):
+    code, system = world.patient.code, "urn:hospital:mrn"
+    assert resources(read(world, f"Patient?identifier={system}|{code}")) == []
+    settings.SMART_IDENTIFIER = system
+    (patient,) = resources(read(world, f"Patient?identifier={system}|{code}"))
+    assert {"system": system, "value": code} in patient["identifier"]
+    type(world.patient).everywhere.filter(pk=world.patient.pk).update(simulated=True)
+    for patient in resources(read(world, "Patient")):  # who is simulated has no number there
+        assert system not in [one["system"] for one in patient["identifier"]]
+
+
 def test_a_page_leads_to_the_next(world):
     for _ in range(3):
         walk(world.patient, "binary", [4.0] * 4)

@@ -12,6 +12,8 @@ import pytest
 from django.core.management import CommandError, call_command
 from django.db import transaction
 from django.urls import reverse
+from django.utils import timezone
+from django.utils.formats import localize
 
 from rehab.exports.encryption import generate_key
 from rehab.outbox.delivery import deliver_due, is_due, sign
@@ -255,3 +257,33 @@ def test_over_a_real_socket_where_the_host_allows_the_network(world, settings):
         assert deliver_due(NOW) == 1
         server.shutdown()
     assert json.loads(Hook.received[0])["type"] == "export.ready"
+
+
+def test_a_receivers_page_asks_for_what_its_kind_has(world, endpoint):
+    fhir = add_endpoint(world, name="EHR", kind=Endpoint.Kind.FHIR)
+    shown = {
+        row.kind: world.lead.get(
+            reverse("admin:rehab_endpoint_change", args=[row.pk])
+        ).content.decode()
+        for row in (endpoint, fhir)
+    }
+    assert ("id_token" in shown["webhook"], "id_wants_falls" in shown["webhook"]) == (False, True)
+    assert ("id_token" in shown["fhir"], "id_wants_falls" in shown["fhir"]) == (True, False)
+    before = fhir.open_secret()
+    address = reverse("admin:rehab_endpoint_changelist")
+    form = {"action": "renew_secrets", "_selected_action": [fhir.pk]}
+    assert "its own" in world.lead.post(address, form, follow=True).content.decode()
+    assert Endpoint.everywhere.get(pk=fhir.pk).open_secret() == before
+
+
+def test_only_what_waits_has_a_next_attempt(world, endpoint):
+    notify(world.clinic.pk, Topic.EXPORT, {}, NOW)
+    message = messages(endpoint).get()
+    page = reverse("admin:rehab_outboxmessage_change", args=[message.pk])
+    line = '<div class="readonly">{}</div>'
+    due = line.format(localize(timezone.localtime(message.due_at)))
+    assert world.lead.get(page).content.decode().count(due) == 2  # and when it was stored
+    deliver_due(NOW, Receiver(400))
+    shown = world.lead.get(page).content.decode()
+    assert shown.count(due) == 1
+    assert line.format("–") in shown

@@ -31,7 +31,7 @@ def hospital(settings, monkeypatch):
     known = SimpleNamespace(
         fetch_jwk_set=lambda: keys, load_server_metadata=lambda: {"issuer": ISSUER}
     )
-    monkeypatch.setattr(sign_on, "client", lambda: known)
+    monkeypatch.setattr(sign_on, "client", lambda *_: known)
 
 
 @pytest.fixture
@@ -123,7 +123,7 @@ def back(linked, client, monkeypatch) -> Any:
 
     def come_back(kind: str, **claims: Any) -> Any:
         purpose = {"kind": kind, "next_url": reverse("account"), "at": int(NOW.timestamp())}
-        monkeypatch.setattr(sign_on, "complete", lambda _: (purpose, {"sub": "4711"} | claims))
+        monkeypatch.setattr(sign_on, "complete", lambda _: (purpose, {"sub": "4711"} | claims, {}))
         return client.get(reverse("sign-on-complete"))
 
     return come_back

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
+from django.conf import settings
 from django.db.models import QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.utils import timezone
@@ -104,7 +105,7 @@ def _search(user: User, kind: str, wanted: Search) -> tuple[list[Resource], bool
         patients = _patients(user)
         if wanted.identifier is not None:
             system, _, code = wanted.identifier.rpartition("|")
-            known = system in ("", f"{SYSTEM}:code")
+            known = system in ("", f"{SYSTEM}:code", settings.SMART_IDENTIFIER)
             patients = patients.filter(code=code) if known else patients.none()
         few = list(patients[part])
         allowed = [one for one in few[: wanted.count] if is_care_allowed(one)]

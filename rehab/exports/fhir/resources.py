@@ -12,6 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 from uuid import NAMESPACE_OID, uuid5
 
+from django.conf import settings
+
 from rehab.exports.session_table import CONDITIONS, WALKED, SessionRow
 from rehab.people.models import Patient, User
 from rehab.sessions.assessments import assessments_with
@@ -81,11 +83,13 @@ class HospitalNames:
         return f"{kind}/{'-'.join(map(str, parts)).replace('_', '.')}"
 
     def patient(self, patient: Patient) -> tuple[str, Resource]:
-        """Return a patient by the code that the clinic knows them by."""
-        known = {"system": f"{SYSTEM}:code", "value": patient.code}
+        """Return a patient by the code that the clinic knows them by; at a hospital its number."""
+        systems = [f"{SYSTEM}:code"]
+        if settings.SMART_IDENTIFIER and not patient.simulated:
+            systems.append(settings.SMART_IDENTIFIER)
         return self.address("Patient", "patient", patient.pk), {
             "resourceType": "Patient",
-            "identifier": [known],
+            "identifier": [{"system": system, "value": patient.code} for system in systems],
             "active": patient.ended_at is None,
         }
 

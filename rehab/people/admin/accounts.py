@@ -149,11 +149,15 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         role_fields = ("role", "clinic") if user_of(request).role == Role.HOST else ("role",)
         if obj is None:
             passwords = ("usable_password", "password1", "password2")
-            return [(None, {"fields": ("username", *passwords, *role_fields)})]
+            return [(None, {"fields": ("username", *passwords, *role_fields, "is_service")})]
         return [
-            (None, {"fields": ("username", "password", *role_fields, "is_active")}),
+            (None, {"fields": ("username", "password", *role_fields, "is_service", "is_active")}),
             (_("Person"), {"fields": ("first_name", "last_name", "email")}),
         ]
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fixed fields: a program's account never becomes a person's."""
+        return () if obj is None else ("is_service",)
 
     def get_form(
         self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any

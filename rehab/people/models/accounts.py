@@ -69,6 +69,11 @@ class User(AbstractUser):
     )
     # Who this person is at the hospital's sign-on (OpenID Connect's `sub`); None: not linked.
     subject = models.CharField(max_length=255, unique=True, null=True, editable=False)  # noqa: DJ001
+    is_service = models.BooleanField(
+        _("service account"),
+        default=False,
+        help_text=_("Of a program: nobody signs in; any lead makes tokens for it."),
+    )
     # Raised to end all sign-ins from before.
     sign_in_generation = models.PositiveIntegerField(default=0, editable=False)
     # The name of the API token through which this person acts, and what it may do.
@@ -110,6 +115,10 @@ class User(AbstractUser):
         """Save the account. Django's own flags follow from the role."""
         self.is_staff = True  # everyone may open the admin; the role decides what it shows
         self.is_superuser = False  # nobody bypasses the table of rights
+        if self.is_service:
+            self.subject = None
+            if self.has_usable_password():
+                self.set_unusable_password()
         super().save(*args, **kwargs)
 
     def __str__(self) -> str:

@@ -17,7 +17,7 @@ from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import User
 from rehab.people.pages.sign_in import go_on, landing_page
 from rehab.people.roles import Role
-from rehab.people.sign_in import flow, sign_on, step_up
+from rehab.people.sign_in import flow, sign_on, smart_launch, step_up
 
 
 @public
@@ -26,6 +26,16 @@ from rehab.people.sign_in import flow, sign_on, step_up
 def begin(request: HttpRequest) -> HttpResponse:
     """Lead a stranger to the hospital's sign-on."""
     return _lead_there(request, "sign-in", request.GET.get("next", ""), "sign-in")
+
+
+@public
+@never_cache
+@require_safe
+def launch(request: HttpRequest) -> HttpResponse:
+    """Begin what a hospital's health record launches: a sign-on that opens its patient."""
+    if not smart_launch.is_launch(request.GET.get("iss", "")):
+        raise Http404
+    return _lead_there(request, "launch", "", "sign-in")
 
 
 @for_roles(*Role, patients=False)
@@ -60,10 +70,13 @@ def complete(request: HttpRequest) -> HttpResponse:
     now = timezone.now()
     back = "account" if isinstance(request.user, User) else "sign-in"
     try:
-        purpose, claims = sign_on.complete(request)
+        purpose, claims, token = sign_on.complete(request)
         next_url = purpose["next_url"]
-        if purpose["kind"] == "sign-in":
-            return _sign_in(request, sign_on.find_account(claims), claims, next_url)
+        if purpose["kind"] in ("sign-in", "launch"):
+            user = sign_on.find_account(claims)
+            if purpose["kind"] == "launch":
+                next_url = _open_patient(request, user, token)
+            return _sign_in(request, user, claims, next_url)
         user = user_of(request)
         if purpose["kind"] == "link":
             if User.everywhere.filter(subject=claims["sub"]).exclude(pk=user.pk).exists():
@@ -111,6 +124,16 @@ def _sign_in(
         return go_on(request, user, next_url)
     flow.finish(request, user, timezone.now(), second_factor_verified=True)
     return redirect(next_url)
+
+
+def _open_patient(request: HttpRequest, user: User, token: dict[str, object]) -> str:
+    """Return the address of the patient whom the record has open; "" where that is nobody here."""
+    patient = smart_launch.find_patient(user, token)
+    if patient is not None:
+        return reverse("patient", args=[patient.pk])
+    words = _("No patient here has the number of the one who is open in the hospital’s record.")
+    messages.warning(request, words)
+    return ""
 
 
 def _set_subject(request: HttpRequest, user: User, subject: str | None) -> None:

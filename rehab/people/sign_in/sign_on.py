@@ -53,16 +53,23 @@ def button_text() -> str:
 
 
 @cache
-def client() -> Any:
-    """Return Authlib's client of the hospital's sign-on; it asks for its addresses when used."""
-    issuer = settings.OIDC_ISSUER.rstrip("/")
+def client(kind: str = "") -> Any:
+    """Return Authlib's client of the hospital's sign-on; it asks for its addresses when used.
+
+    That of a ``launch`` has those of the health record.
+    """
+    issuer, scope = settings.OIDC_ISSUER.rstrip("/"), settings.OIDC_SCOPE
+    metadata_url = f"{issuer}/.well-known/openid-configuration"
+    if kind == "launch":
+        metadata_url = f"{settings.SMART_FHIR}/.well-known/smart-configuration"
+        scope = settings.SMART_SCOPE
     return OAuth().register(
-        "hospital",
+        kind or "hospital",
         client_id=settings.OIDC_CLIENT_ID,
         client_secret=settings.OIDC_CLIENT_SECRET,
-        server_metadata_url=f"{issuer}/.well-known/openid-configuration",
+        server_metadata_url=metadata_url,
         client_kwargs={
-            "scope": settings.OIDC_SCOPE,
+            "scope": scope,
             "code_challenge_method": "S256",
             "default_timeout": WAIT_S,
         },
@@ -74,20 +81,29 @@ def begin(
 ) -> HttpResponse:
     """Return the way to the hospital's sign-on.
 
-    ``kind`` is ``sign-in``, ``link`` (the signed-in account gets the hospital's) or ``confirm``
-    (the person has to sign in there anew). Raises SignOnRefused where it does not answer.
+    ``kind`` is ``sign-in``, ``link`` (the signed-in account gets the hospital's), ``confirm`` (the
+    person has to sign in there anew) or ``launch`` (the health record has a patient open). Raises
+    SignOnRefused where it does not answer.
     """
     request.session[PURPOSE] = {"kind": kind, "next_url": next_url, "at": now.timestamp()}
-    anew = {"prompt": "login", "max_age": 0} if kind == "confirm" else {}
+    more: dict[str, Any] = {}
+    if kind == "confirm":
+        more = {"prompt": "login", "max_age": 0}
+    elif kind == "launch":  # SMART App Launch 2.2.0, 2.0.9
+        more = {"launch": request.GET.get("launch", ""), "aud": settings.SMART_FHIR}
     try:
-        redirect: HttpResponse = client().authorize_redirect(request, return_url, **anew)
-    except (OAuthError, RequestException) as error:
+        redirect: HttpResponse = _client_for(kind).authorize_redirect(request, return_url, **more)
+    except (OAuthError, RequestException, RuntimeError, ValueError) as error:
         raise SignOnRefused(_("The hospital’s sign-on does not answer. Try again.")) from error
     return redirect
 
 
-def complete(request: HttpRequest) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return for what a sign-on was begun, and the claims that it came back with.
+def _client_for(kind: str) -> Any:
+    return client("launch") if kind == "launch" else client()
+
+
+def complete(request: HttpRequest) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Return for what a sign-on was begun, the claims that it came back with, and its token.
 
     Raises SignOnRefused where it is none of this browser, or was refused there.
     """
@@ -95,18 +111,19 @@ def complete(request: HttpRequest) -> tuple[dict[str, Any], dict[str, Any]]:
     try:
         if purpose is None:
             raise OAuthError("no_purpose")
-        token = client().authorize_access_token(request)
+        token = _client_for(purpose["kind"]).authorize_access_token(request)
         claims = dict(token["userinfo"])
-        if settings.OIDC_GROUPS_CLAIM not in claims and client().server_metadata.get(
-            "userinfo_endpoint"
-        ):
+        hospital = client().load_server_metadata()
+        if claims["iss"] != hospital["issuer"]:  # subjects are of this issuer
+            raise OAuthError("other_issuer")
+        if settings.OIDC_GROUPS_CLAIM not in claims and hospital.get("userinfo_endpoint"):
             more = client().userinfo(token=token)
             if more.get("sub") == claims["sub"]:  # Core 5.3.2: else it may be another's
                 claims = {**more, **claims}
     except (OAuthError, JoseError, RequestException, KeyError, ValueError) as error:
         raise SignOnRefused(_("The hospital’s sign-on was not completed. Try again.")) from error
     request.session[ID_TOKEN] = token["id_token"]
-    return purpose, claims
+    return purpose, claims, token
 
 
 def has_second_factor(claims: Mapping[str, Any]) -> bool:

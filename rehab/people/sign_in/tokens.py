@@ -9,6 +9,7 @@ from typing import Any, ClassVar, TypeVar, cast
 
 from django.core.exceptions import ValidationError
 from django.db import models, transaction
+from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
@@ -176,6 +177,11 @@ class ApiToken(TokenModel):
                     % {"user": user, "role": user.get_role_display()}
                 }
             )
+
+
+def service_accounts(user: User) -> QuerySet[User]:
+    """Return the accounts of programs in a person's clinic, which outlive who makes them tokens."""
+    return User.objects.visible_to(user).filter(is_service=True, clinic=user.clinic_id)
 
 
 def find_user_by_token(token: str, now: datetime) -> User | None:
