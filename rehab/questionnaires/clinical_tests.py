@@ -102,7 +102,7 @@ WALK_SPEED = (
     gettext_noop("Stop it when the first foot crosses the last mark."),
     gettext_noop("Walking aid and orthosis as usual; walk slightly behind, never ahead."),
 )
-# Each number's source is beside it; in full in docs/reference/questionnaires.md.
+# Each number's source is beside it; in full in docs/reference/questionnaires.md#walking-tests.
 CLINICAL_TESTS: dict[str, ClinicalTest] = {
     test.slug: test
     for test in (
