@@ -13,9 +13,36 @@ const AIR = 20; // between words and horizon
 const TALLEST = 150; // the scale's top where words stand beside it
 // `under`: whether words stand over the thermometer, not beside it.
 const LAYOUTS = {
-  portrait: { wide: 800, high: 1280, x: 570, y150: 484, y0: 1068, under: true, chart: [60, 446], figure: [400, 930, 1.66] },
-  landscape: { wide: 1280, high: 800, x: 1048, y150: 330, y0: 612, under: false, chart: [440, 912], figure: [900, 560, 1.36] },
-  column: { wide: 800, high: 1000, x: 570, y150: 456, y0: 812, under: true, chart: [60, 446], figure: [400, 760, 1.06] },
+  portrait: {
+    wide: 800,
+    high: 1280,
+    x: 570,
+    y150: 484,
+    y0: 1068,
+    under: true,
+    chart: [60, 446],
+    figure: [400, 930, 1.66],
+  },
+  landscape: {
+    wide: 1280,
+    high: 800,
+    x: 1048,
+    y150: 330,
+    y0: 612,
+    under: false,
+    chart: [440, 912],
+    figure: [900, 560, 1.36],
+  },
+  column: {
+    wide: 800,
+    high: 1000,
+    x: 570,
+    y150: 456,
+    y0: 812,
+    under: true,
+    chart: [60, 446],
+    figure: [400, 760, 1.06],
+  },
   center: { wide: 900, high: 900, x: 644, y150: 400, y0: 712, under: true, chart: [60, 446], figure: [450, 660, 1.06] },
 };
 
