@@ -9,7 +9,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
 from rehab.boards.panels.formatting import BoardPanel
-from rehab.boards.panels.own_panels import make_own_panels
+from rehab.boards.panels.own_panels import make_own_panel
 from rehab.boards.panels.shared_panels import make_session_panels, make_waiting_panels
 from rehab.people.access import actor_of, for_roles
 from rehab.people.consent.models import Purpose
@@ -39,7 +39,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     boards: list[BoardPanel] = []
     if not session.patient.blinded:
         now = timezone.now()
-        boards = [*make_session_panels(session, now), *make_own_panels(session, now)]
+        boards = [*make_session_panels(session, now), make_own_panel(session, now)]
     context = {
         "session": session,
         "boards": boards,

@@ -170,9 +170,9 @@ NOTHING_LOST = join(
 )
 
 MEASURED = join(
-    gettext_noop("Your step, measured."),
+    gettext_noop("Your step in numbers."),
     gettext_noop("This step."),
-    gettext_noop("Measured now."),
+    gettext_noop("Here is your value."),
     gettext_noop("Your value."),
     gettext_noop("The value now."),
     gettext_noop("This step’s value."),

@@ -101,13 +101,13 @@ def test_binary_points_may_be_negative(client, patient):
     ]
 
 
-def test_hit_rates_rank_the_sessions_of_all_types(client, patient):
+def test_hit_rates_rank_the_sessions_of_all_types_beside_one_of_two(client, patient):
     walked = [("positive", 6, 4), ("negative", 9, 1), ("explicit", 3, 7), ("binary", 12, 8)]
     sessions = {walk(patient, v, strides(h, m)).pk: h / (h + m) for v, h, m in walked}
     last = walk(patient, "positive", strides(5, 5))
     sessions[last.pk] = 0.5
-    page = client.get(url_of(last)).content.decode()
-    rows = read(page, "all")
+    TrainingSession.everywhere.filter(pk=last.pk).update(changed_to="negative")
+    rows = read(client.get(url_of(last)).content.decode(), "all")
     assert [(row.rank, row.value) for row in rows] == [
         ("1", "90 %"),
         ("2", "60 %"),
@@ -117,7 +117,6 @@ def test_hit_rates_rank_the_sessions_of_all_types(client, patient):
     ]
     assert all(f"{sessions[row.session]:.0%}" == row.value.replace(" ", "") for row in rows)
     assert [row.session for row in rows if row.you] == [last.pk]
-    assert [row.you for row in read(page, "same")].count(True) == 1
 
 
 def test_explicit_feedback_ranks_by_hit_rate_and_shows_no_points(client, patient):
@@ -157,7 +156,6 @@ def test_only_finished_sessions_with_judged_steps_are_on_a_board(client, patient
     walk(patient, "positive", [None, None])
     page = client.get(url_of(good)).content.decode()
     assert [row.session for row in read(page, "same")] == [good.pk]
-    assert [row.session for row in read(page, "all")] == [good.pk]
 
 
 @pytest.mark.parametrize(
@@ -177,7 +175,7 @@ def test_a_session_without_a_score_says_so_and_shows_the_others(client, patient,
 
 def test_the_first_session_that_ever_ended_without_a_score(client, patient):
     page = client.get(url_of(walk(patient, "negative", [None]))).content.decode()
-    assert page.count("No scores yet") == 2
+    assert page.count("No scores yet") == 1
 
 
 @pytest.mark.parametrize("pause", [[], [ChangeKind.PAUSE]], ids=["running", "paused"])
@@ -194,10 +192,10 @@ def test_simulated_and_walked_sessions_never_share_a_board(client, patient):
     walked = walk(patient, "positive", strides(3, 2))
     simulated = walk(patient, "positive", strides(90, 0), simulated=True)
     page = client.get(url_of(walked)).content.decode()
-    assert [row.session for row in read(page, "all")] == [walked.pk]
+    assert [row.session for row in read(page, "same")] == [walked.pk]
     assert "Simulated" not in page
     page = client.get(url_of(simulated)).content.decode()
-    assert [row.session for row in read(page, "all")] == [simulated.pk]
+    assert [row.session for row in read(page, "same")] == [simulated.pk]
     assert "Simulated" in page
 
 
@@ -205,7 +203,7 @@ def test_only_the_patients_own_sessions_are_shown(world, client, patient):
     last = walk(patient, "positive", strides(3, 2))
     walk(world.patient, "positive", strides(9, 0))
     page = client.get(url_of(last)).content.decode()
-    assert [row.session for row in read(page, "all")] == [last.pk]
+    assert [row.session for row in read(page, "same")] == [last.pk]
     assert reverse("patient", kwargs={"patient_id": patient.pk}) in page
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.boards.panels.own_panels import make_own_panels
+from rehab.boards.panels.own_panels import make_own_panel
 from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.sessions.log import SessionMetric
 from tests.support.boards import board_of, patient_of, people_of, walk_down
@@ -29,7 +29,6 @@ def test_an_imported_session_is_on_the_page_of_scores_by_its_points(clinic):
     old, new = (walk(person, "positive", strides(3 + n, 1)) for n in range(2))
     type(old).everywhere.filter(pk=old.pk).update(legacy_id=7)
     SessionMetric.everywhere.filter(session=old).exclude(slug="score").delete()
-    same, all_types = make_own_panels(new, NOW)
+    same = make_own_panel(new, NOW)
     assert [row.value for row in same.rows] == ["4", "3"]
     assert [row.detail.endswith("· imported") for row in same.rows] == [False, True]
-    assert len(all_types.rows) == 1  # by hit rate, which the original did not keep

@@ -51,14 +51,6 @@ def expected_key(valence: str, steps: list[dict[str, Any]]) -> str:
     return str(sum(step["points"] or 0 for step in steps)).replace("-", "−")
 
 
-def streak(steps: list[dict[str, Any]]) -> int:
-    count = 0
-    for step in steps:
-        if step["hit"] is not None:
-            count = count + 1 if step["hit"] else 0
-    return count
-
-
 # Every text at least 32 px and on the screen, every button at least 72.
 TOO_SMALL = """() => [...document.querySelectorAll("header *, main *")].filter((element) => {
   if (!element.checkVisibility({ checkVisibilityCSS: true, checkOpacity: true })) return false;
@@ -99,15 +91,12 @@ def test_numbers_on_the_page_equal_the_database(server, browser):
                 until_step(page, STRIDES)
             steps = stored(server, walk)
             assert [step["number"] for step in steps] == list(range(1, STRIDES + 1))
-            rewards = valence in ("positive", "binary")
-            run = f"{streak(steps)} in a row" if rewards else f"Step {STRIDES}"
             hits = [None if s["hit"] is None else bool(s["hit"]) for s in steps[-14:]]
             for page in both:
                 expect(page.locator(".key")).to_have_text(
                     expected_key(valence, steps), timeout=PATIENCE_MS
                 )
                 shown = page.evaluate(DIGEST)
-                assert shown["run"] == run
                 assert [None if dot == "gap" else dot[0] for dot in shown["dots"]] == hits
                 assert page.evaluate(TOO_SMALL) == []
 

@@ -129,7 +129,6 @@ def end(story: Story, server: Server) -> None:
         expect(you.locator(".value")).to_have_text(f"{round(100 * metric['value'])} %")
     elif story.valence != "negative":  # which says what was kept
         expect(you.locator(".value")).to_have_text(f"{metric['value']:.0f}".replace("-", "−"))
-    page.tap("role=tab[name='All types']")
     expect(page.locator(f".you[data-session='{story.session}'] >> visible=true")).to_have_count(1)
     page.tap("text=Continue")
     expect(page.locator(".huge")).to_contain_text("Like last time")

@@ -21,6 +21,8 @@ from tests.support.walk_seed import feet_of, make_walks
 pytestmark = pytest.mark.browser
 
 FACTORS = {"normal": 1.0, "large": 1.4, "largest": 1.8}
+# On a wide screen that nobody measured there is room for more.
+WIDE = {"normal": 1.45, "large": 1.6, "largest": 1.8}
 # Diagonal [inches] and distance [m] of the screens: where people would read them from.
 READ_FROM = {
     "phone": (6.1, 0.5),
@@ -130,7 +132,9 @@ def test_words_are_as_large_as_promised(
     page = walking(language, valence)
     degree = pixels_of_degree(screen) if measured else None
     sizes = []
-    for text, factor in FACTORS.items():
+    width, height = SCREENS[screen]
+    is_wide = not measured and width > height and side not in COLUMNS
+    for text, factor in (WIDE if is_wide else FACTORS).items():
         found = look(page, side, screen, text, degree)
         promised = (degree or found["degree"]) * factor * found["short"]
         assert found["word"] == pytest.approx(promised, rel=0.01), text
@@ -142,9 +146,8 @@ def test_words_are_as_large_as_promised(
             found["drop"] < 3,
         )
         if found["short"] < 1:  # only after all else has gone; unmeasured, the thermometer stays
-            assert found["drop"] == 3 or (not measured and found["drop"] == 2)
+            assert found["drop"] == 3 or (not measured and found["drop"] >= 2 - (side in COLUMNS))
             assert found["drop"] == 3 or found["short"] >= KEPT_FROM - 0.01
-        width, height = SCREENS[screen]
         # The horizon crosses neither words nor number: it is between them, or there is none.
         if found["drop"] and found["ground"] < height:
             assert found["words"][3] - 2 <= found["ground"] <= found["label"][1] + 2

@@ -39,7 +39,7 @@ def read(world: World, session: TrainingSession, client: Client | None = None) -
         (0.4, 2.0, "Less often at the goal than last time. Every day is different."),
         (0.6, 2.2, "The goal was higher than last time, and you reached it just as often."),
         (0.3, 2.2, "The goal was higher than last time."),
-        (0.9, 1.8, "The goal was lower than last time."),
+        (0.9, 1.8, ""),
     ],
 )
 def test_the_sentence_is_true_of_both_days(rate: float, goal: float, said: str) -> None:

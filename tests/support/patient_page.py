@@ -18,7 +18,6 @@ DIGEST = """() => ({
   words: document.querySelector(".words").textContent,
   emblem: document.querySelector(".emblem svg").dataset.emblem,
   key: document.querySelector(".key").textContent,
-  run: document.querySelector(".run span").textContent,
   time: document.querySelector(".time").textContent,
   dots: [...document.querySelectorAll(".dots circle")].map((dot) =>
     dot.matches(".gap") ? "gap" : [dot.matches(".hit"), dot.getAttribute("cy")]),

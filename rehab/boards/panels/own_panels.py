@@ -1,4 +1,4 @@
-"""The panels of own sessions on every scores page: of one feedback type, and of all.
+"""The panel of own sessions on every scores page: of one feedback type, or of all.
 
 Points rank sessions of one type, hit rates those of all. Sessions that were simulated and those
 that a person walked never share a board. Only finished sessions are on one: with judged steps,
@@ -11,7 +11,6 @@ from datetime import datetime
 from enum import StrEnum
 
 from django.utils.translation import gettext_lazy as _
-from django.utils.translation import pgettext
 
 from rehab.boards.choices import Aggregation, CountedTypes, Participants, PeriodKind
 from rehab.boards.models import Leaderboard
@@ -66,24 +65,22 @@ def make_board(scale: Scale, types: CountedTypes) -> Leaderboard:
     )
 
 
-def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]:
-    """Return the panels of own sessions: those of this session's type, and of all types.
+def make_own_panel(session: TrainingSession, now: datetime) -> BoardPanel:
+    """Return the panel of own sessions of this session's type.
 
-    A session whose feedback type was changed while it was walked is of no type, and is on the
-    second alone. The caller has checked that the session may be seen.
+    A session whose feedback type was changed while it was walked is of no type: it stands among
+    those of all types. The caller has checked that the session may be seen.
     """
+    is_mixed = bool(session.changed_to)
+    scale = Scale.RATE if is_mixed else scale_of(session.to_plan().valence)
     by_rate = make_board(Scale.RATE, CountedTypes.ALL)
-    boards = [("all", pgettext("board", "All types"), Scale.RATE, by_rate)]
-    if not session.changed_to:
-        scale = scale_of(session.to_plan().valence)
-        board = make_board(scale, CountedTypes.SAME)
-        boards.insert(0, ("same", pgettext("board", "This type"), scale, board))
+    board = by_rate if is_mixed else make_board(scale, CountedTypes.SAME)
     period = period_of(by_rate, now)
     rows = TrainingSession.everywhere.filter(
         patient=session.patient_id, simulated=session.simulated
     )
-    # An imported session has points and no steps: it is on the first panel alone.
-    by_points = [board for _slug, _label, _scale, board in boards if board is not by_rate]
+    # An imported session has points and no steps.
+    by_points = [] if is_mixed else [board]
     sessions = list(read_sessions(by_rate, rows, period, frozenset({"score"}), by_points))
     if any("hit_rate" not in one.values for one in sessions):
         known = TrainingSession.everywhere.filter(patient=session.patient_id)
@@ -91,23 +88,19 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
         sessions = [
             one for one in sessions if "hit_rate" in one.values or one.session_id in imported
         ]
-    visible = []
-    for _slug, _label, _scale, board in boards:
-        standings = Standings(own_results(board, sessions, session.valence, period))
-        visible.append(find_visible_own_rows(standings, standings.find_session(session.pk)))
+    standings = Standings(own_results(board, sessions, session.valence, period))
+    visible = find_visible_own_rows(standings, standings.find_session(session.pk))
     walked = (
         TrainingSession.everywhere.only("created_at", "started_at", "active_s", "legacy_id")
         .order_by()  # by key; the model's own order would lead through the clinic's other rows
-        .in_bulk({each.row.session_id for rows in visible for each in rows})
+        .in_bulk({each.row.session_id for each in visible})
     )
     local = clinic_time(now, session.clinic)
-    return [
-        BoardPanel(
-            slug=slug,
-            title=str(TITLES[scale]),
-            label=label,
-            rows=date_rows(format_rows(board, rows), walked, session, local),
-            kept=scale is Scale.KEPT,
-        )
-        for (slug, label, scale, board), rows in zip(boards, visible, strict=True)
-    ]
+    title = str(TITLES[scale])
+    return BoardPanel(
+        slug="all" if is_mixed else "same",
+        title=title,
+        label=title,
+        rows=date_rows(format_rows(board, visible), walked, session, local),
+        kept=scale is Scale.KEPT,
+    )

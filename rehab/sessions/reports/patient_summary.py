@@ -93,7 +93,7 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
 
 
 def describe_today(today: Result, last: Result | None) -> str:
-    """Return one sentence that is true of today and last time, and puts no blame."""
+    """Return a sentence that is true of today and last time and blames nobody; may be empty."""
     if last is None:
         return _("Next time you can compare it with today.")
     match today.compare_goal(last), today.compare_hits(last):
@@ -102,7 +102,7 @@ def describe_today(today: Result, last: Result | None) -> str:
         case Change.MORE, _hits:
             return _("The goal was higher than last time, and you reached it just as often.")
         case Change.LESS, _hits:
-            return _("The goal was lower than last time.")
+            return ""  # beside a best value it would take that back; the therapist's report has it
         case _goal, Change.LESS:
             return _("Less often at the goal than last time. Every day is different.")
         case _goal, Change.MORE:

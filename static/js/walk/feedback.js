@@ -1,7 +1,7 @@
 // A step as text, emblem and number, and every other text of the page. Draws only what has changed.
 
 import { signed } from "garry/shared/format";
-import { _, fill, n_, number as format } from "garry/shared/language";
+import { _, fill, number as format } from "garry/shared/language";
 import { isStill } from "garry/walk/reduced_motion";
 import { describeStep, describeSummary, messageFor, phaseLeft, timeLeft } from "garry/walk/text";
 
@@ -17,11 +17,10 @@ const rosette = Array.from({ length: 240 }, (_, i) => {
 export function createFeedback(body) {
   const find = (selector) => body.querySelector(selector);
   const [words, sub, live] = [".words", ".sub", ".said"].map(find);
-  const [label, key, run, runWords] = [".label", ".key", ".run", ".run span"].map(find);
+  const [label, key] = [".label", ".key"].map(find);
   const [time, part, bar, partWords] = [".time", ".part", ".part progress", ".part p"].map(find);
   const emblem = find(".emblem svg");
   const signs = emblem.querySelectorAll("text");
-  const beads = run.querySelectorAll("i");
   const name = find("header b").textContent.trim();
   let drawnNumber = -1;
   let shownScore = 0; // the score
@@ -46,7 +45,7 @@ export function createFeedback(body) {
     const text = missing ? _("Step not measured.") : (step?.words ?? "");
     setPhrase(text);
     emblem.dataset.emblem = missing ? "none" : (step?.emblem ?? "");
-    const sign = step?.points ? signed(step.points) : "";
+    const sign = step?.points ? signed(step.points) : step?.points === 0 ? "0" : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
     if (step && step.number !== drawnNumber && !isStill())
@@ -55,24 +54,15 @@ export function createFeedback(body) {
     set(live, step ? describeStep(step, session) : "");
   }
 
-  function drawTotals({ has_points, unit, score, streak, number, last }) {
-    set(label, has_points ? _("Points") : fill(_("This step, in %(unit)s"), { unit }));
+  function drawTotals({ has_points, unit, score, last }) {
+    const counted = has_points ? _("Points") : fill(_("This step, in %(unit)s"), { unit });
+    set(label, last?.summary ? `${counted} · ${describeSummary(last.summary)}` : counted);
     const text = has_points ? format(score) : typeof last?.shown === "number" ? format(last.shown, 2) : "—";
     const before = shownScore;
     shownScore = score;
     if (set(key, text) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }
-    run.dataset.streak = streak ?? "none";
-    beads.forEach((bead, i) => bead.classList.toggle("on", streak > i));
-    set(
-      runWords,
-      last?.summary
-        ? describeSummary(last.summary)
-        : streak === null
-          ? fill(_("Step %(number)s"), { number })
-          : n_("%(count)s in a row", "%(count)s in a row", streak),
-    );
   }
 
   function drawPart(session) {

@@ -32,7 +32,9 @@ export function createFitting(body, scene) {
   function tooLarge(samples, number) {
     const [was, had] = [[...words.childNodes], key.textContent];
     key.textContent = number;
-    let isTooLarge = Boolean(number) && overflows(count);
+    if (number) measureSky(samples);
+    const bottom = count.offsetTop + count.offsetHeight;
+    let isTooLarge = Boolean(number) && (overflows(count) || bottom > count.parentElement.clientHeight + 1);
     for (const sample of samples) {
       if (isTooLarge) break;
       words.textContent = sample;
@@ -87,7 +89,8 @@ export function createFitting(body, scene) {
     for (level of levels) {
       set(level, 1);
       if (!tooLarge(shown, number)) break;
-      if (level !== EMBLEM || body.dataset.pxPerMm) continue;
+      if (level !== EMBLEM && !(level && column)) continue;
+      if (body.dataset.pxPerMm) continue;
       set(level, WORTH);
       if (tooLarge(shown, number)) continue;
       fits = WORTH;

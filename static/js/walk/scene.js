@@ -10,11 +10,40 @@ const BULB_RADIUS = 94;
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 const LEAST = 280; // of the scale's height, with its horizon between words and number
 const AIR = 20; // between words and horizon
+const TALLEST = 150; // the scale's top where words stand beside it
 // `under`: whether words stand over the thermometer, not beside it.
 const LAYOUTS = {
-  portrait: { high: 1280, x: 600, y150: 484, y0: 1068, under: true, chart: [60, 476], figure: [400, 930, 1.66] },
-  landscape: { high: 800, x: 1066, y150: 150, y0: 612, under: false, chart: [520, 930], figure: [900, 560, 1.36] },
-  column: { high: 1000, x: 600, y150: 456, y0: 812, under: true, chart: [60, 476], figure: [400, 760, 1.06] },
+  portrait: {
+    wide: 800,
+    high: 1280,
+    x: 570,
+    y150: 484,
+    y0: 1068,
+    under: true,
+    chart: [60, 446],
+    figure: [400, 930, 1.66],
+  },
+  landscape: {
+    wide: 1280,
+    high: 800,
+    x: 1048,
+    y150: 330,
+    y0: 612,
+    under: false,
+    chart: [440, 912],
+    figure: [900, 560, 1.36],
+  },
+  column: {
+    wide: 800,
+    high: 1000,
+    x: 570,
+    y150: 456,
+    y0: 812,
+    under: true,
+    chart: [60, 446],
+    figure: [400, 760, 1.06],
+  },
+  center: { wide: 900, high: 900, x: 644, y150: 400, y0: 712, under: true, chart: [60, 446], figure: [450, 660, 1.06] },
 };
 
 export function createScene(svg) {
@@ -34,13 +63,15 @@ export function createScene(svg) {
   // heights the horizon may lie once words are large.
   function layOut(dropped = 0, sky = null) {
     const { column, side } = document.body.dataset;
-    layout = { ...LAYOUTS[column ? "column" : portrait.matches ? "portrait" : "landscape"] };
-    const { x, y0, high, under, figure } = layout;
-    const box = `0 0 ${high === 800 ? 1280 : 800} ${high}`;
+    const isCenter = column === "center" && !portrait.matches;
+    const shape = isCenter ? "center" : column ? "column" : portrait.matches ? "portrait" : "landscape";
+    layout = { ...LAYOUTS[shape] };
+    const { x, y0, wide, high, under, figure } = layout;
+    const box = `0 0 ${wide} ${high}`;
     const [words, number] = (sky ?? [0, 1]).map((share) => share * high);
     if (under && sky) layout.y150 = Math.min(words + 56, y0 - LEAST / 2);
-    else if (sky) layout.y150 = Math.max(layout.y150, (3 * (words + AIR) - y0) / 2);
-    if (!under && y0 - layout.y150 < LEAST) layout.y150 = LAYOUTS.landscape.y150;
+    else if (sky) layout.y150 = Math.max(TALLEST, (3 * (words + AIR) - y0) / 2);
+    if (sky && !under && y0 - layout.y150 < LEAST) layout.y150 = TALLEST;
     const { y150 } = layout;
     const [goal, top, bottom] = [y(1), y150 - 36, y0 + 78];
     const horizon = dropped > 2 ? (words + number) / 2 : goal;

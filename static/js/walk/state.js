@@ -1,7 +1,7 @@
 // What the patient's page knows: the server's snapshot, kept current by its events. Nothing is counted here.
 
 const KEPT_STRIDES = 60; // as many as a snapshot has
-const TOTALS = ["number", "score", "streak", "active_s", "phase_s", "phase_strides", "has_points", "longest", "chart"];
+const TOTALS = ["number", "score", "active_s", "phase_s", "phase_strides", "has_points", "longest", "chart"];
 
 export function fromSnapshot(snapshot) {
   const last = snapshot.last?.kind === "calm" ? null : snapshot.last;
