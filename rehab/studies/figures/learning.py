@@ -10,7 +10,7 @@ from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.curves import Point
 from rehab.studies.figures.canvas import COLORS, LEFT, MUTED, QUIET, RIGHT, Canvas
 
-WIDTH, PANEL = 1000.0, 190.0  # a panel for each arm, its name above it
+WIDTH, PANEL = 1000.0, 160.0  # a panel for each arm, its name above it
 HEAD, NAME, BOTTOM, BETWEEN = 30.0, 34.0, 54.0, 18.0
 
 
@@ -48,7 +48,8 @@ def draw_curves(
     seen = [value for point in everything for value in (point.mean, point.low, point.high) if value]
     levels = round_steps(min(*seen, 95.0), max(*seen, 105.0))
     places = _lay_out(everything, words)
-    canvas.words(LEFT - 8, 22, words.y_axis, size=14, color=MUTED)
+    _name_ground(canvas, places, phases, height - BOTTOM + 18)
+    canvas.words(WIDTH - RIGHT, HEAD + NAME - 10, words.y_axis, size=14, anchor="end", color=MUTED)
     canvas.words(WIDTH - RIGHT, height - 10, words.x_axis, size=14, anchor="end", color=MUTED)
     for arm, (code, points) in enumerate(curves.items()):
         top = HEAD + arm * (NAME + PANEL) + NAME
@@ -72,7 +73,7 @@ def _draw_panel(
     def y(value: float) -> float:
         return bottom - PANEL * (value - levels[0]) / (levels[-1] - levels[0])
 
-    _draw_ground(canvas, places, phases, top, bottom)
+    _draw_ground(canvas, places, phases, top)
     canvas.grid(levels, y, strong=100)
     for run in _runs(points):
         _draw_band(canvas, arm, [(places.x(point), point) for point in run], y)
@@ -113,22 +114,23 @@ def _lay_out(points: Sequence[Point], words: CurveLabels) -> _Places:
     return _Places(starts, step, shown)
 
 
-def _draw_ground(
-    canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], top: float, bottom: float
+def _draw_ground(canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], top: float) -> None:
+    """Shade what was walked without feedback."""
+    for (_visit, phase), (x, bins) in places.starts.items():
+        if not phases[phase].feedback:
+            canvas.rect(x, top, bins * places.step, PANEL, fill=QUIET)
+
+
+def _name_ground(
+    canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], foot: float
 ) -> None:
-    """Shade what was walked without feedback, and name visits and phases that are wide enough."""
+    """Name visits above all panels, and below them the phases that are wide enough."""
     for (visit, phase), (x, bins) in places.starts.items():
-        label, wide = phases[phase], bins * places.step
-        if not label.feedback:
-            canvas.rect(x, top, wide, bottom - top, fill=QUIET)
-        if wide > 7.6 * len(label.name):
-            middle = x + wide / 2
-            canvas.words(middle, bottom + 18, label.name, size=13, anchor="middle", color=MUTED)
+        name, wide = phases[phase].name, bins * places.step
+        if wide > 7.6 * len(name):
+            canvas.words(x + wide / 2, foot, name, size=13, anchor="middle", color=MUTED)
         if phase == 0 and len(places.visits) > 1:
-            end = x + places.step * sum(
-                count for (of, _phase), (_x, count) in places.starts.items() if of == visit
-            )
-            canvas.words(end, top - 10, places.visits[visit], size=14, anchor="end", color=MUTED)
+            canvas.words(x, HEAD - 8, places.visits[visit], weight="700")
 
 
 def _runs(points: Sequence[Point]) -> list[list[Point]]:

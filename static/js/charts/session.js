@@ -81,7 +81,7 @@ function drawChanges(marks) {
     const { isGoal } = change;
     const paint = color(isGoal ? "c-goal" : "c-third");
     const wide = marks.widthOf(change.words, 13);
-    const start = Math.min(x, box.left + box.width - wide);
+    const start = Math.min(x + 5 * pixel, box.left + box.width - wide);
     const row = free.findIndex((end) => start >= end);
     const foot = box.top - (row === 1 ? 26 : 8) * pixel;
     marks.line(x, foot, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
