@@ -33,6 +33,7 @@ class Flag(StrEnum):
     NEW = "new"
 
 
+ORDER = [Flag.STUCK, Flag.DUE, Flag.IMPROVING, Flag.NEW]  # who needs thought first
 FLAGS: dict[str, str | Promise] = {
     Flag.DUE: _("overdue"),
     Flag.STUCK: _("stuck"),
@@ -75,7 +76,8 @@ class Case:
             return ""
         shown = [format_number(goal) for goal in reversed(goals)]
         kept = [goal for place, goal in enumerate(shown) if not place or shown[place - 1] != goal]
-        return f"{' → '.join(kept)} {self.walks[0].unit}"
+        way = ("", " ↑", " ↓")[(goals[0] > goals[-1]) - (goals[0] < goals[-1])]
+        return f"{' → '.join(kept)} {self.walks[0].unit}{way}"
 
 
 def same_measure(walks: Sequence[Walk]) -> list[Walk]:
@@ -116,7 +118,7 @@ def judge(
 
 
 def load_caseload(user: User, now: datetime) -> list[Case]:
-    """Return the patients whose program goes on: those due first, then by their last session.
+    """Return the patients whose program goes on: by need (`ORDER`), then by their last session.
 
     ``now`` is in the clinic's time zone. A simulated patient is none.
     """
@@ -140,7 +142,8 @@ def load_caseload(user: User, now: datetime) -> list[Case]:
     return sorted(
         cases,
         key=lambda case: (
-            Flag.DUE not in case.flags,
+            min((ORDER.index(flag) for flag in case.flags), default=ORDER.index(Flag.NEW)),
+            not case.walks,
             case.walks[0].day if case.walks else date.min,
             case.patient.nickname,
         ),

@@ -124,9 +124,7 @@ class ScreenForm(_SpokenForm):
 class EndProgramForm(forms.Form):
     """Why the program ends."""
 
-    reason = forms.ChoiceField(
-        label=_("Why?"), choices=EndReason.choices, initial=EndReason.DONE, widget=forms.RadioSelect
-    )
+    reason = forms.ChoiceField(label=_("Why?"), choices=EndReason.choices, widget=forms.RadioSelect)
 
 
 class ErasureForm(forms.Form):

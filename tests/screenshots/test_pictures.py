@@ -55,7 +55,7 @@ PAGES = {
     "stations-and-devices": "/stations/",
     "incidents": "/incidents/",
     "screen-size": "/screen-size/",
-    "insight": "/insight/?by=type&goal=any",
+    "insight": "/insight/?by=type",
     "replay": "/sessions/12/replay/?at=120",
     "help": "/help/#today",
     "patient": "/patients/2/",

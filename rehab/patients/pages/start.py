@@ -17,7 +17,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from rehab.patients.forms import PatientForm, ScreenForm
 from rehab.patients.pages.first_steps import list_first_steps
 from rehab.patients.screen_check import LETTERS, propose
-from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, patients_today, suggested_time
+from rehab.patients.visits import QUICK_VISIT_DAYS, Progress, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.consent.services import current_text
 from rehab.people.models import Patient, User
@@ -75,16 +75,32 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
     }
 
 
+def begin_context(user: User, patient: Patient) -> dict[str, Any]:
+    """Return the context of the button that starts a session as it is proposed for a patient."""
+    first_station(patient.clinic)
+    initial = initial_choices(patient, user)
+    return {
+        "form": SessionForm(initial=initial, patient=patient, by=user),
+        "last": initial,
+        "is_repeated": last_session(patient, user) is not None,
+        "has_tablet": has_tablet(initial["station"], timezone.now()),
+    }
+
+
 @for_roles(Role.LEAD, Role.PT)
 @never_cache  # so that going back shows the present state
 @require_safe
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     query = request.GET.get("q", "").strip()
-    context = start_context(user_of(request), query) | {
+    user = user_of(request)
+    context = start_context(user, query) | {
         "q": query,
         "first_steps": list_first_steps(request),
     }
+    coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
+    if coming:
+        context |= {"next": coming[0]} | begin_context(user, coming[0].patient)
     return render(request, "patients/start.html", context)
 
 
@@ -95,18 +111,13 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Show a patient: a session like last time, other set-ups, past sessions, planned visits."""
     user = user_of(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
-    first_station(patient.clinic)
-    initial = initial_choices(patient, user)
     lists = start_context(user)
     today = lists["now"].date()
     visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
-    context = lists | {
+    context = lists | begin_context(user, patient)
+    context |= {
         "patient": patient,
         "open_here": open_sessions(user).filter(patient=patient),
-        "form": SessionForm(initial=initial, patient=patient, by=user),
-        "last": initial,
-        "is_repeated": last_session(patient, user) is not None,
-        "has_tablet": has_tablet(initial["station"], timezone.now()),
         "visits": visits,
         "soon": [
             (days, today + timedelta(days=days))

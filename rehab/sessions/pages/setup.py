@@ -83,6 +83,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     sources, tried = _part_sources(form)
     context = {
         "patient": patient,
+        "last": initial_choices(patient, user),
         "has_tablet": has_tablet(form.chosen_station, timezone.now()),
         "is_repeated": last_session(patient, user) is not None,
         "protocols": [

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
 from math import floor
 from urllib.parse import urlencode
@@ -31,6 +31,7 @@ from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.valences import VALENCES
 
 MAX_SESSIONS = 2000  # the newest
+LEAST_FOR_INTERVAL = 3  # patients, or sessions of one
 EQUAL_WITHIN = 1.1  # goals of one measure count as equal up to so much of the lowest
 
 
@@ -170,8 +171,8 @@ KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked],
         lambda one: f"{one.session.patient.nickname} ({one.session.patient.code})",
     ),
     "speed": _by_band(_("Belt speed"), Remark.BELT_SPEED, 0.2, "m/s"),
-    "support": _by_band(_("Body-weight support"), Remark.WEIGHT_SUPPORT, 10, "%"),
-    "help": (_("Help"), _name_help, _name_help),
+    "support": _by_band(_("Support"), Remark.WEIGHT_SUPPORT, 10, "%"),
+    "help": (_("Assistance"), _name_help, _name_help),
 }
 
 
@@ -193,11 +194,18 @@ def _summarize(label: str, walked: Sequence[Walked]) -> Group:
         label=label,
         sessions=len(walked),
         patients=len({one.session.patient_id for one in walked}),
-        hit_rate=mean_interval(_independent(walked, lambda one: one.hit_rate), (0, 1)),
+        hit_rate=_known(mean_interval(_independent(walked, lambda one: one.hit_rate), (0, 1))),
         minutes=sum(one.session.active_s for one in walked) / 60,
         adverse=[(str(EVENTS[kind]), kinds[kind]) for kind in ADVERSE if kinds[kind]],
         exertion=mean_interval(_independent(walked, lambda one: one.exertion), (0, 10)),
     )
+
+
+def _known(found: MeanInterval | None) -> MeanInterval | None:
+    """Return a mean, without an interval where too few values make one."""
+    if found is None or found.count >= LEAST_FOR_INTERVAL:
+        return found
+    return replace(found, low=None, high=None)
 
 
 def _independent(walked: Sequence[Walked], figure: Callable[[Walked], float | None]) -> list[float]:

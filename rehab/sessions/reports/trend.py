@@ -223,6 +223,7 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
     return {
         "hits": {
             "days": [day(point) for point in trend],
+            "joined": len({point.session.valence for point in trend}) == 1,
             "hit": [to_percent(point.hit_rate) for point in trend],
             "wanted": [to_percent(point.target_hit_rate) for point in trend],
         },

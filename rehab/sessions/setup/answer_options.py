@@ -33,7 +33,7 @@ ANSWER_OPTIONS = (
         kind=AdaptationMode,
         choices=[
             (AdaptationMode.OFF.value, _("stays")),
-            (AdaptationMode.SUGGEST.value, _("is suggested")),
+            (AdaptationMode.SUGGEST.value, _("GARRY suggests")),
             (AdaptationMode.AUTOMATIC.value, _("follows by itself")),
         ],
         default=GoalAdaptation().mode.value,

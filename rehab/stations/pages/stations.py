@@ -22,7 +22,7 @@ from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import format_device_states
+from rehab.stations.presence import JUST_NOW, format_device_states
 from rehab.stations.programs import PROGRAMS
 
 
@@ -39,6 +39,7 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     )
     stations = Station.objects.visible_to(user).prefetch_related(Prefetch("devices", devices))
     context = {
+        "lately": now - JUST_NOW,
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
         "stations": [(one, format_device_states(list(one.devices.all()), now)) for one in stations],
     }

@@ -8,10 +8,10 @@ from itertools import groupby
 
 from rehab.sessions.reports.report_chart import round_steps
 from rehab.studies.analysis.curves import Point
-from rehab.studies.figures.canvas import COLORS, INK, LEFT, MUTED, QUIET, RIGHT, Canvas
+from rehab.studies.figures.canvas import COLORS, LEFT, MUTED, QUIET, RIGHT, Canvas
 
-WIDTH, HEIGHT = 1000.0, 450.0
-BOTTOM, BETWEEN = 54.0, 18.0
+WIDTH, PANEL = 1000.0, 160.0  # a panel for each arm, its name above it
+HEAD, NAME, BOTTOM, BETWEEN = 30.0, 34.0, 54.0, 18.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,32 +40,47 @@ def draw_curves(
 ) -> str:
     """Return the figure. ``curves`` and ``labels`` by arm, in the order of the arms."""
     everything = [point for points in curves.values() for point in points]
-    canvas = Canvas(WIDTH, HEIGHT, words.title)
-    foot = canvas.legend(LEFT, 26, [labels[arm] for arm in curves], dashed=True)
+    height = HEAD + len(curves) * (NAME + PANEL) + BOTTOM
+    canvas = Canvas(WIDTH, height, words.title)
     if not everything:
+        canvas.legend(LEFT, 26, [labels[arm] for arm in curves])
         return canvas.to_text()
     seen = [value for point in everything for value in (point.mean, point.low, point.high) if value]
     levels = round_steps(min(*seen, 95.0), max(*seen, 105.0))
-    top, bottom = foot + 62, HEIGHT - BOTTOM
     places = _lay_out(everything, words)
+    _name_ground(canvas, places, phases, height - BOTTOM + 18)
+    canvas.words(WIDTH - RIGHT, HEAD + NAME - 10, words.y_axis, size=14, anchor="end", color=MUTED)
+    canvas.words(WIDTH - RIGHT, height - 10, words.x_axis, size=14, anchor="end", color=MUTED)
+    for arm, (code, points) in enumerate(curves.items()):
+        top = HEAD + arm * (NAME + PANEL) + NAME
+        canvas.mark(LEFT + 6, top - 15, arm, 6)
+        canvas.words(LEFT + 20, top - 10, labels[code], weight="700")
+        _draw_panel(canvas, arm, points, (places, phases, levels), top)
+    return canvas.to_text()
+
+
+def _draw_panel(
+    canvas: Canvas,
+    arm: int,
+    points: Sequence[Point],
+    axes: tuple[_Places, Sequence[PhaseLabel], Sequence[float]],
+    top: float,
+) -> None:
+    """Draw one arm's mean with its band, on the axes that all arms share."""
+    places, phases, levels = axes
+    bottom = top + PANEL
 
     def y(value: float) -> float:
-        return bottom - (bottom - top) * (value - levels[0]) / (levels[-1] - levels[0])
+        return bottom - PANEL * (value - levels[0]) / (levels[-1] - levels[0])
 
-    _draw_ground(canvas, places, phases, top, bottom)
+    _draw_ground(canvas, places, phases, top)
     canvas.grid(levels, y, strong=100)
-    canvas.words(LEFT - 8, top - 12, words.y_axis, size=14, color=MUTED, anchor="start")
-    canvas.words(WIDTH - RIGHT, HEIGHT - 10, words.x_axis, size=14, anchor="end", color=MUTED)
-    for arm, points in enumerate(curves.values()):
-        for run in _runs(points):
-            _draw_band(canvas, arm, [(places.x(point), point) for point in run], y)
-    for arm, points in enumerate(curves.values()):
-        for run in _runs(points):
-            path = "M" + "L".join(f"{places.x(p):.1f} {y(p.mean):.1f}" for p in run)
-            canvas.stroke(path if len(run) > 1 else path + "h.1", arm)
-            for point in run[:: max(1, len(run) // 6)]:
-                canvas.mark(places.x(point), y(point.mean), arm, 4)
-    return canvas.to_text()
+    for run in _runs(points):
+        _draw_band(canvas, arm, [(places.x(point), point) for point in run], y)
+        path = "M" + "L".join(f"{places.x(p):.1f} {y(p.mean):.1f}" for p in run)
+        canvas.stroke(path if len(run) > 1 else path + "h.1", arm)
+        for point in run[:: max(1, len(run) // 6)]:
+            canvas.mark(places.x(point), y(point.mean), arm, 4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,19 +114,23 @@ def _lay_out(points: Sequence[Point], words: CurveLabels) -> _Places:
     return _Places(starts, step, shown)
 
 
-def _draw_ground(
-    canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], top: float, bottom: float
+def _draw_ground(canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], top: float) -> None:
+    """Shade what was walked without feedback."""
+    for (_visit, phase), (x, bins) in places.starts.items():
+        if not phases[phase].feedback:
+            canvas.rect(x, top, bins * places.step, PANEL, fill=QUIET)
+
+
+def _name_ground(
+    canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], foot: float
 ) -> None:
-    """Shade what was walked without feedback, and name visits and phases that are wide enough."""
+    """Name visits above all panels, and below them the phases that are wide enough."""
     for (visit, phase), (x, bins) in places.starts.items():
-        label, wide = phases[phase], bins * places.step
-        if not label.feedback:
-            canvas.rect(x, top, wide, bottom - top, fill=QUIET)
-        if wide > 7.6 * len(label.name):
-            middle = x + wide / 2
-            canvas.words(middle, bottom + 18, label.name, size=13, anchor="middle", color=MUTED)
+        name, wide = phases[phase].name, bins * places.step
+        if wide > 7.6 * len(name):
+            canvas.words(x + wide / 2, foot, name, size=13, anchor="middle", color=MUTED)
         if phase == 0 and len(places.visits) > 1:
-            canvas.words(x, top - 32, places.visits[visit], size=15, color=INK, weight="700")
+            canvas.words(x, HEAD - 8, places.visits[visit], weight="700")
 
 
 def _runs(points: Sequence[Point]) -> list[list[Point]]:

@@ -12,7 +12,9 @@ from django.db import transaction
 from django.db.models import Count
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.template.defaultfilters import floatformat
 from django.utils import timezone
+from django.utils.translation import gettext
 from django.views.decorators.http import (
     require_GET,
     require_http_methods,
@@ -125,7 +127,7 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "may_plan": user.role in {Role.LEAD, Role.RESEARCHER},
         "may_see_harms": may_monitor(study, user) or user.role in {Role.LEAD, Role.PT},
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
-        "arms": () if blind else study.arms.select_related("measure", "protocol"),
+        **({} if blind else _compare_arms(study)),
         "participants": _participants(study, user),
         "primary": dict(OUTCOMES)[first_primary(study)],
         "plan": () if blind else _plan(study),
@@ -134,6 +136,27 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "events": () if blind else events.filter(study=study).select_related("by"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
         "tasks": _markable(study) if is_lead else (),
+    }
+
+
+def _compare_arms(study: Study) -> dict[str, Any]:
+    """Return the columns in which the arms differ, with each arm's values, and what is alike."""
+    arms = list(study.arms.select_related("measure", "protocol"))
+    facts: list[tuple[str, list[object]]] = [
+        (gettext("Feedback"), [arm.get_valence_display() for arm in arms]),
+        (gettext("Feedback comes"), [arm.feedback_schedule for arm in arms]),
+        (gettext("Gain"), [floatformat(arm.gain, -2) for arm in arms]),
+        (gettext("Robot"), [arm.get_robot_intensity_display() for arm in arms]),
+        (gettext("Measure"), [arm.measure for arm in arms]),
+        (gettext("Protocol"), [arm.protocol for arm in arms]),
+        (gettext("Ratio"), [arm.weight for arm in arms]),
+    ]
+    differ = [(name, values) for name, values in facts if len(set(map(str, values))) > 1]
+    alike = [(name, values[0]) for name, values in facts if len(set(map(str, values))) == 1]
+    return {
+        "arm_columns": [name for name, _values in differ],
+        "arms": [(arm, [values[row] for _name, values in differ]) for row, arm in enumerate(arms)],
+        "arms_alike": alike,
     }
 
 

@@ -51,11 +51,11 @@ function drawPhases(marks) {
     if (right <= left) continue;
     ctx.fillStyle = color(phase.feedback ? "card" : "well");
     ctx.fillRect(left, box.top, right - left, box.height);
-    marks.line(left, box.top - 44 * marks.unit, left, box.top + box.height, color("border"), 1);
+    marks.line(left, box.top - 60 * marks.unit, left, box.top + box.height, color("border"), 1);
     if (marks.widthOf(phase.name) < right - left - 12 * marks.unit) {
       const fill = color("text");
       const from = { align: "left", weight: 700, fill };
-      marks.text(phase.name, left + 7 * marks.unit, box.top - 30 * marks.unit, from);
+      marks.text(phase.name, left + 7 * marks.unit, box.top - 46 * marks.unit, from);
     }
   }
 }
@@ -74,18 +74,20 @@ function groupChanges() {
 
 function drawChanges(marks) {
   const { box, unit: pixel } = marks;
-  let free = box.left; // labels never run into each other
+  const free = [box.left, box.left]; // labels never run into each other: two rows of them
   for (const change of groupChanges()) {
     const x = marks.x(change.after + 0.5);
     if (x < box.left || x > box.left + box.width) continue;
     const { isGoal } = change;
     const paint = color(isGoal ? "c-goal" : "c-third");
-    marks.line(x, box.top - 8 * pixel, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
     const wide = marks.widthOf(change.words, 13);
-    const start = Math.min(x, box.left + box.width - wide);
-    if (start < free) continue;
-    marks.text(change.words, start, box.top - 11 * pixel, { size: 13, weight: 700, align: "left", fill: paint });
-    free = start + wide + 10 * pixel;
+    const start = Math.min(x + 5 * pixel, box.left + box.width - wide);
+    const row = free.findIndex((end) => start >= end);
+    const foot = box.top - (row === 1 ? 26 : 8) * pixel;
+    marks.line(x, foot, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
+    if (row < 0) continue;
+    marks.text(change.words, start, foot - 3 * pixel, { size: 13, weight: 700, align: "left", fill: paint });
+    free[row] = start + wide + 10 * pixel;
   }
 }
 
@@ -102,7 +104,9 @@ function drawGaps(marks) {
 
 function drawStrides(element) {
   const seen = [...strides.shown, ...strides.goal].filter((value) => value !== null);
-  const top = Math.max(...seen, 0.001) * 1.06;
+  const [least, most] = [Math.min(...seen), Math.max(...seen, 0.001)];
+  const air = 0.06 * (most - Math.min(least, 0.9 * most));
+  const bottom = least > 0.3 * most ? least - 2 * air : Math.min(0, least); // what lies far above zero fills the page
   const isDense = element.clientWidth / strides.number.length < DENSE_PX;
   const [size, width] = isDense ? [5, 1.5] : [8, 2];
   draw(element, {
@@ -121,8 +125,8 @@ function drawStrides(element) {
       pointSeries(0.6 * size, width, "c-third", "c-third"),
       { stroke: () => color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
-    scales: { x: { time: false }, y: { range: () => [0, top] } },
-    padding: [56, 26, 0, 0],
+    scales: { x: { time: false }, y: { range: () => [bottom, most + air] } },
+    padding: [72, 26, 0, 0],
     cursor: { y: false, points: { show: false }, drag: { x: true, y: false } },
     under: drawPhases,
     paint: (marks) => {
@@ -175,8 +179,8 @@ function fillTable(place) {
 
 if (strides) {
   drawStrides(document.querySelector(".chart"));
-  const details = document.querySelector("details");
-  const place = details.querySelector(".strides");
+  const place = document.querySelector(".strides");
+  const details = place.closest("details");
   details.addEventListener("toggle", () => {
     if (details.open && !place.hasChildNodes()) fillTable(place);
   });

@@ -28,7 +28,12 @@ function drawHits(element) {
   draw(element, {
     ...days(hits.days),
     data: [hits.days.map((_, index) => index), hits.hit],
-    series: [{ stroke: () => color("c-hit"), width: 3, points: { show: false } }],
+    // Sessions of several feedback types are no one course.
+    series: [
+      hits.joined
+        ? { stroke: () => color("c-hit"), width: 3, points: { show: false } }
+        : { paths: () => null, points: { show: false } },
+    ],
     scales: { ...sessions(count), y: { range: () => [0, 100] } },
     yAxis: { values: (_, ticks) => ticks.map((tick) => `${number(tick)} %`), incrs: [20, 25, 50] },
     paint: (marks) => {

@@ -27,7 +27,8 @@ place.addEventListener("submit", async (event) => {
   button.disabled = true;
   try {
     const answer = await fetch(form.action, { method: "POST", body: new FormData(form) });
-    if (answer.ok) form.remove();
+    // A page that shows the fall itself shows what is now.
+    if (answer.ok) document.querySelector(".open.fell") ? location.reload() : form.remove();
   } catch {
     // it stays, and may be tapped again
   }

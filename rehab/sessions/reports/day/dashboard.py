@@ -72,7 +72,7 @@ def dashboard_context(user: User, now: datetime) -> dict[str, Any]:
 
 
 def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow]:
-    """Return today's sessions by the clinic's clock and every open one, running ones first."""
+    """Return who walked today by the clinic's clock, and every open session; running ones first."""
     local = clinic_time(now, clinic)
     sessions = todays_sessions(TrainingSession.objects.visible_to(user), local)
     rows = (
@@ -80,7 +80,8 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
         .select_related("patient", "station", "measure")
         .order_by("-created_at", "-pk")
     )
-    listed = [*rows.filter(IS_OPEN), *rows.exclude(IS_OPEN)[:MAX_ENDED]]
+    walked = rows.exclude(IS_OPEN).filter(active_s__gt=0, simulated=False)
+    listed = [*rows.filter(IS_OPEN), *walked[:MAX_ENDED]]
     listed.sort(key=lambda row: STATE_ORDER.index(State(row.state)))
     by_name = may_see_names(user.role)
     return [
@@ -134,10 +135,7 @@ def _device_problem(device: Device, now: datetime) -> str | None:
             "%(name)s at %(station)s has never connected. Give it its token, or revoke it."
         )
     if device.revoked_at is not None and now - device.revoked_at < REVOKED_ALERT_FOR:
-        return gettext(
-            "%(name)s at %(station)s is revoked and shut out. Give it a new token to let "
-            "it in again."
-        )
+        return gettext("%(name)s at %(station)s is revoked and shut out.")
     if device.has_expired(now):
         return gettext("The token of %(name)s at %(station)s has expired. Give it a new one.")
     if device.copy_seen_at is not None:

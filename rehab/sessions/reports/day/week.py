@@ -21,7 +21,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.trend import to_percent, with_metrics
+from rehab.sessions.reports.trend import with_metrics
 from rehab.training.valences import VALENCES
 
 
@@ -61,20 +61,10 @@ class WeekSummary:
 
     @property
     def chart(self) -> dict[str, Any]:
-        """The data of both charts."""
+        """The data of the chart."""
         return {
             "days": self.days,
             "minutes": [round(minutes, 1) for minutes in self.minutes],
-            "types": [
-                {
-                    "slug": totals.slug,
-                    "label": totals.label,
-                    "hit": to_percent(totals.hit_rate),
-                    "wanted": to_percent(totals.target_hit_rate),
-                }
-                for totals in self.types
-                if totals.hit_rate is not None
-            ],
         }
 
 

@@ -21,6 +21,7 @@ export function createPhase({ show, onPress, change }) {
       const next = session.phases[session.phase.index + 1];
       show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("Last phase"));
       button.disabled = !next;
+      button.classList.toggle("none", !next);
     },
   };
 }
