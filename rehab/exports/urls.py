@@ -3,6 +3,7 @@
 from django.urls import path
 
 from rehab.exports import views
+from rehab.exports.clinic import pages
 
 urlpatterns = [
     path("patients/<int:patient_id>/records/data.zip", views.download_patient, name="patient-data"),
@@ -12,4 +13,7 @@ urlpatterns = [
     path("export/research/advance/", views.advance_research, name="advance-research"),
     path("export/research.zip", views.download_research, name="download-research"),
     path("export/sessions.zip", views.download_sessions, name="export-sessions"),
+    path("clinics/<int:clinic_id>/move/", pages.move_clinic, name="move-clinic"),
+    path("clinics/<int:clinic_id>/clinic.age", pages.download_clinic, name="clinic-file"),
+    path("clinics/<int:clinic_id>/gone.json", pages.download_certificate, name="clinic-gone"),
 ]
