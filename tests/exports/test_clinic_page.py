@@ -21,6 +21,7 @@ from rehab.exports.encryption import generate_key, read_identities
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.people.sign_in.step_up import CONFIRMED_AT, LIFETIME
 from rehab.sessions.live.database import owners
 from rehab.sessions.models import TrainingSession
 from tests.support.accounts import PASSWORD
@@ -151,6 +152,12 @@ def test_each_act_is_recorded_and_others_have_no_buttons(amber, host):
     for name in ("move-clinic", "clinic-file", "clinic-gone"):
         assert lead.get(reverse(name, args=[clinic.pk])).status_code == 403
     assert host.get(reverse("move-clinic", args=[10**6])).status_code == 404
+    store = host.session
+    store[CONFIRMED_AT] -= LIFETIME.total_seconds()
+    store.save()
+    for name in ("move-clinic", "clinic-file", "clinic-gone"):
+        answer = host.get(reverse(name, args=[clinic.pk]))
+        assert answer["Location"].startswith(reverse("confirm"))
 
 
 @pytest.mark.server
