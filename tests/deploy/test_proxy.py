@@ -180,8 +180,10 @@ def test_a_hospital_behind_one_address_has_all_its_sockets(tmp_path: Path):
 
             async def dial(number: int) -> str:
                 shown = {"Authorization": f"Bearer {number}"}
-                how = {"ssl": tls, "proxy": None, "additional_headers": shown, "open_timeout": 60}
-                return str(await (await stack.enter_async_context(connect(url, **how))).recv())
+                dialed = connect(
+                    url, ssl=tls, proxy=None, additional_headers=shown, open_timeout=60
+                )
+                return str(await (await stack.enter_async_context(dialed)).recv())
 
             found = 0
             for first in range(0, 1200, 100):
