@@ -229,6 +229,13 @@ SESSION_MINUTES = number(
     low=5,
     high=12 * 60,
 )
+CLINIC_SESSIONS = number(
+    "GARRY_CLINIC_SESSIONS",
+    1000,
+    "sessions at once that a clinic's share of a server's sockets and requests is for",
+    low=1,
+    high=10_000,
+)
 PROXIES = number(
     "GARRY_PROXIES",
     1 if HOSTED else 0,

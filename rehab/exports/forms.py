@@ -1,4 +1,4 @@
-"""What an export for analysis holds."""
+"""What an export holds, and for whom."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from django import forms
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
+from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.people.models import User
 from rehab.studies.models import Study, StudyState
 
@@ -29,3 +30,33 @@ class ResearchExportForm(forms.Form):
         study: Any = self.fields["study"]
         study.label = capfirst(_("study"))
         study.queryset = Study.objects.visible_to(by).exclude(state=StudyState.DRAFT)
+
+
+class ClinicExportForm(forms.Form):
+    """Who can open a clinic's sealed file."""
+
+    keys = forms.CharField(
+        label=_("Public keys of who takes it in (age1…), one a line"),
+        widget=forms.Textarea({"rows": 2}),
+        max_length=1000,
+    )
+    tokens = forms.BooleanField(
+        label=_("With the tokens of devices, programs and families"), required=False
+    )
+
+    def clean_keys(self) -> str:
+        """Return keys that are valid."""
+        keys: str = self.cleaned_data["keys"]
+        try:
+            read_recipients(keys.split())
+        except InvalidKey as problem:
+            raise forms.ValidationError(str(problem)) from problem
+        return keys
+
+
+class ClinicRemovalForm(forms.Form):
+    """What says that a clinic is elsewhere."""
+
+    receipt = forms.RegexField(
+        label=_("Receipt of the installation that took it in"), regex="^[0-9a-f]{64}$"
+    )

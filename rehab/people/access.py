@@ -11,11 +11,13 @@ from typing import Any, TypeVar
 
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
-from django.http import HttpRequest, HttpResponseBase
+from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from django.utils.cache import patch_cache_control
+from django.utils.translation import gettext
 
+from rehab.people import clinic_limits
 from rehab.people.audit import access_log, history
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -121,6 +123,11 @@ class AccessMiddleware:
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
         """Pass the request on; attribute its changes and record what it showed."""
+        if wait_s := clinic_limits.take_request(getattr(actor_of(request), "clinic_id", None)):
+            headers = {"Retry-After": str(int(wait_s) + 1)}
+            return HttpResponse(
+                gettext(clinic_limits.CURE), status=429, headers=headers, content_type="text/plain"
+            )
         with history.attribute_changes_to(request):
             response = self.get_response(request)
         access_log.record_request(request, response, timezone.now())

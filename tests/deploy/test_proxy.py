@@ -172,6 +172,31 @@ def test_each_device_is_limited_by_itself_behind_one_address(tmp_path: Path, sho
         assert ask("another") == (200 if shown else 429)
 
 
+def test_a_hospital_behind_one_address_has_all_its_sockets(tmp_path: Path):
+    """300 sessions, each with a tablet, a therapist's page, a source and a robot."""
+
+    async def story(url: str, tls: ssl.SSLContext, port: int) -> int:
+        async with run_server(port), AsyncExitStack() as stack:
+
+            async def dial(number: int) -> str:
+                shown = {"Authorization": f"Bearer {number}"}
+                dialed = connect(
+                    url, ssl=tls, proxy=None, additional_headers=shown, open_timeout=60
+                )
+                return str(await (await stack.enter_async_context(dialed)).recv())
+
+            found = 0
+            for first in range(0, 1200, 100):
+                said = await asyncio.gather(*map(dial, range(first, first + 100)))
+                found += said.count(str(port))
+            return found
+
+    ports = (free_port(), free_port())
+    with run_haproxy(tmp_path / "haproxy", *ports) as (_, secure, tls):
+        url = f"wss{secure.removeprefix('https')}/ws/"
+        assert asyncio.run(story(url, tls, ports[0])) == 1200
+
+
 @contextmanager
 def run_pages(port: int) -> Iterator[None]:
     """Answer everything with 200, as a server that is there."""

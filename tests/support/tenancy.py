@@ -19,7 +19,7 @@ from garry_site import urls as site_urls
 from rehab.boards.models import Leaderboard
 from rehab.exports.fhir.api import TYPES as FHIR_TYPES
 from rehab.patients.family import FamilyLink
-from rehab.people.models import Patient
+from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
@@ -42,6 +42,7 @@ MARK = re.compile("zq[a-z]+?qz")  # of tests/support/world.py
 # Parameters of addresses, the model that they name a row of, and by what.
 KEYS: dict[str, tuple[type[Model], str]] = {
     "board_id": (Leaderboard, "pk"),
+    "clinic_id": (Clinic, "pk"),
     "code": (Patient, "code"),
     "device_id": (Device, "pk"),
     "enrollment_id": (Enrollment, "pk"),

@@ -49,25 +49,28 @@ def remove_clinic(
     *,
     wait_s: float,
     store: Callable[[str], None],
+    receipt: str = "",
 ) -> str:
     """Remove a clinic and all that is its; return the digest of its certificate.
 
-    ``content``: of the file that it leaves with; None: its data is to be destroyed. ``store``:
-    writes the certificate, as pending before anything is deleted. Raises CannotMove while sessions
-    run, where the file is not of this clinic as it is, and where servers do not let it go.
+    ``content``: of the file that it leaves with, or ``receipt``: of the installation that took it
+    in; without both its data is to be destroyed. ``store``: writes the certificate, as pending
+    before anything is deleted. Raises CannotMove while sessions run, where file or receipt are not
+    of this clinic as it is, and where servers do not let it go.
     """
     check_no_session_runs(clinic)
-    _read_all(clinic, content, now)  # first, so that nobody is shut out in vain
+    _read_all(clinic, content, receipt, now)  # first, so that nobody is shut out in vain
     with _shut(clinic, now):
         _wait_for_servers(clinic, wait_s)
         check_no_session_runs(clinic)
-        rows = _read_all(clinic, content, now)
+        rows = _read_all(clinic, content, receipt, now)
         certificate = {
             "certificate": PENDING,
             "clinic": clinic.name,
             "removed_at": now,
             "by": by,
             "left_with_file": content.header["file"] if content else None,
+            "left_with_receipt": receipt or None,
             "rows": rows.counts,
             "digests_of_rows": rows.digests,
             "last_seals": last_seals(clinic.pk),
@@ -103,15 +106,30 @@ def _to_text(certificate: dict[str, Any]) -> str:
     return json.dumps(certificate, cls=DjangoJSONEncoder, indent=1, ensure_ascii=False) + "\n"
 
 
-def _read_all(clinic: Clinic, content: Content | None, now: datetime) -> ClinicRows:
-    """Return all rows with counts and digests. Raises CannotMove where the file has others."""
+def _read_all(clinic: Clinic, content: Content | None, receipt: str, now: datetime) -> ClinicRows:
+    """Return all rows with counts and digests. Raises CannotMove where others have left."""
     seal_everything(clinic, now)
     rows = ClinicRows(clinic.pk, with_tokens=content is not None and content.header["tokens"])
     for _ in rows.lines():
         pass
     if content is not None:
         compare_with_file(clinic, content, rows.digests)
+    if receipt and receipt != make_receipt(rows.digests):
+        raise CannotMove(
+            f"{clinic} is not as the receipt says: it was changed since the export, or the receipt "
+            "is of another one. Remove it there, export it again, and take it in there again."
+        )
     return rows
+
+
+def make_receipt(digests: dict[str, str]) -> str:
+    """Return what only an installation that has all rows of a clinic can say, but for use."""
+    kept = {label: digests[label] for label in digests if not _grows(label)}
+    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
+
+
+def _grows(label: str) -> bool:
+    return label.removeprefix("rehab.") in GROWS
 
 
 @contextmanager
@@ -154,7 +172,7 @@ def compare_with_file(clinic: Clinic, content: Content, found: dict[str, str]) -
     differing = [
         label.removeprefix("rehab.")
         for label, digest in content.digests.items()
-        if found[label] != digest and label.removeprefix("rehab.") not in GROWS
+        if found[label] != digest and not _grows(label)
     ]
     if differing:
         raise CannotMove(

@@ -20,6 +20,7 @@ from rehab.exports.clinic.departure import (
     compare_with_file,
     finish_removal,
     last_seals,
+    make_receipt,
     remove_clinic,
 )
 from rehab.exports.clinic.rows import CannotMove, ClinicRows
@@ -29,6 +30,7 @@ from rehab.management.key_files import opened, read_key_file
 from rehab.management.new_file import new_file
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
+from rehab.people.audit.moves import ClinicMove
 from rehab.people.models import Clinic
 from rehab.sessions import seals as session_seals
 
@@ -56,6 +58,8 @@ class Command(BaseCommand):
         away.add_argument("certificate", type=Path, help="where to write what is gone")
         away.add_argument("--file", type=Path, metavar="FILE")
         away.add_argument("--key", type=Path, metavar="KEYFILE")
+        away.add_argument("--receipt", default="", help="what `import` said there, for FILE")
+        away.add_argument("--by", metavar="NAME", help="who removes it, if not by this console")
         away.add_argument("--destroy", action="store_true", help="without a file: all is lost")
         check = parts.add_parser("verify", help="compare a clinic with its seals, and with FILE")
         check.add_argument("clinic", help="its name")
@@ -64,6 +68,8 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, part: str, **options: Any) -> None:
         """Run a subcommand. Raises CommandError, with the cure."""
+        if hasattr(os, "nice"):
+            os.nice(10)  # sessions of other clinics go first
         try:
             getattr(self, f"_{part}")(**options)
         except CannotDecrypt as problem:
@@ -87,11 +93,14 @@ class Command(BaseCommand):
             )
 
     def _import(self, file: Path, key: Path, name: str, **_: Any) -> None:
-        os.nice(10)  # sessions of other clinics go first
         with opened(file) as source:
             log = self.stdout.write
             clinic = import_clinic(source, read_key_file(key), timezone.now(), name=name, log=log)
         self._tell(f"{clinic} is here and as the file says", ClinicRows(clinic.pk).count())
+        taken_in = ClinicMove.everywhere.filter(clinic=clinic).order_by("number").last()
+        if taken_in is not None:
+            said = make_receipt(taken_in.digests)
+            self.stdout.write(f"Receipt, by which it may be removed where it was: {said}")
         self.stdout.write(
             "Passwords and authenticator apps go on; recovery codes do not, and passkeys at the "
             "same address alone. Give devices new tokens, unless it was exported with --tokens."
@@ -104,6 +113,8 @@ class Command(BaseCommand):
         file: Path | None,
         key: Path | None,
         destroy: bool,
+        receipt: str,
+        by: str | None,
         **_: Any,
     ) -> None:
         now = timezone.now()
@@ -119,14 +130,19 @@ class Command(BaseCommand):
             self.stdout.write(f"{clinic} is gone. {certificate}: SHA-256 {digest}.")
             return
         one, content = _find(clinic), None
-        if file is None and not destroy:
-            raise CommandError("Name the file that it leaves with: --file FILE --key KEYFILE.")
+        if file is None and not destroy and not receipt:
+            raise CommandError(
+                "Name the file that it leaves with: --file FILE --key KEYFILE; or the --receipt of "
+                "where it was taken in."
+            )
         if file is not None:
             with opened(file) as source:
                 content = inspect(source, read_key_file(key))
-        by = f"{getpass.getuser()}, server console"
+        by = by or f"{getpass.getuser()}, server console"
         try:
-            digest = remove_clinic(one, content, by, now, wait_s=LEAVES_WITHIN_S, store=store)
+            digest = remove_clinic(
+                one, content, by, now, wait_s=LEAVES_WITHIN_S, store=store, receipt=receipt
+            )
         except CommandError as problem:
             if _read_pending(certificate, clinic) is None:
                 raise

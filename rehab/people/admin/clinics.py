@@ -6,8 +6,12 @@ from typing import Any
 
 from django.contrib import admin
 from django.http import HttpRequest
+from django.urls import reverse
+from django.utils.translation import gettext
 
+from rehab.people.access import user_of
 from rehab.people.models import Clinic, SignOnGroup
+from rehab.people.roles import Role
 from rehab.people.web.admin_base import ScopedAdmin
 
 
@@ -22,6 +26,11 @@ class ClinicAdmin(ScopedAdmin):
         *("care_needs_consent", "research_needs_consent", "networks", "note_template"),
         *("retention_months", "log_retention_months"),
     )
+
+    def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
+        """Return for a host where the clinic is taken out, verified and removed."""
+        links = [(reverse("move-clinic", args=[row.pk]), gettext("Move or remove"))]
+        return links if user_of(request).role == Role.HOST else []
 
 
 @admin.register(SignOnGroup)

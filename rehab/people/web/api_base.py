@@ -26,7 +26,7 @@ from ninja.security.apikey import APIKeyCookie
 from ninja.throttling import BaseThrottle
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, StringConstraints
 
-from rehab.people import roles
+from rehab.people import clinic_limits, roles
 from rehab.people.access import UndeclaredView
 from rehab.people.audit import sign_in_log
 from rehab.people.models import User
@@ -157,8 +157,10 @@ class PerUserThrottle(BaseThrottle):
     """Limits the calls per minute of one person, through all tokens and browsers."""
 
     def allow_request(self, request: HttpRequest) -> bool:
-        """Count a call. Return whether it is within the limit."""
-        return not calls.take(caller(request).pk, time.monotonic())
+        """Count a call. Return whether it is within the limits; browsers' clinics are counted."""
+        user = caller(request)
+        wait_s = calls.take(user.pk, time.monotonic())
+        return not (wait_s or (user.program and clinic_limits.take_request(user.clinic_id)))
 
     def wait(self) -> float:
         """Return the seconds after which there is room for a call again."""

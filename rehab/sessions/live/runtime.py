@@ -6,6 +6,7 @@ import asyncio
 import contextvars
 import logging
 import threading
+from collections import Counter
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
@@ -53,6 +54,7 @@ class Runtime:
         self.recovery = Recovery(self)
         self.audit_queue = AuditQueue()
         self.sockets: set[Any] = set()  # closed when the server stops
+        self.sockets_of: Counter[int] = Counter()  # clinics
         self.requests: set[asyncio.Task[None]] = set()  # of pages, under way
         self.supervisor = Supervisor(settings.DATA_DIR / "children.json")
         # Where child processes connect.

@@ -129,3 +129,14 @@ async def test_a_strange_authorization(place, begun):
         page = PatientPage(session.pk, headers=[(b"authorization", kind)])
         await page.dial()
         assert (await page.sent_away())[0] == 4001, kind
+
+
+async def test_a_clinics_share_of_sockets(place, bystander, monkeypatch):
+    monkeypatch.setattr(base.clinic_limits, "max_sockets", lambda: 1)
+    await place.source().open()
+    robot = place.robot()
+    await robot.dial()
+    await robot.say({"type": "hello", "version": 1, "base": "null"})
+    code, error = await robot.sent_away()
+    assert (code, error["code"]) == (4029, "clinic_full")
+    assert "GARRY_CLINIC_SESSIONS" in error["message"]

@@ -12,6 +12,7 @@ from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
 from django.db import DatabaseError
 
+from rehab.people import clinic_limits
 from rehab.people.token_buckets import TokenBucket
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
@@ -82,10 +83,19 @@ class Socket(AsyncWebsocketConsumer):
             pass
         finally:
             self.runtime.sockets.discard(self)
+            if self.clinic_id is not None:
+                self.runtime.sockets_of[self.clinic_id] -= 1
             self.is_closed = True
             for task in self._tasks:
                 task.cancel()
             self.on_disconnect()
+
+    def belong_to(self, clinic_id: int) -> None:
+        """Note whose socket it is. Raises CloseSocket where the clinic has its share of them."""
+        if self.runtime.sockets_of[clinic_id] >= clinic_limits.max_sockets():
+            raise CloseSocket(CloseCode.TOO_MANY, "clinic_full", clinic_limits.CURE)
+        self.runtime.sockets_of[clinic_id] += 1
+        self.clinic_id = clinic_id
 
     async def _serve(self, receive: Any) -> None:
         while True:

@@ -114,7 +114,7 @@ class DeviceSocket(Socket):
         self.hello_received = True
         self._first_frame_timer.cancel()
         device = self._authorize(self.device)
-        self.clinic_id = device.clinic_id
+        self.belong_to(device.clinic_id)
         await self.runtime.clinics.own(device.clinic_id)
         self.runtime.devices.add(device.station_id, self)
         found = await find_open_session(device, session_id)

@@ -69,8 +69,9 @@ class ScreenConsumer(Socket):
             raise CloseSocket(
                 CloseCode.NO_SESSION, "elsewhere", "The patient has not agreed to remote view."
             )
-        self.live = live = await self.runtime.session(session_id)
-        self.clinic_id = live.clinic_id
+        live = await self.runtime.session(session_id)
+        self.belong_to(live.clinic_id)
+        self.live = live
         if self.is_seen_by_patient:
             live.tablets += 1
             live.tablet_seen_at = timezone.now()

@@ -102,7 +102,16 @@ def own_name() -> str:
     """Return the name that this process writes as owner."""
     if (own := lease.held()) is not None:
         return own.id
-    return f"{socket.gethostname()}|{os.getpid()}|{_own_start_time(os.getpid())}"
+    return _name(os.getpid(), _own_start_time(os.getpid()))
+
+
+def process_name(pid: int) -> str:
+    """Return the name of a process of this machine, for `is_alive`."""
+    return _name(pid, _start_time(pid))
+
+
+def _name(pid: int, started: str) -> str:
+    return f"{socket.gethostname()}|{pid}|{started}"
 
 
 def is_alive(owner: str, servers: Collection[Server] | None = None) -> bool:
