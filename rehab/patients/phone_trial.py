@@ -20,7 +20,10 @@ from rehab.training.phases import make_phase
 from rehab.training.steps import Side
 from rehab.training.valences import POSITIVE
 
-MEASURE, GOAL_PERCENT, MINUTES = MEASURES["shank_stance"], 100.0, 10
+MEASURE, MINUTES = MEASURES["shank_stance"], 10
+# Of the baseline's mean: the shins of `stroke_imu` reach it with 76 % of their later strides, each
+# with at least a fifth; the mean itself with 46 %, four of 36 legs hardly ever.
+GOAL_PERCENT = 98.0
 BASELINE_STRIDES = 10  # of which `TRIAL_BASELINE_STRIDES` have to be valid
 
 
