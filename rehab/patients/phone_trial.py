@@ -17,6 +17,7 @@ from rehab.training.changes import OPEN_STATES, ChangeKind, State
 from rehab.training.goals import TRIAL_BASELINE_STRIDES, GoalRule, Target
 from rehab.training.measures import MEASURES
 from rehab.training.phases import make_phase
+from rehab.training.plans import ROBOT_LEVELS
 from rehab.training.steps import Side
 from rehab.training.valences import POSITIVE
 
@@ -64,9 +65,10 @@ def begin_trial(patient: Patient, station: Station, side: Side | None, by: User)
                 percent_of_baseline=GOAL_PERCENT, baseline_strides=TRIAL_BASELINE_STRIDES
             ),
             phases=[
-                make_phase(kind="baseline", strides=BASELINE_STRIDES),
-                make_phase(kind="training"),
+                make_phase(kind="baseline", strides=BASELINE_STRIDES, robot=False),
+                make_phase(kind="training", robot=False),
             ],
+            robot_intensity=ROBOT_LEVELS["off"],
             target=Target(duration_s=60 * MINUTES),
             trained_side=side,
             station=station,
