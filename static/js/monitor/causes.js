@@ -45,11 +45,14 @@ function describeFall(session) {
   return alarm ? fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) }) : "";
 }
 
-function describeOwnStop(session) {
+function describeOwnStop(session, { robot }) {
   const alarm = alarmOf(session, "robot_stop");
   if (!alarm) return "";
   const values = { why: describeReason(alarm.reason), time: timeOf(alarm) };
-  return fill(_("The robot stopped by itself, %(time)s: %(why)s."), values);
+  const text = robot.isSimulated
+    ? _("The simulated robot stopped by itself, %(time)s: %(why)s.")
+    : _("The robot stopped by itself, %(time)s: %(why)s.");
+  return fill(text, values);
 }
 
 function describeRestart({ state, pause_reason: reason }) {
