@@ -156,6 +156,11 @@ class SessionPlan(PlanSettings):
                     name=phase.name,
                 )
 
+    @property
+    def has_robot(self) -> bool:
+        """Whether a robot takes part: not where it is off and no phase gives it steps."""
+        return self.robot_intensity > 0 or any(phase.robot for phase in self.phases)
+
     def choose_words(self, band: Band, shown: int) -> str:
         """Return what a band says after so many answers in the session."""
         phrases = band.phrases if self.words_vary else band.phrases[:1]

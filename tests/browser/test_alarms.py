@@ -160,6 +160,25 @@ def test_a_silent_sensor_is_seen_heard_and_felt(
     expect(alarm).to_have_count(0)  # in a pause nobody waits for steps
 
 
+def test_strides_that_do_not_count_come_with_a_cure(
+    server: Server, monitor: Page, walk: Walk
+) -> None:
+    alarm = monitor.locator("[data-alarm=strides]")
+    with feet_of(server, walk) as feet:
+        begin(monitor, feet)
+        for count in (4, 1):
+            step = {"side": "left", "value": 1.0, "reasons": ["contact_unclear"]}
+            numbers = range(feet.number + 1, feet.number + 1 + count)
+            feet.number = numbers[-1]
+            steps = [step | {"number": one, "time_s": one * 1.07} for one in numbers]
+            feet.say({"type": "steps", "steps": steps})
+            expect(monitor.locator("[data-show=number]")).to_contain_text(str(feet.number))
+            expect(alarm).to_have_count(feet.number - 6)
+        expect(alarm).to_contain_text("unclear when the foot lands. Strap the sensor as pictured")
+        feet.walk(*[1.0] * 6)
+        expect(alarm).to_have_count(0)
+
+
 def test_a_tablet_that_is_lost_and_a_robot_that_stands(
     server: Server, monitor: Page, walk: Walk
 ) -> None:

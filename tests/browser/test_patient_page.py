@@ -131,6 +131,8 @@ def test_what_a_step_shows_is_there_after_a_reload_and_on_a_second_tablet(server
             assert missing == (performance is None)
             if not missing:
                 continue
+            tube = page.locator(".hatched").evaluate("one => getComputedStyle(one).fill")
+            assert "#hatch" in tube  # a full tube would read as a goal that was beaten
             with signed_in(browser, server, walk) as other:
                 second = open_page(other, walk)
                 until_step(second, feet.number)

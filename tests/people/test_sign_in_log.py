@@ -263,6 +263,8 @@ def test_leads_read_the_sign_ins_of_their_clinic_alone(world, pt, client):
     [
         (FIREFOX, "Firefox, Windows"),
         ("Mozilla/5.0 (X11; Linux x86_64) Chrome/130.0 Safari/537.36", "Chrome, Linux"),
+        ("Mozilla/5.0 (X11; Linux x86_64) HeadlessChrome/1.0 Safari/537.36", "Chrome, Linux"),
+        ("Mozilla/5.0 (iPhone; CPU OS 17_0) CriOS/130.0 Mobile Safari/604", "Chrome, iPhone"),
         ("Mozilla/5.0 (Windows NT 10.0) Chrome/130.0 Safari/537.36 Edg/130.0", "Edge, Windows"),
         ("Mozilla/5.0 (iPad; CPU OS 17_0 like Mac OS X) Version/17 Safari/604", "Safari, iPad"),
         ("Mozilla/5.0 (Linux; Android 14) Chrome/130.0 Mobile Safari/537.36", "Chrome, Android"),

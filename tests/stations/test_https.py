@@ -136,6 +136,9 @@ def test_a_phone_gets_it_by_http(client: Client, lead: Client, clinic_folder):
     away: Any = {"REMOTE_ADDR": "192.168.1.50"}
     page = client.get("/certificate/", **away).content.decode()
     assert "Certificate Trust Settings" in page
+    for agent, unfolded in (("Android", 1), ("(Mac OS X)", 2), ("", 3)):
+        named = client.get("/certificate/", headers={"user-agent": agent}, **away)
+        assert named.content.decode().count(" open>") == unfolded
     file = client.get("/certificate/garry.crt", **away)
     assert file.headers["Content-Type"] == "application/x-x509-ca-cert"
     assert b"PRIVATE" not in file.content

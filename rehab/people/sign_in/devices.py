@@ -25,6 +25,7 @@ BROWSER = "browser"  # key of the browser session: its mark, program and network
 
 # A browser names others that it is compatible with, so the first of these that it names counts.
 PROGRAMS = {"Firefox": "Firefox", "Edg": "Edge", "OPR": "Opera", "Chrome": "Chrome"}
+PROGRAMS |= {"HeadlessChrome": "Chrome", "CriOS": "Chrome", "FxiOS": "Firefox"}
 PROGRAMS |= {"Safari": "Safari"}
 SYSTEMS = {"Android": "Android", "iPad": "iPad", "iPhone": "iPhone", "Windows": "Windows"}
 SYSTEMS |= {"Mac OS X": "macOS", "CrOS": "ChromeOS", "Linux": "Linux"}

@@ -18,6 +18,7 @@ from rehab.people.audit.audit_log import Act, record
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
+from rehab.people.sign_in.devices import describe_browser
 from rehab.stations.https.authority import fingerprint, read_certificate
 from rehab.stations.https.certificate import (
     is_encrypting,
@@ -26,6 +27,11 @@ from rehab.stations.https.certificate import (
     own_authority,
     secure_host,
 )
+
+# Whose instructions a device is shown unfolded; an iPad calls itself a Mac.
+SYSTEMS = {"iPhone": {"ios"}, "iPad": {"ios"}, "Android": {"android"}, "macOS": {"ios", "computer"}}
+SYSTEMS |= {name: {"computer"} for name in ("Windows", "Linux", "ChromeOS")}
+ALL_SYSTEMS = {"ios", "android", "computer"}
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)
@@ -85,7 +91,9 @@ def show_certificate(request: HttpRequest) -> HttpResponse:
 
     ``next`` is where it goes on by https, as soon as it does.
     """
+    agent = describe_browser(request.headers.get("User-Agent", ""))
     context = {
+        "systems": SYSTEMS.get(agent.rpartition(", ")[2], ALL_SYSTEMS),
         "secure_address": secure_address(),
         "next": step_up.way_back(request),
         **certificate_square(),

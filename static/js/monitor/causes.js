@@ -8,12 +8,13 @@
 
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
-import { doubtCure } from "garry/shared/labels";
+import { doubtCure, reasonName, wornCure } from "garry/shared/labels";
 import { SILENT_S, hasStarted } from "garry/monitor/state";
 import { describeReason } from "garry/monitor/robot_text";
 
 const FIRST_STRIDE_S = 10; // a walk needs longer to begin
 const RESTART_S = 15; // after which what has not come back is told
+const LAST = 10; // strides, of which half may not count before that is told
 const SEEN = _("I have seen it");
 const STORAGE = {
   late: _("The database is not answering: strides are waiting, and the robot is standing still."),
@@ -45,11 +46,14 @@ function describeFall(session) {
   return alarm ? fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) }) : "";
 }
 
-function describeOwnStop(session) {
+function describeOwnStop(session, { robot }) {
   const alarm = alarmOf(session, "robot_stop");
   if (!alarm) return "";
   const values = { why: describeReason(alarm.reason), time: timeOf(alarm) };
-  return fill(_("The robot stopped by itself, %(time)s: %(why)s."), values);
+  const text = robot.isSimulated
+    ? _("The simulated robot stopped by itself, %(time)s: %(why)s.")
+    : _("The robot stopped by itself, %(time)s: %(why)s.");
+  return fill(text, values);
 }
 
 function describeRestart({ state, pause_reason: reason }) {
@@ -74,6 +78,16 @@ function describeSource({ presence, state: sessionState }, { state }) {
 
 function describeDoubt(session, { state }) {
   return hasStarted(session) ? doubtCure(state.lastStride?.reasons ?? []) : "";
+}
+
+// What half of the last strides do not count for, and its cure.
+function describeInvalid(session, { state }) {
+  if (!hasStarted(session)) return "";
+  const lost = state.strides.slice(-LAST).flatMap(({ reasons }) => (reasons ?? []).filter(wornCure));
+  const reason = lost.find((one) => 2 * lost.filter((other) => other === one).length >= LAST);
+  if (!reason) return "";
+  const values = { why: reasonName(reason), cure: wornCure(reason) };
+  return fill(_("Half of the strides do not count: %(why)s. %(cure)s"), values);
 }
 
 function describeTablet(session, { state }) {
@@ -129,8 +143,9 @@ export const CAUSES = [
     describe: describeRestart,
     isCalm: true,
   },
-  { cause: "source", hides: [], describe: describeSource },
-  { cause: "signals", hides: [], describe: describeDoubt },
+  { cause: "source", hides: ["strides"], describe: describeSource },
+  { cause: "signals", hides: ["strides"], describe: describeDoubt },
+  { cause: "strides", hides: [], describe: describeInvalid },
   { cause: "tablet", hides: [], describe: describeTablet },
   {
     cause: "robot",

@@ -41,11 +41,12 @@ export function createLastStride({ state, show }) {
     return `${number(value, 2)}${scaled} ${unit}`;
   }
 
-  function describeVerdict(stride, phase) {
+  function describeVerdict(stride, { phase, goal }) {
     if (stride.performance != null) {
       if (stride.close) return fill(_("close: %(side)s"), { side: stride.hit ? _("hit") : _("below") });
       return (stride.hit ? _("hit") : _("below")) + (stride.points ? `, ${signed(stride.points)}` : "");
     }
+    if (stride.valid && goal !== null) return _("before the goal was set");
     if (stride.valid) return fill(_("%(phase)s: no goal yet"), { phase: phaseName(phase.name) });
     const why = (stride.reasons ?? []).map(reasonName).join(", ") || _("no value");
     return fill(_("does not count: %(why)s"), { why });
@@ -82,7 +83,7 @@ export function createLastStride({ state, show }) {
             .map(describeExtra),
         ].join("\n"),
       );
-      show("verdict", describeVerdict(stride, session.phase));
+      show("verdict", describeVerdict(stride, session));
       dot.classList.toggle("miss", !stride.hit && !stride.close);
       dot.classList.toggle("close", Boolean(stride.close));
     },

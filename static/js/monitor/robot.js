@@ -240,7 +240,7 @@ export class RobotPanel {
 
   #describeCure() {
     if (this.#isBack) return this.#describeBattery();
-    const parts = [cureOf(this.#isHeld ? this.#stopReason : this.#status?.reason), this.#describeBattery()];
+    const parts = [this.#cureOf(this.#isHeld ? this.#stopReason : this.#status?.reason), this.#describeBattery()];
     if (this.#isHeld) parts.push(_("Put it on its mark, nobody near it, then:"));
     return parts.filter(Boolean).join(" ");
   }
@@ -258,7 +258,17 @@ export class RobotPanel {
     if (!this.#isConnected || this.#isRecovering) return "";
     if (!this.#isStopped && this.#status?.state !== "stopped") return "";
     const why = fill(_("The robot is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
-    return [why, cureOf(this.#stopReason)].filter(Boolean).join(" ");
+    return [why, this.#cureOf(this.#stopReason)].filter(Boolean).join(" ");
+  }
+
+  get isSimulated() {
+    return this.#status?.simulated === true;
+  }
+
+  // Return what to do about a reason: a simulated robot has no cable to check.
+  #cureOf(reason) {
+    const cure = cureOf(reason);
+    return cure && this.isSimulated ? _("It is simulated: let it move again.") : cure;
   }
 
   // The server remembers why the robot stopped by itself, also where its program was restarted since.

@@ -259,6 +259,7 @@ function offerTrial() {
     if (!file) return;
     try {
       play("recording", await readRecording(file));
+      show("file", file.name); // which stays on this phone
     } catch (problem) {
       show("problem", problem.message);
     }

@@ -105,6 +105,14 @@ const DOUBTS = {
   ),
 };
 
+// Why strides of a worn sensor do not count: the cure.
+const WORN_CURES = {
+  contact_unclear: _("Strap the sensor as pictured, or tighter; of a recording try another one, or the other leg."),
+  sensor_moved: _("Strap the sensor tighter."),
+  samples_lost: _("Keep the sensor near its receiver; of a recording try another one."),
+  low_rate: _("Charge the phone, and turn its power saving off."),
+};
+
 // What ends a page's connection or refuses an order, by its code; others come with a text of their own.
 const REFUSALS = {
   sign_in: _("Sign in again, or pair the tablet again."),
@@ -120,4 +128,5 @@ export const severityName = (severity) => SEVERITIES[severity] ?? REMARKS.fall_s
 export const remarkName = (kind) => REMARKS[kind] ?? kind.replaceAll("_", " ");
 export const clockCures = (names) => [...new Set(names.map((name) => CURES[name]).filter(Boolean))];
 export const doubtCure = (reasons) => DOUBTS[reasons.find((reason) => reason in DOUBTS)] ?? "";
+export const wornCure = (reason) => WORN_CURES[reason] ?? "";
 export const reasonName = (reason) => REASONS[reason] ?? reason.replaceAll("_", " ");

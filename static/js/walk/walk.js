@@ -104,6 +104,7 @@ function draw() {
   } else clear();
   confetti = "none";
   if (session) body.dataset.step = session.number;
+  if (session) body.toggleAttribute("data-sensor", session.presence.source);
   if (screen === "ended" && !isMirror) leaveTimer ??= setTimeout(() => location.replace(body.dataset.ending), LEAVE_MS);
 }
 

@@ -9,6 +9,7 @@ from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
+from rehab.training.plans import ROBOT_LEVELS
 from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
@@ -66,6 +67,17 @@ async def test_a_phase_without_the_robot_sends_it_no_steps(place, begun):
     robot, source = await place.robot().open(), await place.source().open()
     await source.walk(4.0, 5.0)
     assert (await robot.hear("step"))["number"] == 2
+
+
+async def test_a_robot_that_a_plan_leaves_out_is_no_part_of_the_session(place, begun):
+    session = await begun(
+        place, make_phase("training", robot=False), robot_intensity=ROBOT_LEVELS["off"]
+    )
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    assert (await robot.hello())["session"] is None
+    assert (await monitor.watch())["presence"]["robot"] is False
+    await robot.say({"type": "report", "report": {"kind": "stop", "reason": "base_silent"}})
+    assert (await place.monitor(session).watch())["alarms"] == []
 
 
 @pytest.mark.parametrize("valence", ["positive", "explicit"])

@@ -144,6 +144,10 @@ class DeviceSocket(Socket):
     async def _attach(self, session_id: int) -> None:
         # Settled: nothing may come between taking the slot and the welcome.
         live = await self.runtime.settled_session(session_id)
+        if not self.takes_part(live):
+            self._leave_session()
+            await self.send_message({"type": "welcome", "session": None})
+            return
         slot = self.choose_slot(live)
         other: ConnectedDevice | None = getattr(live, slot)
         if other is not None and other is not self:
@@ -162,6 +166,10 @@ class DeviceSocket(Socket):
         if self.plugin is not None:
             live.note_plugin(to_builtins(self.plugin), timezone.now())
         await self.on_attach(live)
+
+    def takes_part(self, live: LiveSession) -> bool:
+        """Return whether the session's plan has a part for it."""
+        return True
 
     def choose_slot(self, live: LiveSession) -> str:
         """Return which attribute of the session it takes."""

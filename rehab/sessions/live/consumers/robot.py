@@ -55,6 +55,10 @@ class RobotConsumer(DeviceSocket):
             case _:
                 raise BadFrame('A robot sends "hello", "report" and "incident".')
 
+    def takes_part(self, live: LiveSession) -> bool:
+        """Return whether the session's plan has a part for it."""
+        return live.aggregate.fold.plan.has_robot
+
     async def on_attach(self, live: LiveSession) -> None:
         """Send this session's events, and no more of the previous one's."""
         if self._pumping is not None:
