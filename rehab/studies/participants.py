@@ -185,6 +185,17 @@ class StudyVisit(ScopedModel):
     def __str__(self) -> str:
         return f"{self.enrollment} / {self.number}"
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether no person walked it."""
+        session = self.session
+        return session is not None and (session.simulated or self.enrollment.patient.simulated)
+
+
+def counts_people_alone(study: Study) -> bool:
+    """Return whether simulated visits stay out of a study's results: of any with a person in it."""
+    return study.enrollments.filter(patient__simulated=False).exists()
+
 
 class StudyEvent(SealableModel):
     """Something that happened in a study: who did it, and why."""

@@ -31,6 +31,7 @@ from rehab.studies.unblinding import (
     must_not_know_arms,
     reveal_arms,
 )
+from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -95,6 +96,7 @@ def render_participant(
     first_station(enrollment.patient.clinic)
     blind = must_not_know_arms(enrollment.study, user)
     visits = list(enrollment.visits.select_related("session"))
+    told = describe_visits(enrollment.study, visits, blind=blind)
     if not blind and "revealed" not in more and may_read_arm(enrollment, user, now):
         more["revealed"] = arms_of(enrollment)
     is_walking = any(visit.session and visit.session.state in OPEN_STATES for visit in visits)
@@ -102,7 +104,8 @@ def render_participant(
     context = {
         "enrollment": enrollment,
         "study": enrollment.study,
-        "visits": visits,
+        "visits": [(visit, told.get(visit.pk)) for visit in visits],
+        "has_simulated": any(visit.is_simulated for visit in visits),
         "next": None if is_walking else next_visit(enrollment),
         "blind": blind,
         "guesser": GUESSERS[guesser] if guesser else "",

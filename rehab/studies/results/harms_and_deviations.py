@@ -17,7 +17,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.noted import ABOUT_A_FALL, ADVERSE, read_noted
 from rehab.studies.analysis.participants import Attendance, Participant
 from rehab.studies.models import Study
-from rehab.studies.participants import StudyEvent, StudyVisit
+from rehab.studies.participants import StudyEvent, StudyVisit, counts_people_alone
 from rehab.training.changes import ChangeKind, State
 from rehab.training.controls import CONTROLS
 
@@ -91,10 +91,13 @@ def label_of(what: str) -> str:
 def read_occurrences(study: Study) -> tuple[Occurrence, ...]:
     """Return all that happened in a study, by participant and visit."""
     visits = StudyVisit.everywhere.filter(enrollment__study=study, session__isnull=False)
-    related = ("enrollment__allocation", "session")
+    related = ("enrollment__allocation", "enrollment__patient", "session")
+    of_people = counts_people_alone(study)
     found: list[Occurrence] = []
     for visit in visits.select_related(*related).order_by("enrollment", "number", "attempt"):
         enrollment, session = visit.enrollment, visit.session
+        if of_people and visit.is_simulated:
+            continue
         if enrollment.is_analyzed and session is not None:
             place = (
                 enrollment.code,
