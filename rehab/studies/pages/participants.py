@@ -7,6 +7,7 @@ from typing import Any
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
@@ -56,9 +57,10 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
         try:
             unmet = find_unmet(study, patient, form.met, now)
             if unmet or declined:
-                turn_away(study, patient, unmet, declined=declined, by=user, now=now)
-                messages.success(request, _("Noted in the screening log: not enrolled."))
-                return redirect("study", study_id=study.pk)
+                noted = turn_away(study, patient, unmet, declined=declined, by=user, now=now)
+                message = _("Noted in the screening log: not enrolled (%(why)s).")
+                messages.success(request, message % {"why": noted.why_not})
+                return redirect(reverse("study", args=[study.pk]) + "#screening")
             enrollment = enroll(
                 study, patient, form.levels, keep_data=keep_data, by=user, now=now, met=form.met
             )

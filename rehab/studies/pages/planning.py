@@ -29,7 +29,7 @@ from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import may_monitor
 from rehab.studies.registration.document import describe
 from rehab.studies.registration.lifecycle import close, register, revise, start
@@ -135,6 +135,9 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "changes": outcome_changes(study),
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
+        "screened": Screening.objects.visible_to(user)
+        .filter(study=study)
+        .select_related("patient"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
         "tasks": _markable(study) if is_lead else (),
     }
