@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from django.db.models import F
 from django.utils.translation import gettext
 
+from rehab.sessions.alarms import UNASKED
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
@@ -70,7 +71,8 @@ def _changed(sessions: Iterable[TrainingSession]) -> dict[int, list[str]]:
     keys = [one.pk for one in sessions]
     events = SessionEvent.everywhere.filter(session__in=keys, kind__in=DEVIATIONS)
     found: dict[int, list[str]] = {}
-    for pk, kind in events.order_by("kind").values_list("session_id", "kind").distinct():
+    events = events.exclude(data__has_key=UNASKED).order_by("kind")
+    for pk, kind in events.values_list("session_id", "kind").distinct():
         label = label_of(kind)
         is_change = kind in list(ChangeKind)
         told = gettext("changed: %(what)s") % {"what": label} if is_change else label

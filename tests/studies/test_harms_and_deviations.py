@@ -14,6 +14,7 @@ from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
+from rehab.studies.record.adverse_events import propose
 from rehab.studies.registration.lifecycle import close
 from rehab.studies.results.results import read_results
 from rehab.studies.unblinding import reveal_arms
@@ -165,3 +166,22 @@ def test_pages_tell_a_visit_that_was_simulated_cut_short_changed_or_on_another_d
     results = read_results(study, later)
     assert results.participants[0].visits[0].attendance == "excluded"
     assert not results.occurrences
+
+
+def test_a_stop_of_a_robot_that_is_off_is_no_harm_and_no_deviation(world):
+    study = running_study(world)
+    session = study_session(world, study)
+    stop = {"session": session, "after_number": 0, "kind": RobotEntry.STOP.value, "at": NOW}
+    SessionEvent.everywhere.create(**stop, data={"device": 1, "unasked": "base_silent"})
+    assert not propose(study)
+    assert not read_results(study, NOW).occurrences
+    assert "robot stop</span>" not in page_of(world, study)
+    SessionEvent.everywhere.create(**stop, data={"device": 1, "reason": "bump"})
+    assert len(propose(study)) == 1
+    assert [one.what for one in read_results(study, NOW).occurrences] == ["robot_stop"]
+    assert "robot stop</span>" in page_of(world, study)
+
+
+def page_of(world, study):
+    page = reverse("study", args=[study.pk])
+    return client_of(world, Role.LEAD).get(page).content.decode()

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.sessions.alarms import UNASKED
 from rehab.sessions.log import EVENTS, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.noted import ABOUT_A_FALL, ADVERSE, read_noted
@@ -123,8 +124,11 @@ def _of_session(session: TrainingSession, make: Callable[..., Occurrence]) -> It
     for one in read_noted(events.filter(kind__in=(*HARMS, *ABOUT_A_FALL))):
         if one.is_adverse:
             yield make(one.kind.value, one.value if one.severity is None else float(one.severity))
-    for kind, value in events.filter(kind__in=DEVIATIONS).values_list("kind", "value"):
-        yield make(kind, value)
+    for kind, value, data in events.filter(kind__in=DEVIATIONS).values_list(
+        "kind", "value", "data"
+    ):
+        if UNASKED not in data:
+            yield make(kind, value)
     if session.state == State.ABORTED:
         yield make(ENDED_EARLY)
     if session.excluded:
