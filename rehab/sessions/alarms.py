@@ -40,6 +40,10 @@ ENDED_BY = {
 }
 
 
+# Holds the reason of a stop where the session has its robot off: no alarm, no harm.
+UNASKED = "unasked"
+
+
 def alarm_of(event: SessionEvent) -> Alarm | None:
     """Return the alarm that an event raises; None for none.
 

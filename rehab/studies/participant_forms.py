@@ -49,10 +49,10 @@ class EnrollmentForm(forms.Form):
             ended_at=None, erased_at=None
         )
         fields["patient"].label = capfirst(gettext("patient"))
-        for number, criterion in enumerate(study.criteria):
+        for number, criterion in enumerate(study.inclusion_criteria + study.exclusion_criteria):
             fields[f"criterion_{number}"] = forms.ChoiceField(
                 label=criterion,
-                choices=[("yes", gettext("holds")), ("no", gettext("does not hold"))],
+                choices=[("yes", gettext("yes")), ("no", gettext("no"))],
                 widget=forms.RadioSelect,
             )
         for number, (name, levels) in enumerate(study.factors):
@@ -62,11 +62,12 @@ class EnrollmentForm(forms.Form):
 
     @property
     def met(self) -> list[str]:
-        """The criteria that hold."""
+        """The criteria that are met: those of inclusion by a yes, those of exclusion by a no."""
+        included = len(self.study.inclusion_criteria)
         return [
             criterion
             for number, criterion in enumerate(self.study.criteria)
-            if self.cleaned_data[f"criterion_{number}"] == "yes"
+            if self.cleaned_data[f"criterion_{number}"] == ("yes" if number < included else "no")
         ]
 
     @property

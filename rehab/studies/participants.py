@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from django.db import models
 from django.utils import timezone
+from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
@@ -16,7 +17,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.random_codes import random_code
 from rehab.people.scope import ClinicModel, ScopedModel
 from rehab.sessions.models import TrainingSession
-from rehab.studies.models import Arm, Study, StudyVersion
+from rehab.studies.models import NOT, Arm, Study, StudyVersion
 
 ERASED_CODE = "E-"  # prefix of an erased participant's code
 OF_STUDY = retained("the study's result, under a code", shown=True, research=True)
@@ -149,6 +150,15 @@ class Screening(AppendOnlyModel):
     def __str__(self) -> str:
         return f"{self.study.code}: {self.at:%Y-%m-%d}"
 
+    @property
+    def why_not(self) -> str:
+        """Why the patient does not take part, with the answer to each criterion that failed."""
+        told = []
+        for one in self.unmet:
+            answer = gettext("yes") if one.startswith(NOT) else gettext("no")
+            told.append(f"{one.removeprefix(NOT)}: {answer}")
+        return "; ".join(told) or (gettext("no, declines") if self.declined else "")
+
 
 class StudyVisit(ScopedModel):
     """A visit that the study plans. An aborted session can be walked again."""
@@ -184,6 +194,17 @@ class StudyVisit(ScopedModel):
 
     def __str__(self) -> str:
         return f"{self.enrollment} / {self.number}"
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether no person walked it."""
+        session = self.session
+        return session is not None and (session.simulated or self.enrollment.patient.simulated)
+
+
+def counts_people_alone(study: Study) -> bool:
+    """Return whether simulated visits stay out of a study's results: of any with a person in it."""
+    return study.enrollments.filter(patient__simulated=False).exists()
 
 
 class StudyEvent(SealableModel):

@@ -18,6 +18,7 @@ from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
 from rehab.studies.registration.document import find_rule
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
+from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
@@ -117,6 +118,7 @@ def start_session(
                 patient=enrollment.patient,
                 valence=arm.valence,
                 goal=GoalRule(percent_of_baseline=study.goal_percent),
+                adaptation=GoalAdaptation(AdaptationMode.OFF),
                 phases=arm.baseline() if visit.follow_up else arm.phases(),
                 protocol=arm.protocol,
                 measure=arm.measure,

@@ -87,6 +87,28 @@ def test_a_title_says_what_is_blinded_and_who_is_simulated(world):
     assert not title()["still asked"]
 
 
+def test_who_is_blinded_is_one_truth_whatever_was_typed(world):
+    study = running_study(world)
+    study.facts = {"blinding": "Assessors are blinded"}
+    study.save(update_fields=["facts"])
+
+    def told():
+        rows = {(r["list"], r["item"]): r for r in checklist_rows(study, None)}
+        return rows["SPIRIT 2025", "24a"], rows["SPIRIT 2025", "24b"]
+
+    who, how = told()
+    assert who["answer"] in (UNMASKED, "See item 1a.")
+    assert "“Assessors are blinded” is not so" in who["still asked"]
+    assert how["answer"] == "GARRY keeps nothing from anybody: no assessor is marked."
+    give_mark(study, world.people[Role.PT], Task.ASSESSOR, None, NOW)
+    who, how = told()
+    assert "Assessors are blinded" in who["answer"]
+    assert not who["still asked"]
+    assert "kept from sessions" in how["answer"]
+    study.facts = {"blinding": "Assessors are not blinded"}
+    assert not told()[0]["still asked"]
+
+
 def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     study = running_study(world)
     enrollment = enrolled(study, new_patient(world))
@@ -103,7 +125,7 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     assert "with 1 of 20 participants" in consort["23b"]
     assert "last enrollment 2026" in consort["23a"]
     assert "Sizes of blocks: 2, 4." in consort["17b"]
-    assert consort["20b"] == "Nobody is blinded: no assessor is marked."
+    assert consort["20b"] == "GARRY keeps nothing from anybody: no assessor is marked."
     assert "robot stop: A 0 events" in consort["27"]
     assert "1 arms revealed, 1 of them by one person alone" in consort["20a"]
 

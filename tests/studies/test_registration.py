@@ -23,7 +23,7 @@ from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.unblinding import take_mark
 from rehab.studies.visits import Place, seed_of, start_session
 from rehab.training.goals import GoalRule
-from rehab.training.measures import MEASURES, InvalidSetting
+from rehab.training.measures import MEASURES, WORN_CHANNELS, InvalidSetting
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World
 
@@ -345,3 +345,40 @@ def test_a_follow_up_is_registered_planned_and_walked_without_feedback(world):
         kinds.append([phase["kind"] for phase in session.plan["phases"]])
         TrainingSession.everywhere.filter(pk=session.pk).update(state="finished")
     assert kinds == [["baseline", "training", "washout"], ["baseline"]]
+
+
+@pytest.mark.parametrize(
+    ("plan", "arm", "cure"),
+    [
+        ({"primary_outcome": "follow_up_change"}, {}, "give the days to it"),
+        ({"secondary_outcomes": ["savings"], "visits": 1}, {}, "plan more of them"),
+        ({"primary_outcome": "catch_change"}, {}, "choose another protocol or outcome"),
+        ({"secondary_outcomes": ["score"]}, {}, "Choose an outcome that is measured"),
+        ({"primary_outcome": "hit_rate", "secondary_outcomes": ["points_per_100_steps"]},
+         {"valence": "explicit"}, "Choose an outcome that is measured"),
+        ({}, {"measure": None}, "choose the same measure"),
+    ],
+)  # fmt: skip
+def test_an_outcome_that_the_plan_cannot_give_or_compare_is_not_registered(world, plan, arm, cure):
+    study = draft_study(world, **plan)
+    if "measure" in arm:
+        others = MeasureDefinition.everywhere.exclude(channel__in=WORN_CHANNELS)
+        arm = {"measure": others.exclude(slug="a2").first()}
+    study.arms.filter(code="B").update(**arm)
+    with pytest.raises(InvalidSetting, match=cure):
+        register(study, None, NOW)
+
+
+def test_what_a_plan_can_give_is_registered_and_later_checked_again(world):
+    study = draft_study(
+        world,
+        primary_outcome="follow_up_change",
+        secondary_outcomes=["savings", "after_effect"],
+        follow_up_days=30,
+    )
+    register(study, None, NOW)
+    study.follow_up_days = None
+    with pytest.raises(InvalidSetting, match="give the days to it"):
+        revise(study, "No time", None, NOW)
+    study.refresh_from_db()
+    assert (study.follow_up_days, study.versions.count()) == (30, 1)

@@ -224,7 +224,11 @@ def means_of(results):
 
 
 def test_before_the_end_no_figure_is_shown_that_tells_the_feedback_type(world):
-    study = running_study(world, primary_outcome="score", secondary_outcomes=["hit_rate"])
+    outcomes = {"primary_outcome": "score", "secondary_outcomes": ["hit_rate"]}
+    study = draft_study(world, **outcomes)
+    study.arms.filter(code="B").update(valence="positive", gain=0.9)
+    register(study, None, NOW)
+    start(study, None, NOW)
     assert list(read_results(study, NOW).registered) == ["hit_rate"]
     close(study, None, NOW)
     assert list(read_results(study, NOW).registered) == ["score", "hit_rate"]

@@ -55,18 +55,28 @@ def test_the_flow_begins_with_everybody_who_was_assessed(world):
     study = running_study(world, **CRITERIA)
     pt = client_of(world, Role.PT)
     url = reverse("enroll", args=[study.pk])
-    yes = {"criterion_0": "yes", "criterion_1": "yes", "criterion_2": "yes"}
+    yes = {"criterion_0": "yes", "criterion_1": "yes", "criterion_2": "no"}
     answers = [
         yes,
         yes | {"takes_part": "no"},
-        yes | {"criterion_2": "no"},
-        yes | {"criterion_1": "no", "criterion_2": "no"},
+        yes | {"criterion_2": "yes"},
+        yes | {"criterion_1": "no", "criterion_2": "yes"},
     ]
     for number, answer in enumerate(answers):
         patient = new_patient(world, number)
         sent = {"patient": patient.pk, "takes_part": "yes", "keep_data": "yes"} | answer
         page = pt.post(url, sent, follow=True).content.decode()
         assert ("screening log" in page) == (number > 0)
+    assert "not enrolled (Follows two-step orders: no; Pacemaker: yes)" in page
+    log = page.partition('id="screening"')[2]
+    assert all(
+        words in " ".join(log.split())
+        for words in ("Newcomer 0 – enrolled", "declines", "Pacemaker: yes")
+    )
+    form = pt.get(url).content.decode()
+    assert "Pacemaker</legend>" in form
+    assert "not: Pacemaker" not in form
+    assert f"{reverse('study', args=[study.pk])}#screening" in form
     assert study.enrollments.count() == 1
     assert study.screenings.count() == 4
     results = read_results(study, NOW)

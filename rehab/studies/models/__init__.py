@@ -4,6 +4,7 @@ from rehab.studies.models.arm import Arm
 from rehab.studies.models.marks import StudyMark, has_mark
 from rehab.studies.models.protocol import (
     METHODS,
+    NOT,
     OUTCOMES,
     SCHEDULE_FIELDS,
     SPENDINGS,
@@ -14,6 +15,7 @@ from rehab.studies.models.protocol import (
 
 __all__ = [
     "METHODS",
+    "NOT",
     "OUTCOMES",
     "SCHEDULE_FIELDS",
     "SPENDINGS",

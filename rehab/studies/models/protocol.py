@@ -21,6 +21,7 @@ from rehab.studies.analysis import outcomes
 from rehab.studies.arms import EARLY_MONTHS, ArmRule, check_arms, check_channels
 
 OUTCOMES = [(slug, _(label)) for slug, (label, _unit) in outcomes.OUTCOMES.items()]
+NOT = "not: "  # begins a criterion of exclusion among those that have to hold
 SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
 SPENDINGS = {
     "obrien_fleming": _("Seldom early (O’Brien and Fleming)"),
@@ -183,7 +184,7 @@ class Study(ClinicModel):
     @property
     def criteria(self) -> list[str]:
         """All that has to hold of a participant, in words: those of exclusion with “not” before."""
-        return [*self.inclusion_criteria, *(f"not: {one}" for one in self.exclusion_criteria)]
+        return [*self.inclusion_criteria, *(f"{NOT}{one}" for one in self.exclusion_criteria)]
 
     @property
     def visit_plan(self) -> VisitPlan:

@@ -7,6 +7,7 @@ from typing import Any
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
@@ -31,6 +32,7 @@ from rehab.studies.unblinding import (
     must_not_know_arms,
     reveal_arms,
 )
+from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -55,9 +57,10 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
         try:
             unmet = find_unmet(study, patient, form.met, now)
             if unmet or declined:
-                turn_away(study, patient, unmet, declined=declined, by=user, now=now)
-                messages.success(request, _("Noted in the screening log: not enrolled."))
-                return redirect("study", study_id=study.pk)
+                noted = turn_away(study, patient, unmet, declined=declined, by=user, now=now)
+                message = _("Noted in the screening log: not enrolled (%(why)s).")
+                messages.success(request, message % {"why": noted.why_not})
+                return redirect(reverse("study", args=[study.pk]) + "#screening")
             enrollment = enroll(
                 study, patient, form.levels, keep_data=keep_data, by=user, now=now, met=form.met
             )
@@ -95,6 +98,7 @@ def render_participant(
     first_station(enrollment.patient.clinic)
     blind = must_not_know_arms(enrollment.study, user)
     visits = list(enrollment.visits.select_related("session"))
+    told = describe_visits(enrollment.study, visits, blind=blind)
     if not blind and "revealed" not in more and may_read_arm(enrollment, user, now):
         more["revealed"] = arms_of(enrollment)
     is_walking = any(visit.session and visit.session.state in OPEN_STATES for visit in visits)
@@ -102,7 +106,8 @@ def render_participant(
     context = {
         "enrollment": enrollment,
         "study": enrollment.study,
-        "visits": visits,
+        "visits": [(visit, told.get(visit.pk)) for visit in visits],
+        "has_simulated": any(visit.is_simulated for visit in visits),
         "next": None if is_walking else next_visit(enrollment),
         "blind": blind,
         "guesser": GUESSERS[guesser] if guesser else "",

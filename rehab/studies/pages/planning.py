@@ -31,15 +31,17 @@ from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
-from rehab.studies.participants import Allocation, Enrollment, StudyEvent
+from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import may_monitor
 from rehab.studies.registration.document import describe
 from rehab.studies.registration.lifecycle import close, register, revise, start
 from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
 from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import plan_rows, write_pdf
+from rehab.studies.results.reading import UNREAD
 from rehab.studies.results.results import may_look
 from rehab.studies.unblinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
+from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 
@@ -128,12 +130,16 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "may_see_harms": may_monitor(study, user) or user.role in {Role.LEAD, Role.PT},
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
         **({} if blind else _compare_arms(study)),
-        "participants": _participants(study, user),
+        "participants": (people := _participants(study, user, blind=blind)),
+        "has_simulated": any(one["has_simulated"] for one in people),
         "primary": dict(OUTCOMES)[first_primary(study)],
         "plan": () if blind else _plan(study),
         "changes": outcome_changes(study),
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
+        "screened": Screening.objects.visible_to(user)
+        .filter(study=study)
+        .select_related("patient"),
         "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
         "tasks": _markable(study) if is_lead else (),
     }
@@ -169,16 +175,29 @@ def _plan(study: Study) -> list[tuple[object, ...]]:
         return []
 
 
-def _participants(study: Study, user: User) -> list[dict[str, Any]]:
+def _participants(study: Study, user: User, *, blind: bool) -> list[dict[str, Any]]:
     """Return the participants that a user may see; groups only once the study is closed."""
     rows = Enrollment.objects.visible_to(user).filter(study=study).select_related("patient")
     groups: dict[int, str] = {}
     if study.state == StudyState.CLOSED:
         allocations = Allocation.objects.visible_to(user).filter(enrollment__study=study)
         groups = dict(allocations.values_list("enrollment_id", "group"))
+    enrollments = list(rows.order_by("pk"))
+    of_study = StudyVisit.everywhere.filter(enrollment__in=enrollments)
+    visits = list(of_study.select_related("session", "enrollment__patient").defer(*UNREAD))
+    told = describe_visits(study, visits, blind=blind)
+    of_each: dict[int, list[StudyVisit]] = {row.pk: [] for row in enrollments}
+    for visit in visits:
+        of_each[visit.enrollment_id].append(visit)
     return [
-        {"enrollment": row, "next": next_visit(row), "group": groups.get(row.pk, "")}
-        for row in rows.order_by("pk")
+        {
+            "enrollment": row,
+            "next": next_visit(row),
+            "group": groups.get(row.pk, ""),
+            "told": [(visit, told[visit.pk]) for visit in of_each[row.pk] if told.get(visit.pk)],
+            "has_simulated": any(visit.is_simulated for visit in of_each[row.pk]),
+        }
+        for row in enrollments
     ]
 
 

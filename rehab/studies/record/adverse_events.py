@@ -17,6 +17,7 @@ from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import User
+from rehab.sessions.alarms import UNASKED
 from rehab.sessions.log import RobotEntry, SessionEvent
 from rehab.sessions.reports.noted import ABOUT_A_FALL, read_noted
 from rehab.studies.models import Study, StudyMark, has_mark
@@ -126,7 +127,8 @@ def propose(study: Study) -> list[tuple[Enrollment, SessionEvent]]:
     for _session, of_session in groupby(events.order_by("session", "pk"), attrgetter("session_id")):
         logged = list(of_session)
         harms = [one.event for one in read_noted(logged) if one.is_adverse]
-        found += [one for one in logged if one.kind == RobotEntry.STOP or one in harms]
+        stops = [one for one in logged if one.kind == RobotEntry.STOP and UNASKED not in one.data]
+        found += [one for one in logged if one in stops or one in harms]
     unjudged = [event for event in found if getattr(event, "adverse_event", None) is None]
     return [(event.session.study_visit.enrollment, event) for event in unjudged]
 

@@ -7,6 +7,7 @@ ours, and short. An item without an answer is still to be written: GARRY says so
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from textwrap import fill
 
@@ -19,6 +20,11 @@ INDENT = "    "
 SUMMARY, REPEATED = "1b", {"masked", "simulated"}  # other things are said once in a list
 BY_HAND = "to be written in the report"
 NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
+SAID_BLINDED = "a marked assessor, or other words: “{said}” is not so, no assessor is marked"
+# Words that say that assessors are blinded, up to three words apart.
+ASSESSOR, BLINDED = r"\b(?:assessor|rater)\w*", r"\b(?:blind|mask)\w*"
+NEAR = r"\W+(?:(?!not\b)\w+\W+){0,3}?"
+SAYS_BLINDED = re.compile(f"{ASSESSOR}{NEAR}{BLINDED}|{BLINDED}{NEAR}{ASSESSOR}", re.IGNORECASE)
 # List; then one line for each item: number | words | what answers it.
 ITEMS = {
     "SPIRIT 2025": """
@@ -170,6 +176,9 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
         Of a closed study; None before.
     """
     answers = know(study, results) | study.facts
+    is_unmasked, said_blinded = UNMASKED in answers["masked"], ""
+    if is_unmasked and _says_blinded([answers.get("blinding", "")]):
+        said_blinded = answers.pop("blinding")  # a report tells one truth: GARRY's
     for name, items in ITEMS.items():
         said: dict[str, str] = {}  # at which item
         for line in items.strip().splitlines():
@@ -180,10 +189,15 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
             if number != SUMMARY:
                 said |= {s: said.get(s, number) for s in known if s not in REPEATED}
             asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
-            lacking = [str(ASKED[slug]) for slug in asked]
+            lacking = [
+                SAID_BLINDED.format(said=said_blinded)
+                if said_blinded and slug == "blinding"
+                else str(ASKED[slug])
+                for slug in asked
+            ]
             if slugs == "-" or not (given or lacking):
                 lacking = [BY_HAND]
-            if "masked" in named and UNMASKED in answers["masked"] and _says_blinded(given):
+            if "masked" in named and is_unmasked and _says_blinded(given):
                 lacking.append(NO_ASSESSOR)
             yield {
                 "list": name,
@@ -195,7 +209,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
 
 
 def _says_blinded(given: Iterable[str]) -> bool:
-    return any("assessor-blind" in one.lower().replace(" ", "-") for one in given)
+    return any(SAYS_BLINDED.search(one) for one in given)
 
 
 def checklist_text(rows: Iterable[dict[str, str]], name: str) -> str:

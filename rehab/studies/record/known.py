@@ -180,7 +180,7 @@ def _conducted(study: Study) -> dict[str, str]:
         "masked": f"Assessor-blinded: {assessors} marked." if assessors else UNMASKED,
         "blinded": "Who is marked as an assessor is kept from sessions, arms and boards by GARRY."
         if assessors
-        else "Nobody is blinded: no assessor is marked.",
+        else "GARRY keeps nothing from anybody: no assessor is marked.",
         "looks_made": f"Looked at results before the end after {', '.join(counts)} participants."
         if counts else "",
         "simulated": _simulated(study),

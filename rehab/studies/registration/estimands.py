@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rehab.studies.analysis.outcomes import OUTCOMES, define_outcomes
+from rehab.studies.models import NOT
 
 SUMMARY = {
     "parallel": "Difference of the arms' means over the visits that all arms have, adjusted for "
@@ -45,7 +46,7 @@ def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
         Of a study's version.
     """
     meanings = {row["outcome"]: row["meaning"] for row in define_outcomes()}
-    people = [*document.get("inclusion", ()), *(f"not: {o}" for o in document.get("exclusion", ()))]
+    people = [*document.get("inclusion", ()), *(f"{NOT}{o}" for o in document.get("exclusion", ()))]
     if months := document["months_since_stroke_at_least"]:
         people.insert(0, f"{months} months or more since the stroke")
     for slug in dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])):

@@ -15,6 +15,7 @@ from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
 from rehab.studies.participants import Allocation, StudyEvent
 from rehab.studies.registration.document import ANALYSIS, describe, digest_of
+from rehab.studies.registration.measurable import check_outcomes
 from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -92,7 +93,7 @@ def register(study: Study, by: User | None, now: datetime) -> StudyVersion:
     Raises
     ------
     InvalidSetting
-        For a study that is no draft, or cannot be run.
+        For a study that is no draft, cannot be run, or could not find one of its outcomes.
     """
     with transaction.atomic():
         lock(study)
@@ -101,6 +102,7 @@ def register(study: Study, by: User | None, now: datetime) -> StudyVersion:
         study.state, study.registered_at = StudyState.REGISTERED, now
         study.commitment = secret.commitment
         version = _add_version(study, by, now)
+        check_outcomes(study)
         study.save(update_fields=["state", "registered_at", "commitment"])
         note(study, Kind.REGISTERED, by, now, about=version.digest)
     return version
@@ -166,8 +168,8 @@ def revise(
     Raises
     ------
     InvalidSetting
-        Without a reason or a change, and for other groups, another ratio or other factors: what was
-        allocated cannot be allocated again.
+        Without a reason or a change, and for an outcome that could not be found, other groups,
+        another ratio or other factors: what was allocated cannot be allocated again.
     """
     with transaction.atomic():
         stored = Study.everywhere.select_for_update(no_key=True).get(pk=study.pk)
@@ -195,6 +197,7 @@ def revise(
                     "chosen later, they could follow the results."
                 )
             )
+        check_outcomes(study)
         study.save(update_fields=REVISABLE)
         version = _add_version(study, by, now, reason.strip(), needs_consent=needs_consent)
         note(study, Kind.REVISED, by, now, about=version.digest, reason=reason.strip())

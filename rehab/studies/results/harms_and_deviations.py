@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.sessions.alarms import UNASKED
 from rehab.sessions.log import EVENTS, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.noted import ABOUT_A_FALL, ADVERSE, read_noted
 from rehab.studies.analysis.participants import Attendance, Participant
 from rehab.studies.models import Study
-from rehab.studies.participants import StudyEvent, StudyVisit
+from rehab.studies.participants import StudyEvent, StudyVisit, counts_people_alone
 from rehab.training.changes import ChangeKind, State
 from rehab.training.controls import CONTROLS
 
@@ -91,10 +92,13 @@ def label_of(what: str) -> str:
 def read_occurrences(study: Study) -> tuple[Occurrence, ...]:
     """Return all that happened in a study, by participant and visit."""
     visits = StudyVisit.everywhere.filter(enrollment__study=study, session__isnull=False)
-    related = ("enrollment__allocation", "session")
+    related = ("enrollment__allocation", "enrollment__patient", "session")
+    of_people = counts_people_alone(study)
     found: list[Occurrence] = []
     for visit in visits.select_related(*related).order_by("enrollment", "number", "attempt"):
         enrollment, session = visit.enrollment, visit.session
+        if of_people and visit.is_simulated:
+            continue
         if enrollment.is_analyzed and session is not None:
             place = (
                 enrollment.code,
@@ -120,8 +124,11 @@ def _of_session(session: TrainingSession, make: Callable[..., Occurrence]) -> It
     for one in read_noted(events.filter(kind__in=(*HARMS, *ABOUT_A_FALL))):
         if one.is_adverse:
             yield make(one.kind.value, one.value if one.severity is None else float(one.severity))
-    for kind, value in events.filter(kind__in=DEVIATIONS).values_list("kind", "value"):
-        yield make(kind, value)
+    for kind, value, data in events.filter(kind__in=DEVIATIONS).values_list(
+        "kind", "value", "data"
+    ):
+        if UNASKED not in data:
+            yield make(kind, value)
     if session.state == State.ABORTED:
         yield make(ENDED_EARLY)
     if session.excluded:

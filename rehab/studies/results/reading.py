@@ -31,7 +31,7 @@ from rehab.studies.analysis.participants import (
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.models import Study
-from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.studies.participants import Enrollment, StudyVisit, counts_people_alone
 from rehab.training.changes import ENDED_STATES, State
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
@@ -117,12 +117,14 @@ def _read_people(
     """Return everybody who was ever taken in, by enrollment; as known where nothing differs."""
     metrics = _sum_metrics(study)
     people = {}
-    for enrollment in study.enrollments.select_related("allocation").order_by("pk"):
+    of_people = counts_people_alone(study)
+    for enrollment in study.enrollments.select_related("allocation", "patient").order_by("pk"):
         visits = latest_attempts(enrollment)
-        key = (_key(enrollment, visits, until), metrics.get(enrollment.pk))
+        out = {visit.pk for visit in visits if _is_excluded(visit, of_people=of_people)}
+        key = (_key(enrollment, visits, until), out, metrics.get(enrollment.pk))
         earlier = known.get(enrollment.pk)
         if earlier is None or earlier[0] != key:
-            earlier = (key, _read(enrollment, visits, until))
+            earlier = (key, _read(enrollment, visits, until, out))
         people[enrollment.pk] = earlier
     return people
 
@@ -161,7 +163,9 @@ def _is_due(visit: StudyVisit, until: date) -> bool:
     return visit.session_id is not None or visit.day <= until
 
 
-def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Participant:
+def _read(
+    enrollment: Enrollment, visits: list[StudyVisit], until: date, excluded: set[int]
+) -> Participant:
     group = enrollment.allocation.group.split("-")
     planned = [
         (
@@ -170,9 +174,9 @@ def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Part
                 group[visit.period],
                 _is_due(visit, until),
                 visit.period,
-                Attendance.EXCLUDED if _is_excluded(enrollment, visit) else Attendance.MISSED,
+                Attendance.EXCLUDED if visit.pk in excluded else Attendance.MISSED,
             ),
-            _walked(enrollment, visit),
+            None if visit.pk in excluded else _walked(enrollment, visit),
         )
         for visit in visits
     ]
@@ -191,10 +195,17 @@ def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
     return list({visit.number: visit for visit in visits.order_by("number", "attempt")}.values())
 
 
-def _is_excluded(enrollment: Enrollment, visit: StudyVisit) -> bool:
-    """Return whether a correction took a visit's session away from the participant."""
+def _is_excluded(visit: StudyVisit, *, of_people: bool) -> bool:
+    """Return whether a correction took a visit's session away, or no person walked it.
+
+    ``of_people``: what `counts_people_alone` returns.
+    """
     session = visit.session
-    return session is not None and (session.excluded or session.patient_id != enrollment.patient_id)
+    return session is not None and (
+        session.excluded
+        or session.patient_id != visit.enrollment.patient_id
+        or (of_people and visit.is_simulated)
+    )
 
 
 def _walked(enrollment: Enrollment, visit: StudyVisit) -> AnalyzedSession | None:
@@ -202,7 +213,7 @@ def _walked(enrollment: Enrollment, visit: StudyVisit) -> AnalyzedSession | None
     session = visit.session
     if session is None or session.state not in ENDED_STATES or not enrollment.is_analyzed:
         return None
-    return None if _is_excluded(enrollment, visit) else read_walked(session)
+    return read_walked(session)
 
 
 def read_walked(session: TrainingSession) -> AnalyzedSession:

@@ -157,6 +157,7 @@ CONTROLS: dict[str, Control] = {
             value_format=ValueFormat.QUANTITY,
             shows_old=True,
             mark=ChartMark("⚑", gettext_noop("goal"), ValueFormat.NUMBER),
+            when_locked=_NOTHING,
         ),
         Control(
             kind=ChangeKind.GOAL_ADAPTATION,

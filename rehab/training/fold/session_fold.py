@@ -284,7 +284,6 @@ class SessionFold:
             For a value out of bounds; likewise.
         """
         control = CONTROLS[change.kind]
-        control.check_lock(self.plan, change.value)
         state = control.next_state(self.state)
         control.put_into_force(self, change.value)
         self.state = state

@@ -80,6 +80,21 @@ async def test_a_robot_that_stopped_by_itself_is_one_and_a_persons_stop_is_none(
     assert not [event for event in tablet.events if event.get("fell")]  # its page stays calm
 
 
+async def test_a_robot_that_is_off_alarms_only_of_what_it_feels(place, sourced):
+    session, _ = await sourced(place, robot_intensity=0.0)
+    robot = await place.robot().open()
+    monitor = await place.monitor(session).open()
+    await robot.say({"type": "report", "report": {"kind": "stop", "reason": "base_silent"}})
+    await monitor.until(lambda event: event.get("stopped") is True)  # it stays stopped
+    assert not any(event.get("alarms") for event in monitor.events)
+    [row] = [row async for row in SessionEvent.everywhere.filter(kind="robot_stop")]
+    assert row.data["unasked"] == "base_silent"
+    await monitor.say({"type": "robot", "order": "arm"})
+    await monitor.until(lambda event: event.get("stopped") is False)
+    await robot.say(BUMPED)
+    await until_open(monitor, "robot_stop")
+
+
 async def test_letting_the_robot_move_acknowledges_its_stop(place, sourced):
     session, _ = await sourced(place)
     robot = await place.robot().open()

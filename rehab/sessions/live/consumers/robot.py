@@ -10,6 +10,7 @@ from channels.db import database_sync_to_async
 from django.db import DatabaseError
 from django.utils import timezone
 
+from rehab.sessions.alarms import UNASKED
 from rehab.sessions.incidents import store_incident
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.protocol.fields import read_fields
@@ -30,6 +31,8 @@ from robot.wire.incident import MOTION
 log = logging.getLogger(__name__)
 
 MAX_REPORT_CHARS = 8 * 1024
+# What a robot that is off may feel all the same, and a person has to look at.
+FELT = frozenset({"bump", "cliff", "wheel_drop", "unordered_motion"})
 INCIDENTS_WAITING = 4  # of one robot, for the disk
 
 
@@ -92,7 +95,9 @@ class RobotConsumer(DeviceSocket):
         if self.live is None:
             return
         if report.get("kind") == "stop":  # a sensor or its button: a person has to check it
-            details = {"device": self.device_id, "reason": report["reason"]}
+            is_alarm = describe_cue(self.live.aggregate.fold)["intensity"] > 0
+            why = "reason" if is_alarm or report["reason"] in FELT else UNASKED
+            details = {"device": self.device_id, why: report["reason"]}
             self.runtime.robots.stop(self.live, None, details)
         else:
             self.live.robot_orders.record_report(report, timezone.now())
