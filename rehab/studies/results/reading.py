@@ -222,8 +222,8 @@ def _read(
 
 def _first_began(enrollment: Enrollment) -> datetime | None:
     """Return when the first session began, also one that was broken off; None before it."""
-    began = (visit.session.began_at for visit in enrollment.visits.exclude(session=None))
-    return min(began, default=None)
+    visits = enrollment.visits.select_related("session").defer(*UNREAD)
+    return min((one.session.began_at for one in visits if one.session), default=None)
 
 
 def _days_of(visits: list[StudyVisit]) -> list[Day]:
