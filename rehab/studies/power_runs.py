@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.people.scope import Scope, ScopedModel
+from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
 from rehab.studies.analysis.outcomes import LOWER_IS_BETTER
 from rehab.studies.models import Study
 from rehab.studies.simulation.power import PairPower, SimulatedDifference, simulate_from, summarize
@@ -110,6 +111,13 @@ def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
     InvalidSetting
         For a study without an effect, or one that cannot be simulated.
     """
+    if study.primary_outcome in CLINICAL_OUTCOMES:
+        raise InvalidSetting(
+            gettext(
+                "Simulated people take no clinical tests. Choose a primary outcome of the strides "
+                "to simulate; plan this one by its SD between people."
+            )
+        )
     arms = list(study.arms.select_related("protocol", "measure"))
     groups = study.groups()
     plan = walkable(

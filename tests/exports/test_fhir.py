@@ -19,6 +19,10 @@ from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
 from rehab.people.sign_in.step_up import CONFIRMED_AT
+from rehab.studies.participants import Enrollment
+from rehab.studies.record.adverse_events import AdverseEvent
+from rehab.studies.registration.lifecycle import close
+from rehab.studies.unblinding import Task, give_mark
 from tests.support.clock import START as NOW
 from tests.support.programs import ROOT, program_of
 from tests.support.studies import enrolled, new_patient, running_study
@@ -26,7 +30,10 @@ from tests.support.walks import walk
 from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
-KINDS = ("Patient", "Encounter", "Observation", "QuestionnaireResponse", "Provenance", "Device")
+KINDS = (
+    *("Patient", "Encounter", "Observation", "QuestionnaireResponse", "Provenance", "Device"),
+    *("ResearchStudy", "ResearchSubject", "AdverseEvent", "Goal"),
+)
 
 
 def read(world, path, role=Role.PT):
@@ -58,6 +65,46 @@ def test_its_abilities_are_stated(world):
     statement = pytest.importorskip("fhir.resources.R4B.capabilitystatement").CapabilityStatement
     told = statement.model_validate_json(read(world, "metadata").content)
     assert {one.type for one in told.rest[0].resource} == set(KINDS)
+
+
+def test_no_arm_is_told_before_the_study_is_closed_and_an_assessor_reads_no_event(world):
+    study = running_study(world)
+    enrollment = enrolled(study, new_patient(world))
+    told = AdverseEvent.everywhere.create(
+        enrollment=enrollment, what="fell over", grade=4, relation="none"
+    )
+    mine = f"patient={enrollment.patient_id}"
+    subject = f"ResearchSubject/subject-{enrollment.pk}"
+
+    def all_of_it(role=Role.PT):
+        of_study = json.loads(read(world, f"ResearchStudy/study-{study.pk}", role).content)
+        found = [json.loads(read(world, subject, role).content), of_study]
+        return [*found, *resources(read(world, f"AdverseEvent?patient=patient-{mine[8:]}", role))]
+
+    one, of_study, event = all_of_it()
+    assert (one["status"], of_study["status"]) == ("on-study", "active")
+    assert (event["id"], event["event"]) == (f"event-{told.pk}", {"text": "fell over"})
+    assert event["seriousness"]["coding"][0]["code"] == "serious"
+    assert not {"assignedArm", "arm"} & {*one, *of_study}
+    give_mark(study, world.people[Role.PT], Task.ASSESSOR, None, NOW)
+    assert [one["resourceType"] for one in all_of_it()] == ["ResearchSubject", "ResearchStudy"]
+    close(study, None, NOW)
+    one, of_study, event = all_of_it()
+    assert one["assignedArm"] == enrollment.allocation.group
+    assert [arm["name"] for arm in of_study["arm"]] == ["A", "B"]
+    assert event["event"]["text"] == f"fell over ({enrollment.allocation.group})"
+
+
+def test_a_patients_own_goal_and_the_set_one_are_goals(world):
+    type(world.patient).everywhere.filter(pk=world.patient.pk).update(own_goal="To the bakery")
+    session = walk(world.patient, "binary", [4.0] * 4)
+    goals = resources(read(world, f"Goal?patient=patient-{world.patient.pk}"))
+    texts = {one["id"]: one for one in goals}
+    own = texts[f"goal-{world.patient.pk}"]
+    assert own["description"] == {"text": "To the bakery"}
+    (target,) = texts[f"goal-{world.patient.pk}-{session.pk}"]["target"]
+    assert target["detailQuantity"]["value"] == session.goal
+    assert target["detailQuantity"]["code"] == "W/kg"
 
 
 def test_a_hospital_finds_its_patient_by_code_and_what_was_walked(world):
@@ -106,6 +153,9 @@ def test_nothing_of_another_clinic_is_read_searched_or_exported(world):
         "Encounter": f"session-{session}",
         "Observation": f"figure-{session}-score",
         "Provenance": f"provenance-{session}",
+        "Goal": f"goal-{patient}-{session}",
+        "ResearchSubject": f"subject-{Enrollment.everywhere.get(patient=patient).pk}",
+        "AdverseEvent": f"event-{AdverseEvent.everywhere.get(enrollment__patient=patient).pk}",
     }
     for kind, name in names.items():
         assert read(world, f"{kind}/{name}").status_code == 200

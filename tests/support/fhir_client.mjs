@@ -30,7 +30,7 @@ const abilities = await client.capabilityStatement();
 check(abilities);
 await search("Patient", {});
 const patient = found.Patient[0].id;
-for (const type of ["Encounter", "Observation", "QuestionnaireResponse", "Provenance"]) {
+for (const type of ["Encounter", "Observation", "QuestionnaireResponse", "Provenance", "Goal"]) {
     await search(type, { patient: `Patient/${patient}`, _count: 1 });
 }
 await search("Device", {});

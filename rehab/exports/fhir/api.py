@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -22,6 +23,13 @@ from rehab.exports.fhir.resources import (
     make_device,
     session_resources,
 )
+from rehab.exports.fhir.study_resources import (
+    make_event,
+    make_goals,
+    make_patient,
+    make_study,
+    make_subject,
+)
 from rehab.people.access import for_roles
 from rehab.people.audit.audit_log import Act, record
 from rehab.people.consent.services import is_care_allowed
@@ -30,9 +38,26 @@ from rehab.people.networks import client_address
 from rehab.people.roles import PATIENT_EXPORTERS
 from rehab.people.web.api_base import AwareDatetime, TextLine, caller, responses
 from rehab.sessions.models import TrainingSession
+from rehab.studies.models import Study, StudyState
+from rehab.studies.participants import Enrollment
+from rehab.studies.record.adverse_events import AdverseEvent, Grade
 from rehab.training.changes import ENDED_STATES
 
-TYPES = ("Patient", "Encounter", "Observation", "QuestionnaireResponse", "Provenance", "Device")
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Resources that are no session's: of which rows, and how they are made.
+
+    ``patient`` leads from a row to its patient, ``since`` to its moment; "" where neither is.
+    """
+
+    find: Callable[[User], QuerySet[Any]]
+    make: Callable[[User, Any, HospitalNames], Iterator[tuple[str, Resource]]]
+    word: str
+    patient: str
+    since: str
+
+
 NAMES = HospitalNames()
 JSON, NDJSON = "application/fhir+json", "application/fhir+ndjson"
 router = Router(tags=["FHIR R4"])
@@ -67,6 +92,41 @@ def _sessions(user: User) -> QuerySet[TrainingSession]:
     return rows.select_related("patient__clinic", "measure").order_by("pk")
 
 
+def _studies(user: User) -> QuerySet[Study]:
+    return Study.objects.visible_to(user).exclude(state=StudyState.DRAFT).order_by("pk")
+
+
+def _subjects(user: User) -> QuerySet[Enrollment]:
+    related = ("study", "patient__clinic", "allocation")
+    return Enrollment.objects.visible_to(user).select_related(*related).order_by("pk")
+
+
+def _events(user: User) -> QuerySet[AdverseEvent]:
+    rows = AdverseEvent.objects.visible_to(user).filter(grade__gt=Grade.NONE)
+    related = ("enrollment__study", "enrollment__allocation", "enrollment__patient__clinic")
+    return rows.select_related(*related, "entry__session__study_visit").order_by("pk")
+
+
+ROWS = {
+    "Patient": Rows(_patients, make_patient, "patient", "pk", "created_at"),
+    "ResearchStudy": Rows(_studies, make_study, "study", "", ""),
+    "ResearchSubject": Rows(_subjects, make_subject, "subject", "patient", "enrolled_at"),
+    "AdverseEvent": Rows(_events, make_event, "event", "enrollment__patient", "at"),
+    "Goal": Rows(_patients, make_goals, "goal", "pk", "created_at"),
+}
+TYPES = ("Encounter", "Observation", "QuestionnaireResponse", "Provenance", "Device", *ROWS)
+
+
+def _of_row(user: User, row: Any, kind: str) -> Iterator[Resource]:
+    """Yield the resources of a row; none without the patient's consent to care."""
+    patient = row
+    for name in filter(None, ROWS[kind].patient.replace("pk", "").split("__")):
+        patient = getattr(patient, name)
+    if not isinstance(patient, Patient) or is_care_allowed(patient):
+        for address, resource in ROWS[kind].make(user, row, NAMES):
+            yield _with_id(address, resource)
+
+
 def _with_id(address: str, resource: Resource) -> Resource:
     return resource | {"id": address.partition("/")[2]}
 
@@ -83,9 +143,9 @@ def _find(user: User, kind: str, name: str) -> Resource:
     """Return a resource by its id. Raises Http404."""
     if kind == "Device":
         found = [_with_id(*make_device(NAMES))]
-    elif kind == "Patient":
-        rows = _patients(user).filter(pk=_key_of(name, "patient"))
-        found = [_with_id(*NAMES.patient(one)) for one in rows if is_care_allowed(one)]
+    elif kind in ROWS:
+        rows_of_kind = ROWS[kind].find(user).filter(pk=_key_of(name, ROWS[kind].word))
+        found = [one for row in rows_of_kind for one in _of_row(user, row, kind)]
     else:
         key = _key_of(name, "session figure test answers provenance")
         rows_of = _sessions(user).filter(pk=key)
@@ -101,15 +161,18 @@ def _search(user: User, kind: str, wanted: Search) -> tuple[list[Resource], bool
     part = slice(wanted.offset, wanted.offset + wanted.count + 1)
     if kind == "Device":
         return [_with_id(*make_device(NAMES))][part], False
-    if kind == "Patient":
-        patients = _patients(user)
-        if wanted.identifier is not None:
+    if kind in ROWS:
+        rows = ROWS[kind].find(user)
+        if wanted.patient is not None:
+            key = {ROWS[kind].patient: _key_of(wanted.patient, "patient")}
+            rows = rows.filter(**key) if ROWS[kind].patient else rows.none()
+        if kind == "Patient" and wanted.identifier is not None:
             system, _, code = wanted.identifier.rpartition("|")
             known = system in ("", f"{SYSTEM}:code", settings.SMART_IDENTIFIER)
-            patients = patients.filter(code=code) if known else patients.none()
-        few = list(patients[part])
-        allowed = [one for one in few[: wanted.count] if is_care_allowed(one)]
-        return [_with_id(*NAMES.patient(one)) for one in allowed], len(few) > wanted.count
+            rows = rows.filter(code=code) if known else rows.none()
+        few = list(rows[part])
+        made = [one for row in few[: wanted.count] for one in _of_row(user, row, kind)]
+        return made, len(few) > wanted.count
     sessions = _sessions(user)
     if wanted.patient is not None:
         sessions = sessions.filter(patient=_key_of(wanted.patient, "patient"))
@@ -159,11 +222,21 @@ def _add_calls(kind: str) -> None:
     search.__doc__, read.__doc__ = f"Search {kind} resources.", f"Read one {kind}."
 
 
+PARAMETERS = {"identifier": "token", "patient": "reference", "encounter": "reference"}
+
+
+def _asked_by(kind: str) -> list[str]:
+    """Return by what resources of a type are searched."""
+    if kind in ROWS:
+        is_named = {"identifier": kind == "Patient", "patient": bool(ROWS[kind].patient)}
+        return [name for name, is_one in is_named.items() if is_one]
+    return ["patient", "encounter"] if kind != "Device" else []
+
+
 @router.get("/fhir/metadata", response=responses(dict))
 @for_roles(*PATIENT_EXPORTERS, patients=False)
 def show_capabilities(request: HttpRequest) -> HttpResponse:
     """Show what this FHIR server can do: its CapabilityStatement."""
-    texts = {"patient": "reference", "encounter": "reference"}
     return _answer(
         {
             "resourceType": "CapabilityStatement",
@@ -185,11 +258,7 @@ def show_capabilities(request: HttpRequest) -> HttpResponse:
                             "type": kind,
                             "interaction": [{"code": "read"}, {"code": "search-type"}],
                             "searchParam": [
-                                {"name": name, "type": type_}
-                                for name, type_ in (
-                                    {"identifier": "token"} if kind == "Patient" else texts
-                                ).items()
-                                if kind != "Device"
+                                {"name": name, "type": PARAMETERS[name]} for name in _asked_by(kind)
                             ],
                         }
                         for kind in TYPES
@@ -255,10 +324,10 @@ def read_bulk(request: HttpRequest, fhir_type: Path[str], wanted: Query[Before])
 def _all(user: User, kind: str, before: datetime) -> Iterator[Resource]:
     if kind == "Device":
         yield _with_id(*make_device(NAMES))
-    elif kind == "Patient":
-        for patient in _patients(user).filter(created_at__lte=before).iterator():
-            if is_care_allowed(patient):
-                yield _with_id(*NAMES.patient(patient))
+    elif kind in ROWS:
+        until = {f"{ROWS[kind].since}__lte": before} if ROWS[kind].since else {}
+        for row in ROWS[kind].find(user).filter(**until).iterator():
+            yield from _of_row(user, row, kind)
     else:
         for session in _sessions(user).filter(ended_at__lte=before).iterator():
             yield from _of_session(user, session, kind)

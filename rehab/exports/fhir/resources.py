@@ -99,7 +99,7 @@ def make_bundle(user: User, session: TrainingSession, names: Names) -> Resource:
     return {
         "resourceType": "Bundle",
         "type": "collection",
-        "timestamp": _at(session.began_at + names.shift),
+        "timestamp": format_moment(session.began_at + names.shift),
         "entry": [
             {"fullUrl": address, "resource": resource}
             for address, resource in session_resources(user, session, names)
@@ -129,8 +129,8 @@ def session_resources(
     user: User, session: TrainingSession, names: Names
 ) -> Iterator[tuple[str, Resource]]:
     """Yield the resources of a session that a user may see, each with its address."""
-    shift, began = names.shift, _at(session.began_at + names.shift)
-    ended = {} if session.ended_at is None else {"end": _at(session.ended_at + shift)}
+    shift, began = names.shift, format_moment(session.began_at + names.shift)
+    ended = {} if session.ended_at is None else {"end": format_moment(session.ended_at + shift)}
     patient, about = names.patient(session.patient)
     device, garry = make_device(names)
     encounter = names.address("Encounter", "session", session.pk)
@@ -162,7 +162,8 @@ def session_resources(
         loinc = [{"system": LOINC, "code": test.loinc}] if test.loinc else []
         coded = {"coding": [*loinc, own], "text": test.label}
         address = names.address("Observation", "test", session.pk, row.pk)
-        yield address, _observe(coded, _at(row.at + shift), row.value, test.unit) | of
+        yield address, _observe(coded, format_moment(row.at + shift), row.value, test.unit) | of
+    yield from set_goal(session, names)
     for answers in QuestionnaireResponse.objects.visible_to(user).filter(session=session):
         address = names.address("QuestionnaireResponse", "answers", session.pk, answers.pk)
         yield address, _answers(answers, shift) | of
@@ -173,6 +174,26 @@ def session_resources(
             "target": [{"reference": encounter}],
             "recorded": ended.get("end", began),
             "agent": [{"who": {"reference": device}}, *_plugins(user, session)],
+        },
+    )
+
+
+def set_goal(session: TrainingSession, names: Names) -> Iterator[tuple[str, Resource]]:
+    """Yield the goal that a session ended with; none of one without a goal."""
+    if session.goal is None:
+        return
+    measure = session.measure
+    code = {"system": f"{SYSTEM}:measure", "code": measure.slug, "display": measure.name}
+    reached = {"value": session.goal, **_unit(measure.unit)}
+    yield (
+        names.address("Goal", "goal", session.patient_id, session.pk),
+        {
+            "resourceType": "Goal",
+            "lifecycleStatus": "completed",
+            "description": {"text": f"{measure.name} in training"},
+            "subject": {"reference": names.patient(session.patient)[0]},
+            "startDate": (session.began_at + names.shift).date().isoformat(),
+            "target": [{"measure": {"coding": [code]}, "detailQuantity": reached}],
         },
     )
 
@@ -222,7 +243,7 @@ def _answers(row: QuestionnaireResponse, shift: timedelta) -> dict[str, Any]:
         "resourceType": "QuestionnaireResponse",
         "questionnaire": f"{SYSTEM}:questionnaire:{row.slug}",
         "status": "completed" if row.finished_at else "in-progress",
-        "authored": _at((row.finished_at or row.asked_at) + shift),
+        "authored": format_moment((row.finished_at or row.asked_at) + shift),
         "item": items,
     }
 
@@ -234,5 +255,6 @@ def _unit(unit: str) -> dict[str, str]:
     return {"unit": unit or "1", "system": UCUM, "code": code}
 
 
-def _at(moment: datetime) -> str:
+def format_moment(moment: datetime) -> str:
+    """Return a moment as FHIR writes it."""
     return moment.isoformat(timespec="seconds")

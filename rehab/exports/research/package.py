@@ -21,7 +21,9 @@ from rehab.exports.archive import write_csv
 from rehab.exports.fhir.resources import garry_version
 from rehab.exports.patient_data import README_TEXT
 from rehab.exports.research.bids import dataset_files
+from rehab.exports.research.jamovi import write_omv
 from rehab.exports.research.k_anonymity import write_anonymity
+from rehab.exports.research.redcap import COLUMNS, read_rows, redcap_files
 from rehab.exports.research.ro_crate import write_crate
 from rehab.exports.research.session_files import ABOUT, KINDS, write_part
 from rehab.exports.research.sinks import FORMATS, available_formats
@@ -195,6 +197,8 @@ class Package:
         yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
         for table in TABLES:
             yield table.file, _concatenate(table.header, [part / table.file for part in parts])
+        yield from redcap_files(read_rows(parts))
+        yield "jamovi/sessions.omv", [write_omv(COLUMNS, list(read_rows(parts)))]
         for study in studies:
             yield from study_files(self.user, study, self.made_at, shift_dates=self.shift_dates)
         for name, text in dataset_files(people.values(), garry_version()) if people else ():
@@ -230,6 +234,7 @@ class Package:
             "ever allocated, what each outcome means; of closed ones the results' tables, the "
             "seed, verify_allocation.py, which allocates again, reanalyze.py and .R, which "
             "redo the results. checklists.csv: SPIRIT, CONSORT, TIDieR, WHO.\n"
+            "redcap/: sessions and visits as a data dictionary and an import; jamovi/: the same.\n"
             "k_anonymity.csv: how many people are alike. ro-crate-metadata.json: RO-Crate 1.1.\n"
             "Sessions of people who left a study and wanted their data removed are not here.\n\n"
             f"{README_TEXT % {'version': RULES_VERSION}}"

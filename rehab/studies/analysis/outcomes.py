@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rehab.studies.analysis import walk_figures as figures
+from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
 from rehab.studies.analysis.walk_figures import ENDS, FIRST_AFTER, SUCCESS, WINDOW, History
 from rehab.studies.analysis.walks import Walk
 from rehab.training.summary.metrics import METRICS
@@ -180,7 +181,7 @@ OF_SESSIONS = {
     for metric in METRICS.values()
     if metric.unit not in {"days", "sessions"} and metric.slug not in NOT_COMPARED
 }
-# How each of them is computed, with the visit's own baseline.
+# How each outcome is computed; of sessions, with the visit's own baseline.
 MEANINGS = {
     "score": "Points of the session; none where the feedback type has no points.",
     "hit_rate": "Hits / judged strides with feedback.",
@@ -191,22 +192,23 @@ MEANINGS = {
     f"baseline, in percent of {OWN}.",
     "steps": "Judged strides with feedback.",
     "active_minutes": "Time that was walked.",
-}
+} | {slug: one.meaning for slug, one in (OF_STRIDES | CLINICAL_OUTCOMES).items()}
 LOWER_IS_BETTER = frozenset(
     {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"}
+    | {slug for slug, one in CLINICAL_OUTCOMES.items() if not one.test.higher_is_better}
 )
 BOUNDS = {"hit_rate": (0.0, 1.0), "invalid_strides": (0.0, 100.0)}  # where intervals are cut
 # Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
-    slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()
+    slug: (one.label, one.unit)
+    for slug, one in (OF_SESSIONS | OF_STRIDES | CLINICAL_OUTCOMES).items()
 }
 
 
 def define_outcomes() -> list[dict[str, str]]:
     """Return name, unit and meaning of every outcome that may be registered."""
-    meanings = MEANINGS | {one.slug: one.meaning for one in OF_STRIDES.values()}
     return [
-        {"outcome": slug, "label": label, "unit": unit, "meaning": meanings[slug]}
+        {"outcome": slug, "label": label, "unit": unit, "meaning": MEANINGS[slug]}
         for slug, (label, unit) in OUTCOMES.items()
     ]
 
@@ -215,7 +217,7 @@ def scale_of(slug: str) -> str:
     """Return the unit of an outcome or a further channel with what it is a percentage of."""
     if slug not in OUTCOMES:
         return f"% of {OWN}"
-    meaning = MEANINGS[slug] if slug in MEANINGS else OF_STRIDES[slug].meaning
+    meaning = MEANINGS[slug]
     of = (OWN in meaning and OWN) or (FIRST in meaning and FIRST.removeprefix("in percent of "))
     return f"% of {of}" if of else OUTCOMES[slug][1]
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
+from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import compute_outcomes
@@ -42,7 +43,7 @@ class ParticipantVisit:
     attendance
         What became of it.
     outcomes
-        By slug; empty where it was not walked or does not count.
+        By slug; where it was not walked or does not count, of clinical tests alone.
     phases, planned
         Figures of each phase that was walked, as `describe_phases` returns them; how many phases
         the session had.
@@ -59,8 +60,8 @@ class ParticipantVisit:
 
     @property
     def is_walked(self) -> bool:
-        """Whether it gave anything."""
-        return bool(self.outcomes)
+        """Whether it gave anything beside clinical tests."""
+        return bool(self.outcomes.keys() - CLINICAL_OUTCOMES.keys())
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,8 @@ class Participant:
         Mean of the first session's baseline, None of too few valid strides; what it is a mean of.
     levels
         Of the factors that the allocation balances.
+    clinical_baselines
+        The first baselines of clinical tests, by the outcome's slug.
     """
 
     code: str
@@ -89,6 +92,7 @@ class Participant:
     baseline: float | None = None
     measure: str = ""
     levels: tuple[str, ...] = ()
+    clinical_baselines: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -103,10 +107,12 @@ class Participant:
 
     def observe(self, slug: str) -> Iterator[Observation]:
         """Yield an outcome of each visit that was due, also where it is missing."""
+        is_test = slug in CLINICAL_OUTCOMES
+        baseline = self.clinical_baselines.get(slug) if is_test else self.baseline
         for visit in self.visits if self.is_analyzed else ():
             if visit.is_due:
                 value = visit.outcomes.get(slug)
-                of_person = self.baseline, visit.period, self.levels
+                of_person = baseline, visit.period, self.levels
                 yield Observation(self.code, visit.arm, visit.number, value, *of_person)
 
 
@@ -127,6 +133,7 @@ def make_participant(
     has_left: bool = False,
     is_analyzed: bool = True,
     levels: Sequence[str] = (),
+    clinical_baselines: Mapping[str, float] | None = None,
 ) -> Participant:
     """Return a participant from the planned visits and what was walked of them.
 
@@ -135,11 +142,14 @@ def make_participant(
     code
         By which results name the participant.
     planned
-        The visits in their order, each with its session; None where none counts.
+        The visits in their order with the outcomes of clinical tests, each with its session; None
+        where none counts.
     has_left, is_analyzed
         Whether the participant withdrew; whether the sessions count in the results.
     levels
         Of the factors that the allocation balances.
+    clinical_baselines
+        Of clinical tests, by the outcome's slug.
     """
     visits: list[ParticipantVisit] = []
     walks: dict[str, list[Walk | None]] = {}
@@ -153,7 +163,7 @@ def make_participant(
         first = first or walked
         channels = channel_changes(walked.walk)
         history = History(before, first.walk.baseline)
-        outcomes = compute_outcomes(walked.walk, history, walked.metrics)
+        outcomes = visit.outcomes | compute_outcomes(walked.walk, history, walked.metrics)
         outcomes |= {f"{CHANNEL}{name}": value for name, value in channels.items()}
         visits.append(
             replace(
@@ -168,7 +178,7 @@ def make_participant(
         before = walked.walk
     curves = {arm: curve_of(of_arm) for arm, of_arm in walks.items()}
     baseline, measure = (first.walk.baseline, first.measure) if first else (None, "")
-    about = curves, baseline, measure, tuple(levels)
+    about = curves, baseline, measure, tuple(levels), clinical_baselines or {}
     return Participant(code, tuple(visits), has_left, is_analyzed, *about)
 
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 from django.core.validators import RegexValidator
 from django.db import models
 from django.utils import timezone
+from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import ACCOUNT_DELETED, AppendOnlyModel
@@ -18,9 +19,14 @@ from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
 from rehab.studies.analysis import outcomes
+from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
 from rehab.studies.arms import EARLY_MONTHS, ArmRule, check_arms, check_channels
 
-OUTCOMES = [(slug, _(label)) for slug, (label, _unit) in outcomes.OUTCOMES.items()]
+OUTCOMES = [
+    (slug, format_lazy("{}, {}", _(of_test.test.label), _(of_test.window)) if of_test else _(label))
+    for slug, (label, _unit) in outcomes.OUTCOMES.items()
+    for of_test in [CLINICAL_OUTCOMES.get(slug)]
+]
 NOT = "not: "  # begins a criterion of exclusion among those that have to hold
 SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
 SPENDINGS = {

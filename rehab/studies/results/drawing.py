@@ -9,13 +9,14 @@ from typing import Any
 from django.utils.translation import gettext, ngettext
 
 from rehab.people.web.csv_tables import CsvWriter
-from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.outcomes import OUTCOMES as DEFINED
 from rehab.studies.analysis.participants import CHANNEL, by_arm
 from rehab.studies.figures.flow import Box, draw_flow
 from rehab.studies.figures.forest import ForestRow, draw_forest
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
 from rehab.studies.guesses import guess_rows
+from rehab.studies.models import OUTCOMES
 from rehab.studies.results.results import Results
 from rehab.studies.results.tables import (
     carry_over_rows,
@@ -38,12 +39,12 @@ def outcome_label(slug: str) -> str:
     """Return an outcome's name, translated; a further channel's is its own."""
     if slug.startswith(CHANNEL):
         return slug.removeprefix(CHANNEL)
-    return gettext(OUTCOMES[slug][0])
+    return str(dict(OUTCOMES)[slug])
 
 
 def outcome_unit(slug: str) -> str:
     """Return an outcome's unit, translated; "" for ratios."""
-    unit = "%" if slug.startswith(CHANNEL) else OUTCOMES[slug][1]
+    unit = "%" if slug.startswith(CHANNEL) else DEFINED[slug][1]
     return gettext(unit) if unit else ""
 
 

@@ -9,16 +9,26 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, datetime
 from functools import cached_property
 from threading import Lock
 from typing import Any
 
-from django.db.models import Count, Sum
+from django.db.models import Count, F, Q, Sum
 
+from rehab.sessions.assessments import Assessment
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
+from rehab.studies.analysis.clinical_outcomes import (
+    AFTER,
+    FOLLOW_UP,
+    ClinicalResult,
+    Day,
+    clinical_baselines,
+    clinical_changes,
+)
 from rehab.studies.analysis.curves import Point
 from rehab.studies.analysis.findings import Departure, OutcomeResult, find
 from rehab.studies.analysis.participants import (
@@ -30,7 +40,7 @@ from rehab.studies.analysis.participants import (
     make_participant,
 )
 from rehab.studies.analysis.walks import COLUMNS, read_walk
-from rehab.studies.models import Study
+from rehab.studies.models import Study, StudyMark
 from rehab.studies.participants import Enrollment, StudyVisit, counts_people_alone
 from rehab.training.changes import ENDED_STATES, State
 from rehab.training.fold import SessionFold
@@ -115,16 +125,17 @@ def _read_people(
     study: Study, until: date, known: Mapping[int, tuple[Any, Participant]]
 ) -> dict[int, tuple[Any, Participant]]:
     """Return everybody who was ever taken in, by enrollment; as known where nothing differs."""
-    metrics = _sum_metrics(study)
+    metrics, tests = _sum_metrics(study), _read_tests(study)
     people = {}
     of_people = counts_people_alone(study)
     for enrollment in study.enrollments.select_related("allocation", "patient").order_by("pk"):
         visits = latest_attempts(enrollment)
         out = {visit.pk for visit in visits if _is_excluded(visit, of_people=of_people)}
-        key = (_key(enrollment, visits, until), out, metrics.get(enrollment.pk))
+        taken = tests.get(enrollment.patient_id, ())
+        key = (_key(enrollment, visits, until), out, metrics.get(enrollment.pk), taken)
         earlier = known.get(enrollment.pk)
         if earlier is None or earlier[0] != key:
-            earlier = (key, _read(enrollment, visits, until, out))
+            earlier = (key, _read(enrollment, visits, until, out, taken))
         people[enrollment.pk] = earlier
     return people
 
@@ -135,6 +146,24 @@ def _sum_metrics(study: Study) -> dict[int, tuple[int, float]]:
     rows = SessionMetric.everywhere.filter(**{f"{of_whom}__study": study}).order_by()
     sums = rows.values_list(of_whom).annotate(Count("pk"), Sum("value"))
     return {enrollment: (count, total) for enrollment, count, total in sums}
+
+
+def _read_tests(study: Study) -> dict[int, tuple[ClinicalResult, ...]]:
+    """Return the results that assessors recorded while they had the mark, by patient."""
+    mark = "by__study_marks"
+    rows = Assessment.everywhere.filter(
+        Q(**{f"{mark}__ended_at": None}) | Q(**{f"{mark}__ended_at__gt": F("at")}),
+        patient__enrollments__study=study,
+        struck_at=None,
+        **{f"{mark}__study": study, f"{mark}__task": StudyMark.Task.ASSESSOR},
+        **{f"{mark}__at__lte": F("at")},
+    )
+    found: dict[int, tuple[ClinicalResult, ...]] = {}
+    columns = ("patient", "test", "at", "value")
+    for patient, test, at, value in rows.order_by("at", "pk").values_list(*columns):
+        day = clinic_time(at, study.clinic).date()
+        found[patient] = (*found.get(patient, ()), ClinicalResult(test, at, day, value))
+    return found
 
 
 def _key(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> tuple[Any, ...]:
@@ -164,9 +193,15 @@ def _is_due(visit: StudyVisit, until: date) -> bool:
 
 
 def _read(
-    enrollment: Enrollment, visits: list[StudyVisit], until: date, excluded: set[int]
+    enrollment: Enrollment,
+    visits: list[StudyVisit],
+    until: date,
+    excluded: set[int],
+    taken: tuple[ClinicalResult, ...],
 ) -> Participant:
     group = enrollment.allocation.group.split("-")
+    first = _first_began(enrollment) if taken else None
+    changes = clinical_changes(taken, first, _days_of(visits)) if first else [{} for _ in visits]
     planned = [
         (
             ParticipantVisit(
@@ -175,10 +210,11 @@ def _read(
                 _is_due(visit, until),
                 visit.period,
                 Attendance.EXCLUDED if visit.pk in excluded else Attendance.MISSED,
+                of_tests,
             ),
             None if visit.pk in excluded else _walked(enrollment, visit),
         )
-        for visit in visits
+        for visit, of_tests in zip(visits, changes, strict=True)
     ]
     return make_participant(
         enrollment.code,
@@ -186,7 +222,29 @@ def _read(
         has_left=enrollment.withdrawn_at is not None,
         is_analyzed=enrollment.is_analyzed,
         levels=enrollment.levels,
+        clinical_baselines=clinical_baselines(taken, first) if first else {},
     )
+
+
+def _first_began(enrollment: Enrollment) -> datetime | None:
+    """Return when the first session began, also one that was broken off; None before it."""
+    visits = enrollment.visits.select_related("session").defer(*UNREAD)
+    return min((one.session.began_at for one in visits if one.session), default=None)
+
+
+def _days_of(visits: list[StudyVisit]) -> list[Day]:
+    """Return when visits were, or were to be, each with its window."""
+    days = []
+    for visit, after in zip(visits, [*visits[1:], None], strict=True):
+        session = visit.session
+        day = (
+            visit.day
+            if session is None
+            else (clinic_time(session.began_at, visit.enrollment.clinic).date())
+        )
+        is_last = after is None or after.follow_up or after.period != visit.period
+        days.append(Day(day, FOLLOW_UP if visit.follow_up else AFTER if is_last else None))
+    return days
 
 
 def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:

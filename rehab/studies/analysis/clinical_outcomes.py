@@ -1,0 +1,132 @@
+"""Clinical tests as outcomes: each result's change since the first baseline, in its window.
+
+Whoever takes a test must not know the arm, and so cannot choose what it is of: the day decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+
+from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
+from robot.marking import gettext_noop
+
+# Ours: a result tells of a visit for so many days after it, a baseline for so many before.
+DAYS_AFTER, DAYS_BEFORE = 7, 14
+AFTER, FOLLOW_UP = gettext_noop("after training"), gettext_noop("at the follow-up")
+VISITS = {AFTER: "the last training visit of an arm", FOLLOW_UP: "the follow-up"}
+SLUGS = {AFTER: "after", FOLLOW_UP: "follow_up"}
+
+
+@dataclass(frozen=True, slots=True)
+class ClinicalOutcome:
+    """A clinical test in a window: ``AFTER`` or ``FOLLOW_UP``."""
+
+    test: ClinicalTest
+    window: str
+
+    @property
+    def slug(self) -> str:
+        """The outcome's, for programs."""
+        return f"{self.test.slug}_{SLUGS[self.window]}"
+
+    @property
+    def label(self) -> str:
+        """The outcome's, for people."""
+        return f"{self.test.label}, {self.window}"
+
+    @property
+    def unit(self) -> str:
+        """Of the change."""
+        return self.test.unit or "points"
+
+    @property
+    def meaning(self) -> str:
+        """How it is computed, and which way is better."""
+        better = "higher" if self.test.higher_is_better else "lower"
+        return (
+            f"Last result of an assessor of the study from the day of {VISITS[self.window]} to "
+            f"{DAYS_AFTER} days later (at the first visit, from the session's begin), before the "
+            f"next visit's day, less the last one of the {DAYS_BEFORE} days before the first "
+            f"session began; {better} is better."
+        )
+
+
+CLINICAL_OUTCOMES = {
+    one.slug: one
+    for one in (ClinicalOutcome(t, window) for t in CLINICAL_TESTS.values() for window in SLUGS)
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ClinicalResult:
+    """A result: of which test, when, on which day by the clinic's clock."""
+
+    test: str
+    at: datetime
+    day: date
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Day:
+    """A visit's day; ``window`` is None of a visit after which its arm's training goes on."""
+
+    day: date
+    window: str | None
+
+
+def clinical_baselines(results: Iterable[ClinicalResult], first: datetime) -> dict[str, float]:
+    """Return the first baselines by the outcomes' slugs.
+
+    Parameters
+    ----------
+    results
+        Of one participant, oldest first.
+    first
+        When the first session began.
+    """
+    before = {
+        one.test: one.value
+        for one in results
+        if one.at < first and (first - one.at).days < DAYS_BEFORE
+    }
+    return {
+        slug: before[one.test.slug]
+        for slug, one in CLINICAL_OUTCOMES.items()
+        if one.test.slug in before
+    }
+
+
+def clinical_changes(
+    results: Sequence[ClinicalResult], first: datetime, days: Sequence[Day]
+) -> list[dict[str, float]]:
+    """Return the changes at each visit by the outcomes' slugs.
+
+    Parameters
+    ----------
+    results, first
+        As for `clinical_baselines`.
+    days
+        Of the visits, in their order.
+    """
+    baselines = clinical_baselines(results, first)
+    found: list[dict[str, float]] = []
+    for number, visit in enumerate(days):
+        ends = days[number + 1].day if number + 1 < len(days) else date.max
+        last = {
+            one.test: one.value
+            for one in results
+            if one.at >= first
+            and visit.day <= one.day < ends
+            and (one.day - visit.day).days <= DAYS_AFTER
+        }
+        found.append(
+            {
+                slug: last[one.test.slug] - baselines[slug]
+                for slug, one in CLINICAL_OUTCOMES.items()
+                if one.window == visit.window and one.test.slug in last and slug in baselines
+            }
+        )
+    return found

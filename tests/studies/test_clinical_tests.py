@@ -1,0 +1,145 @@
+"""Clinical tests as outcomes: registered, taken by blinded assessors, analyzed like the others."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.urls import reverse
+
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.sessions.assessments import Assessment
+from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, define_outcomes
+from rehab.studies.models import Study
+from rehab.studies.participants import Enrollment
+from rehab.studies.power_runs import build_trial
+from rehab.studies.registration.estimands import estimands
+from rehab.studies.registration.lifecycle import close
+from rehab.studies.results.results import read_results
+from rehab.studies.results.tables import outcome_rows
+from rehab.studies.unblinding import Task, give_mark
+from rehab.training.measures import InvalidSetting
+from tests.support.studies import enrolled, new_patient, running_study
+from tests.support.trials import walk_visit
+from tests.support.world import NOW, World, client_of, signed_in
+
+pytestmark = pytest.mark.django_db
+PLAN = {
+    "primary_outcome": "10mwt_after",
+    "secondary_outcomes": ["10mwt_follow_up", "tug_after"],
+    "follow_up_days": 28,
+}
+BEFORE, AFTER, FOLLOW_UP = -2.0, 1.5, 29.5  # days; the second visit is at day 1
+
+
+def take(one: Enrollment, by: Any, day: float, value: float, test: str = "10mwt") -> Assessment:
+    return Assessment.everywhere.create(
+        clinic=one.clinic,
+        patient=one.patient,
+        test=test,
+        value=value,
+        at=NOW + timedelta(days=day),
+        by=by,
+    )
+
+
+@pytest.fixture
+def trial(world: World):
+    """Return a running study of six people who walked once, and its assessor."""
+    study = running_study(world, **PLAN)
+    assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
+    give_mark(study, assessor, Task.ASSESSOR, None, NOW - timedelta(days=20))
+    people = [enrolled(study, new_patient(world, number)) for number in range(1, 7)]
+    for one in people:
+        walk_visit(one)
+    return study, assessor, people
+
+
+def values_of(study: Study, slug: str) -> dict[str, float]:
+    found = (row for row in outcome_rows(read_results(study, NOW)) if row["outcome"] == slug)
+    return {row["participant"]: row["value"] for row in found if row["value"] is not None}
+
+
+def test_a_test_of_an_assessor_is_the_primary_outcome_as_its_change_in_the_window(trial):
+    study, assessor, people = trial
+    for number, one in enumerate(people):
+        faster = 0.3 if one.allocation.group == "B" else 0.1
+        take(one, assessor, BEFORE, 0.5 + number / 10)
+        take(one, assessor, AFTER, 0.5 + number / 10 + faster + number % 3 / 100)
+        take(one, assessor, FOLLOW_UP, 0.5 + number / 10)
+    close(study, None, NOW)
+    results = read_results(study, NOW)
+    found = results.find("10mwt_after")
+    assert [arm.participants for arm in found.arms] == [3, 3]
+    (pair,) = found.differences
+    assert pair.difference.estimate == pytest.approx(0.2, abs=0.02)
+    assert [arm.mean.estimate for arm in results.find("10mwt_follow_up").arms] == pytest.approx(
+        [0, 0], abs=1e-9
+    )
+    rows = [row for row in outcome_rows(results) if row["outcome"] == "10mwt_after"]
+    of_first = [row for row in rows if row["participant"] == people[0].code and row["value"]]
+    assert [(row["visit"], row["unit"], row["baseline"]) for row in of_first] == [(2, "m/s", 0.5)]
+    assert "tug_after" in results.registered
+    # A test is no walk: visits of which it is all there is stay missed.
+    assert sum(arm.visits_walked for arm in results.flow) == 6
+
+
+@pytest.mark.parametrize(
+    ("days", "expected"),
+    [
+        ((BEFORE, AFTER), 0.3),
+        ((-15.0, AFTER), None),  # too long before
+        ((AFTER,), None),  # no baseline
+        ((BEFORE, 0.2), None),  # of the first visit, after which training goes on
+        ((BEFORE, 9.5), None),  # more than a week after the last visit
+    ],
+)
+def test_a_result_counts_in_its_window_alone(trial, days, expected):
+    study, assessor, (one, *_others) = trial
+    for number, day in enumerate(days):
+        take(one, assessor, day, 0.5 + 0.3 * number)
+    close(study, None, NOW)
+    found = values_of(study, "10mwt_after")
+    assert found == ({} if expected is None else {one.code: pytest.approx(expected)})
+
+
+def test_only_what_an_assessor_recorded_counts_and_nothing_struck_out(trial, world):
+    study, assessor, (one, other, *_others) = trial
+    for person in (one, other):
+        take(person, assessor, BEFORE, 0.5)
+    take(one, world.people[Role.PT], AFTER, 0.9)  # who may know the arm
+    struck = take(other, assessor, AFTER, 0.9)
+    close(study, None, NOW)
+    assert values_of(study, "10mwt_after") == {other.code: pytest.approx(0.4)}
+    struck.struck_at = NOW
+    struck.save()
+    assert values_of(study, "10mwt_after") == {}
+
+
+def test_unit_direction_and_window_are_registered(world):
+    study = running_study(world, **PLAN)
+    (first, *_others) = estimands(study.versions.get().document)
+    assert "assessor" in first["variable"]
+    assert "higher is better" in first["variable"]
+    units = {row["outcome"]: row["unit"] for row in define_outcomes()}
+    assert (units["10mwt_after"], units["tug_after"], units["berg_after"]) == ("m/s", "s", "points")
+    assert {"tug_after", "5sts_follow_up"} <= LOWER_IS_BETTER
+    page = client_of(world, Role.LEAD).get(reverse("study", args=[study.pk]))
+    assert b"10-meter walk, comfortable, after training" in page.content
+
+
+def test_power_says_that_simulated_people_take_no_tests(world):
+    study = running_study(world, **PLAN)
+    with pytest.raises(InvalidSetting, match="take no clinical tests"):
+        build_trial(study, {"effects": {"B": 10.0}})
+
+
+def test_an_assessor_takes_a_test_and_sees_no_arm(trial):
+    _study, assessor, (one, *_others) = trial
+    url = reverse("assess", args=[one.patient.pk, "10mwt"])
+    client = signed_in(assessor)
+    assert b"feedback positive" not in client.get(url).content
+    assert client.post(url, {"meters": "10", "measured": "12.5"}).status_code == 302
+    assert Assessment.everywhere.get(patient=one.patient).value == pytest.approx(0.8)
