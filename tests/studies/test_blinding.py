@@ -17,6 +17,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import ErasureReason, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
@@ -26,7 +27,6 @@ from rehab.studies.registration.lifecycle import close
 from rehab.studies.unblinding import Task, UnblindingRefused, give_mark, reveal_arms, take_mark
 from rehab.studies.visits import Place, next_visit, start_session
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.archives import words_of
@@ -160,7 +160,7 @@ def test_a_sessions_type_stays_that_of_its_arm(world, kind):
     session = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
     other = "negative" if session.valence == "positive" else "positive"
     with pytest.raises(InvalidSetting, match="belongs to a study"):
-        SessionFold(session.to_plan()).change(Change(kind, other))
+        SessionAggregate(session).change(Change(kind, other), None, NOW)
 
 
 def test_each_visit_is_walked_once_and_again_after_a_session_that_was_broken_off(world):

@@ -39,13 +39,13 @@ def check_outcomes(study: Study) -> None:
     """Raise InvalidSetting for the outcomes that a study could not find, each with its cure."""
     labels = dict(OUTCOMES)
     slugs = dict.fromkeys((study.primary_outcome, *study.secondary_outcomes))
-    problems = [
+    problems = " ".join(
         gettext("“%(outcome)s” %(why)s") % {"outcome": labels.get(slug, slug), "why": why}
         for slug in slugs
         for why in _reasons(study, slug)
-    ]
+    )
     if problems:
-        raise InvalidSetting(" ".join(problems))
+        raise InvalidSetting(problems)
 
 
 def _reasons(study: Study, slug: str) -> Iterator[str]:
