@@ -34,6 +34,7 @@ def test_every_column_of_the_signals_is_recognized_and_strides_count(tmp_path):
     checked = check_upload([SIGNALS], None, save=stored)
     assert not checked.wrong
     assert is_sample(stored)  # nobody walked it under its new name either
+    stored.unlink()
     assert not check_upload([other], None, save=stored).wrong
     assert not is_sample(stored)
     found = checked.found
