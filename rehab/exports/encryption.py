@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any, BinaryIO
 
 import pyrage
+from django.conf import settings
 from pyrage.x25519 import Identity, Recipient
 
 AGE_MAGIC = b"age-encryption.org/"
@@ -40,7 +41,7 @@ def read_recipients(keys: Iterable[str]) -> list[Recipient]:
     except pyrage.RecipientError as problem:
         raise InvalidKey("A public key begins with age1 and has 62 characters.") from problem
     if not recipients:
-        raise InvalidKey("There is no public key. `manage.py backupkey` makes one.")
+        raise InvalidKey(f"There is no public key. `{settings.PROGRAM} backupkey` makes one.")
     return recipients
 
 

@@ -63,7 +63,6 @@ def _walk(patient: Patient, valence: str, profile: str, seed: int, began: dateti
                 make_phase("washout"),
             ),
             source=f"simulated {profile}",
-            simulated=True,
         )
     )
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)

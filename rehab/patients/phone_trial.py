@@ -73,7 +73,6 @@ def begin_trial(patient: Patient, station: Station, side: Side | None, by: User)
             trained_side=side,
             station=station,
             created_by=by,
-            simulated=True,
         )
     )
     if patient.paretic_side != side:

@@ -23,6 +23,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import ask
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.sources import is_simulated
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
@@ -60,7 +61,8 @@ class SessionRequest(PlanSettings):
     ``phases``: those of the protocol unless given. ``measure``: A2 unless given. ``rule``: how that
     is scored, as its row says unless given. ``trained_side``: the patient's paretic side unless
     given. ``cue``: that of the feedback type unless given. ``source_args``: arguments of
-    `python -m rehab.sources` for a source that the server runs beside the session.
+    `python -m rehab.sources` for a source that the server runs beside the session. ``simulated``:
+    nobody walks, though neither patient nor arguments tell it.
     """
 
     patient: Patient
@@ -109,7 +111,7 @@ def create_session(request: SessionRequest) -> TrainingSession:
         valence=plan.valence.slug,
         trained_side=plan.trained_side.value,
         source=request.source,
-        simulated=request.simulated,
+        simulated=request.simulated or is_simulated(patient, request.source_args),
         source_args=list(request.source_args),
         plan=plan.to_json(),
         goal=plan.goal.value,

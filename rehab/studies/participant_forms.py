@@ -112,7 +112,6 @@ class PlaceForm(OptionForm):
         return Place(
             station=data["station"],
             source=dict(source_choices())[data["source"]],
-            simulated=kind == "synthetic",
             source_args=tuple(build_source_args(kind, name, self.patient)),
             walking=parts["walking"],
             heart_rate_limit=parts["heart_rate_limit"],

@@ -31,7 +31,6 @@ class Place:
 
     station: Station | None = None
     source: str = ""
-    simulated: bool = False
     source_args: tuple[str, ...] = ()
     walking: WalkingConditions = field(default_factory=WalkingConditions)
     heart_rate_limit: int | None = None

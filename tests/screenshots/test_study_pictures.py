@@ -60,7 +60,7 @@ give_mark(study, asha, Task.ASSESSOR, lead, now)
 people = [
     enrolled(study, new_patient(world, number), now=now, by=lead) for number in range(1, 6)
 ]
-session = start_session(people[0], Place(simulated=True), lead, now)
+session = start_session(people[0], Place(), lead, now)
 session.state, session.started_at, session.ended_at = "finished", now, now
 session.save()
 reveal_arms(people[1], "Dizzy after the third block", emergency=True, by=lead, now=now)

@@ -25,6 +25,7 @@ from rehab.sessions.setup.recordings import (
     write_columns,
 )
 from rehab.sources.recording.signals import measure_file
+from tests.support import samples
 from tests.support.data import signals
 from tests.support.world import client_of
 
@@ -145,6 +146,20 @@ def test_strange_files_in_the_browser(world, monkeypatch, names, mass, shown):
     endings = upload(client, [signals("lab_files") / name for name in names])
     page = client.post(reverse("check-recording"), {"ending": endings, "mass": mass})
     assert shown in page.content.decode()
+
+
+@pytest.mark.django_db
+def test_a_problem_names_the_file_as_its_owner_does(world, monkeypatch):
+    wrong = "No column of {} is a vertical force."
+    monkeypatch.setattr(
+        "rehab.sessions.pages.recording.check_upload",
+        lambda files, *_others: recordings.Checked(None, [wrong.format(files[0].name)]),
+    )
+    client = client_of(world, Role.PT)
+    upload(client, [samples.FOLDER / "strides.csv"])
+    answers = {"ending": ".csv", "mass": "", "files": "Monday walk.csv"}
+    page = client.post(reverse("check-recording"), answers)
+    assert page.context["problems"] == [wrong.format("Monday walk.csv")]
 
 
 def test_an_upload_that_nobody_stores_is_removed_after_a_day():

@@ -6,11 +6,17 @@ import pytest
 from django.contrib.staticfiles import finders
 from django.urls import reverse
 
-from rehab.sessions.setup.recordings import check_upload
+from rehab.people.models import Patient
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.recordings import check_upload, is_sample, recordings_folder
 from rehab.sources.recording import read_recording
+from rehab.stations.models import Station
 from tests.support import samples
 
 SIGNALS, STRIDES = samples.FOLDER / "signals.csv", samples.FOLDER / "strides.csv"
+REAL = ["live", "recording walk.csv"]
+OWN = ["synthetic good", "recording own-signals.csv", "recording own-strides.csv"]
 
 
 def test_they_are_made_by_their_program(tmp_path):
@@ -22,9 +28,15 @@ def test_they_are_made_by_their_program(tmp_path):
 
 @pytest.mark.wide
 @pytest.mark.django_db(transaction=True)
-def test_every_column_of_the_signals_is_recognized_and_strides_count():
-    checked = check_upload([SIGNALS], None)
+def test_every_column_of_the_signals_is_recognized_and_strides_count(tmp_path):
+    stored, other = tmp_path / "stored.csv", tmp_path / "other.csv"
+    other.write_text(SIGNALS.read_text().rstrip().rpartition("\n")[0])
+    checked = check_upload([SIGNALS], None, save=stored)
     assert not checked.wrong
+    assert is_sample(stored)  # nobody walked it under its new name either
+    stored.unlink()
+    assert not check_upload([other], None, save=stored).wrong
+    assert not is_sample(stored)
     found = checked.found
     assert found["mass_kg"] == pytest.approx(75, abs=1)
     assert len(found["channels"]) == 6
@@ -38,10 +50,52 @@ def test_the_strides_are_a_recording():
     assert [phase.kind for phase in recording.phases] == ["baseline", "training"]
 
 
-@pytest.mark.parametrize("name", ["help", "check-recording"])
+@pytest.mark.parametrize(
+    ("name", "offered"), [("help", [SIGNALS, STRIDES]), ("check-recording", [SIGNALS])]
+)
 @pytest.mark.django_db
-def test_pages_offer_them(world, name):
+def test_pages_offer_what_they_read(world, name, offered):
     page = world.pt.get(reverse(name)).content.decode()
-    for file in (SIGNALS, STRIDES):
+    assert page.count("samples/") == len(offered)
+    for file in offered:
         assert f"samples/{file.name}" in page
         assert finders.find(f"samples/{file.name}")
+
+
+@pytest.mark.parametrize("walked_by_nobody", [False, True])
+@pytest.mark.parametrize("source", [*REAL, *OWN])
+@pytest.mark.django_db
+def test_what_nobody_walked_is_not_counted(world, settings, tmp_path, source, walked_by_nobody):
+    """One rule over all sources: a simulated patient, and whatever GARRY made itself."""
+    settings.DATA_DIR = tmp_path
+    recordings_folder().mkdir()
+    (recordings_folder() / "own-strides.csv").write_bytes(STRIDES.read_bytes())
+    signals = recordings_folder() / "own-signals.csv"
+    signals.write_text("time_s,left_force_n\n0,700\n")
+    signals.with_name("own-signals.csv.simulated").touch()  # as it is stored after its check
+    lines = STRIDES.read_text().splitlines()[:-1]
+    (recordings_folder() / "walk.csv").write_text("\n".join(lines))
+    patient = Patient.everywhere.create(
+        clinic=world.clinic, code="S1", nickname="Joon", simulated=walked_by_nobody, body_mass_kg=75
+    )
+    station = Station.everywhere.create(clinic=world.clinic, name="Free")
+    protocol = Protocol.everywhere.get(name="Training only", clinic=None)
+    answers = {
+        "valence": "negative",
+        "goal_by": "value",
+        "goal_value": "4.05",
+        "goal_percent": "110",
+        "wanted_hits": "65",
+        "minutes": "12",
+        "protocol": protocol.pk,
+        "station": station.pk,
+        "source": source,
+        "trained_side": "left",
+        "robot": "gentle",
+        "robot_above": "(usual)",
+        "robot_below": "(usual)",
+    }
+    page = world.pt.post(reverse("setup", args=[patient.pk]), answers)
+    assert page.status_code == 302, page.context["form"].errors
+    session = TrainingSession.everywhere.get(patient=patient)
+    assert session.simulated == (walked_by_nobody or source not in REAL)

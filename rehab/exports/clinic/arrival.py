@@ -17,6 +17,7 @@ from itertools import count, groupby
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from django.conf import settings
 from django.db import connection, transaction
 from django.db.models import DateField, DateTimeField, TimeField
 from pyrage.x25519 import Identity
@@ -203,7 +204,8 @@ class Arrival:
         if wrong:
             raise CannotMove(
                 f"What was stored is not what the file says ({', '.join(wrong)}). Nothing was left "
-                "here. Look for damage of disk and database (manage.py doctor), then try again."
+                f"here. Look for damage of disk and database ({settings.PROGRAM} doctor), then "
+                "try again."
             )
 
     def _open(self, key: int) -> None:

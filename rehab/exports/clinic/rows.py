@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 from cryptography.fernet import InvalidToken
+from django.conf import settings
 from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
 from django.db.models import Model, Q, QuerySet
 
@@ -45,7 +46,8 @@ def open_value(label: str, encrypted: str) -> str:
     except InvalidToken as problem:
         if label == "rehab.study":
             raise CannotMove(
-                "A study was sealed with another key of the server. Run manage.py rotatekeys."
+                "A study was sealed with another key of the server. Run "
+                f"{settings.PROGRAM} rotatekeys."
             ) from problem
         return ""  # an app whose codes are refused here, too
 

@@ -125,7 +125,7 @@ def examine_database() -> Iterator[Diagnosis]:
     kind = f"{connection.vendor}, {connection.settings_dict['NAME']}"
     if pending:
         yield Diagnosis(
-            "database", f"{kind}: {pending} migration(s) to do", "Run manage.py migrate."
+            "database", f"{kind}: {pending} migration(s) to do", f"Run {settings.PROGRAM} migrate."
         )
     else:
         yield Diagnosis("database", f"{kind}: up to date")
@@ -155,7 +155,7 @@ def examine_files() -> Iterator[Diagnosis]:
     if missing:
         yield Diagnosis("files", f"missing: {', '.join(missing)}", "Run make setup.")
     elif settings.HOSTED and not (settings.STATIC_ROOT / "staticfiles.json").exists():
-        yield Diagnosis("files", "not collected", "Run manage.py collectstatic.")
+        yield Diagnosis("files", "not collected", f"Run {settings.PROGRAM} collectstatic.")
     else:
         yield Diagnosis("files", "all there")
 
@@ -248,10 +248,12 @@ def examine_tokens() -> Iterator[Diagnosis]:
 def examine_seals() -> Iterator[Diagnosis]:
     """Diagnose the chains of the audit log and the history, and what keeps them append-only."""
     for name in guards.find_missing(connection.alias):
-        yield Diagnosis("logs", f"the trigger {name} is missing", "Run manage.py migrate.")
+        yield Diagnosis(
+            "logs", f"the trigger {name} is missing", f"Run {settings.PROGRAM} migrate."
+        )
     broken = list(seals.find_broken())
     for problem in broken[:10]:
-        cure = "Compare with the copy that manage.py shiplogs made, and find out who was there."
+        cure = f"Compare with the copy of {settings.PROGRAM} shiplogs, and find out who was there."
         yield Diagnosis("logs", problem, cure)
     if not broken:
         late = seals.count_unsealed(timezone.now() - timedelta(days=1))
@@ -263,7 +265,7 @@ def examine_keys() -> Iterator[Diagnosis]:
     """Diagnose the server's own keys."""
     stored = list(ServerKey.objects.all())
     closed = ", ".join(str(one) for one in stored if one.open() is None)
-    cure = "GARRY_SECRET_KEY is another one now: see manage.py rotatekeys --help."
+    cure = f"GARRY_SECRET_KEY is another one now: see {settings.PROGRAM} rotatekeys --help."
     if closed:
         yield Diagnosis("keys", f"{closed}: not opened", cure)
     else:

@@ -26,6 +26,7 @@ from rehab.sessions.live.headless import (
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import describe_cue
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.recordings import is_sample
 from rehab.sources.recording import Recording, RecordingError, read_recording
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.fold import SessionFold
@@ -138,7 +139,7 @@ class Command(BaseCommand):
                 phases=phases,
                 trained_side=side,
                 source=name_source(recording, options),
-                simulated=recording is None,
+                simulated=recording is None or is_sample(options["recording"]),
             )
         )
 

@@ -217,5 +217,6 @@ def check_port(host: str, port: int) -> None:
         except OSError as problem:
             raise CommandError(
                 f"Cannot serve at {host}:{port} ({problem.strerror}). Stop the other program, or "
-                f"choose another port: GARRY_PORT={port + 1 if port < 65535 else 8000} make run."
+                f"choose another port: GARRY_PORT={port + 1 if port < 65535 else 8000} "
+                f"{'garry serve' if settings.PROGRAM == 'garry' else 'make run'}."
             ) from problem

@@ -40,7 +40,8 @@ def prepare_database() -> None:
         return
     if settings.HOSTED:
         raise CommandError(
-            f"The database lacks {pending} migration(s). Back it up, then run `manage.py migrate`."
+            f"The database lacks {pending} migration(s). Back it up, then run "
+            f"`{settings.PROGRAM} migrate`."
         )
     call_command("migrate", verbosity=0, interactive=False)
 

@@ -167,7 +167,6 @@ class SessionForm(OptionForm):
                 station=data["station"],
                 created_by=self.by,
                 source=dict(source_choices()).get(data["source"], ""),
-                simulated=kind == "synthetic",
                 source_args=build_source_args(kind, name, self.patient),
                 **build_parts(chosen),
             )

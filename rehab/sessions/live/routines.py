@@ -20,7 +20,7 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
-from rehab.sessions.live.session.instruments import LATE_S
+from rehab.sessions.live.session.instruments import LATE_S, TASK_FAILURES
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.seals import PAUSE_S, seal_sessions
 from rehab.stations.models import Device
@@ -72,7 +72,8 @@ class Routines:
         await end_tasks(self.tasks)
 
     async def _repeat(self, beats: float, work: Callable[[], Awaitable[None]]) -> None:
-        """Call a function periodically; log its failures and go on."""
+        """Call a function periodically; log and count its failures and go on."""
+        failures = TASK_FAILURES.labels(work.__name__.strip("_"))  # 0 until one fails
         while True:
             due_s = self._loop.time() + beats * ROBOT_HEARTBEAT_S
             await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
@@ -80,6 +81,7 @@ class Routines:
             try:
                 await work()
             except Exception:
+                failures.inc()
                 log.exception("A periodic task (every %.2f s) failed", beats * ROBOT_HEARTBEAT_S)
 
     async def _send_robot_heartbeats(self) -> None:

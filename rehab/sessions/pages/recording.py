@@ -63,6 +63,7 @@ def check_recording(request: HttpRequest) -> HttpResponse:
         "part_bytes": PART_BYTES,
         "mass": asked.get("mass", ""),
         "name": asked.get("name", "")[:60],
+        "files": asked.get("files", "")[:1000],
         "is_hosted": settings.HOSTED,
     }
     if request.method == "POST":
@@ -78,6 +79,7 @@ def check_recording(request: HttpRequest) -> HttpResponse:
         else:
             context |= {"ending": ",".join(file.suffix for file in files)}
             context |= _answer(request, files, mass_kg)
+            context["problems"] = _name_files(context["problems"], files, context["files"])
     return render(request, "sessions/recording.html", context)
 
 
@@ -118,6 +120,14 @@ def _answer(request: HttpRequest, files: list[Path], mass_kg: float | None) -> d
         command += ["--columns", *map(_quote, columns)]
         shown |= {"stored": name, "found": None, "command": " ".join(command)}
     return shown
+
+
+def _name_files(problems: list[str], files: list[Path], names: str) -> list[str]:
+    """Return problems with the names that a person's files have; ``names`` stand between "/"."""
+    own = dict(zip((file.name for file in files), names.split("/"), strict=False))
+    for stored, name in own.items():
+        problems = [text.replace(stored, name or stored) for text in problems]
+    return problems
 
 
 def _describe(checked: Checked, chosen: dict[str, dict[str, str]]) -> dict[str, Any]:

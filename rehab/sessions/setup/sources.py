@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Sequence
 from pathlib import Path
 
 from django.conf import settings
 
 from rehab.people.models import Patient
 from rehab.sessions.formatting import RECORDING_PREFIX, SIMULATED_PREFIX
-from rehab.sessions.setup.recordings import recordings_folder
+from rehab.sessions.setup.recordings import is_sample, recordings_folder
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 
@@ -45,3 +46,13 @@ def build_source_args(kind: str, name: str, patient: Patient) -> list[str]:
             mass = ["--mass", str(patient.body_mass_kg)] if holds_signals(file) else []
             return ["recording", str(file), *mass]
     return []
+
+
+def is_simulated(patient: Patient, source_args: Sequence[str]) -> bool:
+    """Return whether nobody walks: a simulated patient, or what GARRY made itself."""
+    match source_args:
+        case ["synthetic", *_]:
+            return True
+        case ["recording", file, *_]:
+            return patient.simulated or is_sample(Path(file))
+    return patient.simulated

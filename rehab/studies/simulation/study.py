@@ -26,7 +26,7 @@ from rehab.training.measures import A2, InvalidSetting
 from rehab.training.steps import Side
 
 SEED_MAX = 99_999
-PLACE = Place(source="simulated", simulated=True)
+PLACE = Place(source="simulated")
 PROTOCOL = "Simulated study"
 
 

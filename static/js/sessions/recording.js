@@ -39,6 +39,7 @@ form.addEventListener("submit", async (event) => {
     return tell(refused instanceof TypeError ? failed : refused.message || failed);
   }
   form.elements.ending.value = files.map(endingOf).join(",");
+  form.elements.files.value = files.map(({ name }) => name).join("/");
   const [file] = files;
   form.elements.name.value = file.name.slice(0, file.name.lastIndexOf(".")).slice(0, 60);
   form.submit();

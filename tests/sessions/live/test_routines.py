@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+from contextlib import suppress
+from types import SimpleNamespace
+
 import pytest
 
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.routines import Routines
+from rehab.sessions.live.session.instruments import REGISTRY
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.seals import SessionSeal
 
@@ -20,3 +26,21 @@ async def test_the_sessions_of_its_clinics_are_sealed(place, sourced, is_own):
     ends = [one.last_step async for one in SessionSeal.everywhere.filter(session=session.pk)]
     assert ends == ([1] if is_own else [])
     await ClinicOwner.everywhere.filter(clinic=session.clinic_id, owner="another").aupdate(owner="")
+
+
+async def test_each_failure_of_a_task_is_counted_and_it_goes_on():
+    asked = []
+
+    async def _break() -> None:
+        asked.append(count())
+        if len(asked) == 3:
+            raise asyncio.CancelledError
+        raise RuntimeError("This task always fails.")
+
+    def count() -> float | None:
+        return REGISTRY.get_sample_value("garry_task_failures_total", {"task": "break"})
+
+    routines = SimpleNamespace(_loop=asyncio.get_running_loop())
+    with suppress(asyncio.CancelledError):
+        await Routines._repeat(routines, 0.01, _break)
+    assert asked == [0, 1, 2]

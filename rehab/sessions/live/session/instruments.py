@@ -30,6 +30,12 @@ DELIVERY_S = Histogram(
 WRITE_FAILURES = Counter(
     "garry_write_failures", "Commits that failed; their steps are sent again.", registry=REGISTRY
 )
+TASK_FAILURES = Counter(
+    "garry_task_failures",
+    "Periodic tasks of the server that failed; each is tried again.",
+    ["task"],
+    registry=REGISTRY,
+)
 LATE_S = Histogram(
     "garry_loop_late_seconds",
     "How late the event loop came to a periodic task: pages and robots waited as long.",
