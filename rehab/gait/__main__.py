@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -212,7 +213,9 @@ def _check_walk(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(setup_to_json(check, list(table)), allow_nan=False))
     else:
-        print(*options.files, *describe_setup(check), sep="\n")
+        words = ["python", "-m", "rehab.gait", *["--join"][: len(options.files) - 1]]
+        command = shlex.join([*words, *map(str, options.files)])
+        print(*options.files, *describe_setup(check, command), sep="\n")
     wrong = compare_with_setup(check, given) if given else []
     for text in wrong:
         print(text, file=sys.stderr)

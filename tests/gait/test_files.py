@@ -99,7 +99,9 @@ def test_each_kind_of_file_is_recognized(walk, tmp_path, name, capsys):
     assert {channel for _, channel in check.proposal.guesses} == {"force", "moment", "angle"}
     assert check.valid >= 0.8 * check.strides
     assert main(["check", str(path), "--mass", "75"]) in (0, 1)
-    assert "If that is right, measure with:" in capsys.readouterr().out
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("  python -m rehab.gait ")
+    assert " --mass " in last
 
 
 def test_gzipped_csv(walk, tmp_path):

@@ -128,7 +128,7 @@ def test_millinewtons(synthetic):
     assert "force_unit" in codes
 
 
-@pytest.mark.parametrize(("factor", "percent"), [(0.8, 63), (1.25, 40)])
+@pytest.mark.parametrize(("factor", "percent"), [(0.8, 63), (0.88, 57), (1.14, 44), (1.25, 40)])
 def test_a_wrong_mass_is_named_with_one_leg(synthetic, factor, percent):
     mass_kg = synthetic.mass_kg * factor
     leg = LegSamples(*synthetic.left)

@@ -243,3 +243,25 @@ def test_a_mass_that_is_no_adults_is_doubted(walk):
 
     assert not found.is_certain
     assert any("lbf" in text and "give the mass" in text for text in found.findings)
+
+
+@pytest.mark.parametrize(("factor", "is_told"), [(0.88, True), (0.95, False), (1.14, True)])
+def test_a_mass_that_the_plates_do_not_carry_is_told(walk, factor, is_told):
+    found = check_setup(columns_of(walk), MASS * factor)
+
+    assert any("it carries" in text for text in found.findings) == is_told
+
+
+def test_few_steps_on_a_treadmill_are_not_taken_for_plates_in_a_floor(walk):
+    columns = columns_of(walk)
+    part = walk.t_s < walk.t_s[0] + 4.0
+    short = {name: values[part] for name, values in columns.items()}
+    with pytest.raises(GaitInputError, match="to tell a treadmill"):
+        check_setup(short, MASS)
+    assert not check_setup(short, MASS, is_overground=False).proposal.is_overground
+
+
+def test_a_moment_that_is_too_large_is_told_so(walk):
+    found = check_setup(columns_of(walk, moment=1.7), MASS)
+
+    assert any("times too large" in text and "usual are" in text for text in found.findings)

@@ -23,9 +23,9 @@ from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW
 
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
-USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
 OWN_TOLERANCE_S = 0.003  # against the same person's earlier check
-# Beyond, A2 is off by more than a tenth if it is the mass that is wrong, and not a handrail.
+# Of the body mass, on both plates or twice one. Beyond, A2 is off by more than a tenth if it is the
+# mass that is wrong, and not a handrail or, on one plate, a leg that is spared.
 CERTAIN_LOAD = (0.9, 1.1)
 
 
@@ -225,13 +225,15 @@ def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> 
 
 
 def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
-    """Check the load of one leg, which should carry about half of the weight."""
+    """Check the load of one leg: half of the weight, but a leg may be spared, so strides count."""
     share = load_kg / mass_kg
-    if not (share < USUAL_LOAD[0] or share > USUAL_LOAD[1]):
+    low, high = CERTAIN_LOAD
+    if not (2 * share < low or 2 * share > high):
         return []
     message = (
         f"The plate carries {share * 100:.0f} % of {mass_kg:g} kg over whole strides; half is "
-        "usual. Right for a leg that is spared or favored; else check the body mass."
+        f"usual, that of {2 * load_kg:.1f} kg. Right for a leg that is spared or favored; else "
+        "check the body mass."
     )
     return [Finding("weight_unusual", message, side)]
 

@@ -68,8 +68,12 @@ def check_strides(strides: list[Stride]) -> list[tuple[str, str]]:
     a2 = float(np.median([s.a2_w_kg or 0.0 for s in good]))
     if not USUAL_MOMENT[0] <= moment <= USUAL_MOMENT[1]:
         found.append(("moment_unusual", f"The ankle moment peaks at {moment:.2f} Nm/kg; usual are "
-                      "0.8 to 2.0. Right for a weak leg; else check unit and mass."))  # fmt: skip
+                      f"0.8 to 2.0. {_say_cure(moment < USUAL_MOMENT[0])}"))  # fmt: skip
     if not USUAL_A2[0] <= a2 <= USUAL_A2[1]:
-        found.append(("a2_unusual", f"A2 is {a2:.2f} W/kg; usual are 0.3 to 7. Right for a weak "
-                      "leg; else check units and mass."))  # fmt: skip
+        found.append(("a2_unusual", f"A2 is {a2:.2f} W/kg; usual are 0.3 to 7. "
+                      f"{_say_cure(a2 < USUAL_A2[0])}"))  # fmt: skip
     return found
+
+
+def _say_cure(is_low: bool) -> str:
+    return f"{'Right for a weak leg; else check' if is_low else 'Check'} units and mass."

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.one_leg import GRAVITY_M_S2
+from rehab.gait.one_leg import GRAVITY_M_S2, STRIDE_MAX_S
 from rehab.gait.recordings.columns import SIDES
 from rehab.gait.recordings.table import Table
+from rehab.gait.selfcheck.checks import CERTAIN_LOAD
 from rehab.gait.selfcheck.shapes import (
     LIKE,
     NAMED_LIKE,
@@ -36,6 +37,7 @@ SWING = (0.15, 0.98)  # of the time a plate is unloaded
 # Times (logarithm) that a column without a label carries another mass than the given one, in any
 # unit: a harness takes half of it, and what is no force carries anything.
 NO_FORCE = 0.9
+STEPS_MIN = 4  # on each plate, to tell a treadmill
 LOADED = 0.9  # of the time on a treadmill somebody loads the plates
 OTHER_SIDE = {"left": "right", "right": "left"}
 
@@ -184,9 +186,22 @@ def _guess_side(name: str) -> str:
 
 
 def looks_overground(columns: Mapping[str, Floats], time_s: Floats, forces: list[Force]) -> bool:
-    """Return whether these are a few steps over plates: in between nobody bears them, or few."""
-    if min(len(force.stances) for force in forces) < 4:
-        return True
+    """Return whether these are a few steps over plates: in between nobody bears them, or few.
+
+    Raises
+    ------
+    GaitInputError
+        Where the steps are as few, but come again on each plate, stride by stride.
+    """
+    fewest = min(len(force.stances) for force in forces)
+    if fewest < STEPS_MIN:
+        gaps_s = [gap_s for force in forces for gap_s in np.diff(force.stances.begin_s)]
+        if fewest < 2 or min(gaps_s) > STRIDE_MAX_S:
+            return True
+        raise GaitInputError(
+            f"Too few whole steps on a plate ({fewest}) to tell a treadmill from plates in a "
+            "floor. Record half a minute, or say which: --no-overground or --overground."
+        )
     first_s = min(force.stances.begin_s[0] for force in forces)
     last_s = max(force.stances.end_s[-1] for force in forces)
     part = slice(*np.searchsorted(time_s, (first_s, last_s)))
@@ -215,12 +230,13 @@ def find_force_unit(
         for f in forces
         for begin, end in zip(f.stances.begin_s, f.stances.end_s, strict=True)
     ]
-    load, spread = float(np.median(own)) / STANCE_LOAD, 2 * FORCE_SPREAD
+    load = float(np.median(own)) / STANCE_LOAD
+    low, high = math.exp(-2 * FORCE_SPREAD), math.exp(2 * FORCE_SPREAD)
     if not is_overground:
         starts = forces[0].stances.begin_s
         part = slice(*np.searchsorted(time_s, (starts[0], starts[-1])))
         load = sum(float(np.nanmean(columns[f.name][part] * f.sign)) for f in forces)
-        load, spread = load * 2 / len(forces), FORCE_SPREAD
+        load, (low, high) = load * 2 / len(forces), CERTAIN_LOAD
     units = {u: f for u, f in FORCE_UNITS.items() if mass_kg or u not in BY_MASS}
     factors = {unit: f * ((mass_kg or 1) if unit in BY_MASS else 1) for unit, f in units.items()}
     masses = {unit: max(load * factor, 1e-9) / GRAVITY_M_S2 for unit, factor in factors.items()}
@@ -241,14 +257,14 @@ def find_force_unit(
                 f"carry {masses[unit]:.0f} kg, not {mass_kg:.1f} kg. Walk for half a minute with "
                 "the plates on, and send their vertical force."
             )
-        elif off > spread:
-            doubt = f"it carries {masses[unit]:.0f} kg, not {mass_kg:.1f} kg"
+        elif not low <= masses[unit] / mass_kg <= high:
+            by = ", if its leg takes half" if len(forces) == 1 and not is_overground else ""
+            doubt = f"it carries {masses[unit]:.0f} kg{by}, not {mass_kg:.1f} kg"
         return factors[unit], unit, mass_kg, doubt
     if is_overground:
         raise GaitInputError(
             "The body mass is not in this file, and a few steps over plates weigh nobody. Weigh "
-            "the patient and give the mass: --mass 75. An ankle moment and an ankle angle are "
-            "needed beside the forces, in this file or in others given with it."
+            "the patient and give the mass: --mass 75."
         )
     low, high = MASS_USUAL_KG
     if unit in masses and MASS_MIN_KG <= masses[unit] <= MASS_MAX_KG:

@@ -9,8 +9,16 @@ from rehab.gait.setup.check import SetupCheck
 from rehab.gait.setup.guess import Guess
 
 
-def describe_setup(check: SetupCheck) -> list[str]:
-    """Return a set-up check as lines to read."""
+def describe_setup(check: SetupCheck, command: str = "") -> list[str]:
+    """Return a set-up check as lines to read, the last of them the command that measures with it.
+
+    Parameters
+    ----------
+    check
+        What was found.
+    command
+        The command's beginning, to which the arguments are added; empty where a person has it.
+    """
     proposal = check.proposal
     sources = {"plates": "measured with the plates", "file": "by the file", "given": "as given"}
     lines = [
@@ -23,7 +31,8 @@ def describe_setup(check: SetupCheck) -> list[str]:
     a2 = "".join(f", A2 {side} {value:.2f} W/kg" for side, value in check.a2_w_kg.items())
     lines.append(f"{check.strides} strides, {check.valid} valid{a2}")
     lines += [f"! {text}" for text in check.findings]
-    return [*lines, "", "If that is right, measure with:", "  " + format_arguments(check)]
+    measure = f"{command} {format_arguments(check)}".strip()
+    return [*lines, "", "If that is right, measure with:", "  " + measure]
 
 
 def _describe_guess(guess: Guess, at_s: float | None) -> str:

@@ -96,7 +96,14 @@ def find_unit(
     elif off[second] < off[unit] + 2 * spread and off[second] < 2 * spread:
         doubts.append(f"{second} would be as likely as {unit}")
     if off[unit] > spread and not doubts:
-        size_off = f"its size is {math.exp(min(off[unit], 99)):.1f} times off what is usual"
+        least, most = (expected * math.exp(sign * spread) for sign in (-1, 1))
+        size *= units[unit]
+        what, si = ("peak", "Nm") if channel == "moment" else ("range", "rad")
+        size_off = (
+            f"its {what} is {math.exp(min(off[unit], 99)):.1f} times too "
+            f"{'large' if size > expected else 'small'}: {size:.3g} {si}, "
+            f"usual are {least:.3g} to {most:.3g}"
+        )
         by_height = channel == "moment" and off[unit] > math.log(5)
         cure = "; export it in Nm or Nm/kg, not by body weight and height" if by_height else ""
         doubts.append(size_off + cure)

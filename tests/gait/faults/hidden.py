@@ -29,13 +29,13 @@ HIDDEN = {
         "moment × gain has the curve, signs and times of a stronger ankle, and its lever on the "
         "force, 0.13-0.17 m (five people), stays that of a foot",
         "a file's plates and markers, from 0.88 and 1.12 on; 'lbf·ft would be as likely as Nm'; "
-        "'its size is … times off' from a factor of 1.28 on",
+        "'its peak is … times too large' from a factor of 1.28 on",
         ("moment × 0.7376", "moment × 0.8", "moment × 1.2"),
     ),
     2: Hidden(
         "angle × gain is the motion of another ankle: 0.05 rad in an orthosis, 0.4-0.6 else",
-        "a knee's curve is not taken for an ankle's; 'its size is … times off' from 1.8 on; below "
-        "that a foot held at a known angle",
+        "a knee's curve is not taken for an ankle's; 'its range is … times too large' from 1.8 on; "
+        "below that a foot held at a known angle",
         ("angle × 0.8", "angle × 1.2", "angle × 1.56"),
     ),
     3: Hidden(
