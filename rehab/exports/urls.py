@@ -14,5 +14,7 @@ urlpatterns = [
     path("export/sessions.zip", views.download_sessions, name="export-sessions"),
     path("clinics/<int:clinic_id>/move/", clinic_pages.move_clinic, name="move-clinic"),
     path("clinics/<int:clinic_id>/clinic.age", clinic_pages.download_clinic, name="clinic-file"),
-    path("clinics/<int:clinic_id>/gone.json", clinic_pages.download_certificate, name="clinic-gone"),
+    path(
+        "clinics/<int:clinic_id>/gone.json", clinic_pages.download_certificate, name="clinic-gone"
+    ),
 ]

@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -76,6 +77,13 @@ class CleanStride:
     end_s: float
     a2_w_kg: float
     file_a2_w_kg: float | None
+
+
+PLUG_IN_GAIT = {
+    "gaitalytics treadmill": "gaitalytics_treadmill_events.c3d",
+    "BTK flatfoot": "btk_pig_flatfoot_full.c3d",
+    "BTK motion3": "btk_pig_motion3_ff.c3d",
+}
 
 
 def read_lab_file(name: str) -> Path:
@@ -321,3 +329,13 @@ def vary(
     )
     varied = replace(walk, t_s=t_s, legs=legs, mass_kg=walk.mass_kg * heavier, known=known)
     return replace(varied, power_w_kg={}, events_s={})
+
+
+def own_legs(table: Any) -> dict[str, LegSamples]:
+    """Return both legs with moment and angle from plates and markers."""
+    return {
+        side: LegSamples(
+            table[f"plates.{side}"], table[f"own.{side}_moment_nm"], table[f"own.{side}_angle_rad"]
+        )
+        for side in ("left", "right")
+    }

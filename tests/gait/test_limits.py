@@ -20,8 +20,14 @@ from rehab.gait.signals.filters import find_last
 from rehab.gait.stances import analysis, continuity, plausibility
 from rehab.gait.stances.analysis import StanceAnalyzer
 from rehab.gait.stances.lag_watch import MOMENT_LAG_S, LagWatch, find_moment_lag
-from tests.gait.corpus import PRESENT, find_clean, open_corpus, read_lab_file
-from tests.gait.test_own_kinetics import FILES, own_legs
+from tests.gait.corpus import (
+    PLUG_IN_GAIT,
+    PRESENT,
+    find_clean,
+    open_corpus,
+    own_legs,
+    read_lab_file,
+)
 
 pytest.importorskip("ezc3d")
 
@@ -124,7 +130,7 @@ def test_noise_of_unfiltered_angles_is_no_spike():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(continuity, "_is_discontinuous", watch)
-        for name, file in FILES.items():
+        for name, file in PLUG_IN_GAIT.items():
             walk = open_corpus(name)
             replace(walk, legs=own_legs(read_any_table(read_lab_file(file)))).measure()
     assert len(needed) == 3

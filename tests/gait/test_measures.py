@@ -21,7 +21,14 @@ from rehab.training.measures import PLATE_MEASURES
 from rehab.training.scoring import judge
 from rehab.training.steps import Side, select_value
 from robot.wire.limits import MAX_EXTRA
-from tests.gait.corpus import CorpusWalk, find_clean, find_stances, open_corpus, read_lab_file
+from tests.gait.corpus import (
+    PLUG_IN_GAIT,
+    CorpusWalk,
+    find_clean,
+    find_stances,
+    open_corpus,
+    read_lab_file,
+)
 from tests.gait.walks import read_moore, read_moore_columns
 
 SIDES = ("left", "right")
@@ -74,11 +81,6 @@ def add_own(walk, name):
 
 
 WALKS = {"moore2013": open_walk, "gaitalytics": open_gaitalytics}
-PLUG_IN_GAIT = {
-    "gaitalytics treadmill": "gaitalytics_treadmill_events.c3d",
-    "BTK flatfoot": "btk_pig_flatfoot_full.c3d",
-    "BTK motion3": "btk_pig_motion3_ff.c3d",
-}
 
 
 @cache

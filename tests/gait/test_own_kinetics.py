@@ -6,23 +6,17 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import LegSamples, measure_strides
+from rehab.gait import measure_strides
 from rehab.gait.recordings import c3d_plates
 from rehab.gait.recordings.ankle import JOINT_AHEAD_M, compute_ankle
 from rehab.gait.recordings.columns import MARKED, find_layout, find_required, read_column_map
 from rehab.gait.recordings.markers import PLACES
 from rehab.gait.recordings.readers import read_any_table
 from rehab.gait.setup.check import check_setup
-from tests.gait.corpus import find_clean, open_corpus, read_lab_file
+from tests.gait.corpus import PLUG_IN_GAIT, find_clean, open_corpus, own_legs, read_lab_file
 from tests.sources.intake_harness import IntakeHarness
 
 ezc3d = pytest.importorskip("ezc3d")
-
-FILES = {
-    "gaitalytics treadmill": "gaitalytics_treadmill_events.c3d",
-    "BTK flatfoot": "btk_pig_flatfoot_full.c3d",
-    "BTK motion3": "btk_pig_motion3_ff.c3d",
-}
 
 
 @dataclass(frozen=True)
@@ -37,18 +31,9 @@ class Comparison:
     by_moment: list[float]
 
 
-def own_legs(table):
-    return {
-        side: LegSamples(
-            table[f"plates.{side}"], table[f"own.{side}_moment_nm"], table[f"own.{side}_angle_rad"]
-        )
-        for side in ("left", "right")
-    }
-
-
 def compare(name: str) -> Comparison:
     walk = open_corpus(name)
-    own = replace(walk, legs=own_legs(read_any_table(read_lab_file(FILES[name]))))
+    own = replace(walk, legs=own_legs(read_any_table(read_lab_file(PLUG_IN_GAIT[name]))))
     strides = own.measure()
     b, a = butter(2, 6 / (walk.rate_hz / 2))
     found = Comparison([], [], [], [])
@@ -102,7 +87,7 @@ def test_against_the_files_own_moment_and_power(name, by, rms, slow_rms, by_powe
 
 def test_a_file_without_moments_is_measured_from_its_markers(tmp_path):
     """One command: plates and markers are enough."""
-    table = read_any_table(read_lab_file(FILES["BTK motion3"]))
+    table = read_any_table(read_lab_file(PLUG_IN_GAIT["BTK motion3"]))
     for name in [n for n in table if "Ankle" in n]:
         del table[name]
     check = check_setup(table)
@@ -110,22 +95,22 @@ def test_a_file_without_moments_is_measured_from_its_markers(tmp_path):
     assert guesses["left", "moment"] == "own.left_moment_nm"
     assert guesses["right", "angle"] == "own.right_angle_rad"
     assert check.valid >= 2
-    whole = check_setup(read_any_table(read_lab_file(FILES["BTK motion3"])))
+    whole = check_setup(read_any_table(read_lab_file(PLUG_IN_GAIT["BTK motion3"])))
     assert whole.proposal.guesses["left", "moment"].column == "LAnkleMoment.X"
 
 
 @pytest.mark.parametrize(
     ("name", "factor", "sides"),
     [
-        *((name, factor, 2) for name in FILES for factor in (0.5, 1.6)),
-        *((name, 1.0, 0) for name in FILES),
+        *((name, factor, 2) for name in PLUG_IN_GAIT for factor in (0.5, 1.6)),
+        *((name, 1.0, 0) for name in PLUG_IN_GAIT),
         ("gaitalytics treadmill", 1.2, 1),
         ("BTK motion3", 1.2, 2),
     ],
 )
 def test_an_angle_with_a_gain_is_told_where_joints_are_known(name, factor, sides):
     """People's own differ by 0.90 to 1.20 times, so that a gain of 1.2 is told of three in five."""
-    table = read_any_table(read_lab_file(FILES[name]))
+    table = read_any_table(read_lab_file(PLUG_IN_GAIT[name]))
     for column in [one for one in table if "AnkleAngles" in one and one.endswith(".X")]:
         table[column] = table[column] * factor
     told = [text for text in check_setup(table).findings if "times what the file's plates" in text]
@@ -133,10 +118,10 @@ def test_an_angle_with_a_gain_is_told_where_joints_are_known(name, factor, sides
 
 
 @pytest.mark.parametrize("factor", [0.7376, 0.8, 1.0, 1.2])
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", PLUG_IN_GAIT)
 def test_a_moment_with_a_wrong_gain_is_told_by_plates_and_markers(name, factor):
     """lbf·ft for N·m, and gains that no stride shows: the lever on the force stays a foot's."""
-    table = read_any_table(read_lab_file(FILES[name]))
+    table = read_any_table(read_lab_file(PLUG_IN_GAIT[name]))
     for column in [one for one in table if one.endswith("AnkleMoment.X")]:
         table[column] = table[column] * factor
     check = check_setup(table)
@@ -149,16 +134,16 @@ def test_a_moment_with_a_wrong_gain_is_told_by_plates_and_markers(name, factor):
 @pytest.mark.parametrize(
     ("name", "column", "late_ms", "sides"),
     [
-        *((name, "Moment", ms, 2) for name in FILES for ms in (-10, 10)),
-        *((name, "Angles", ms, 2) for name in FILES for ms in (-20, 20)),
+        *((name, "Moment", ms, 2) for name in PLUG_IN_GAIT for ms in (-10, 10)),
+        *((name, "Angles", ms, 2) for name in PLUG_IN_GAIT for ms in (-20, 20)),
         ("BTK motion3", "Angles", -10, 2),
         ("gaitalytics treadmill", "Angles", -10, 0),  # its own come 5 to 9 ms late
-        *((name, column, 0, 0) for name in FILES for column in ("Moment", "Angles")),
+        *((name, column, 0, 0) for name in PLUG_IN_GAIT for column in ("Moment", "Angles")),
     ],
 )
 def test_a_moment_or_angle_out_of_time_is_told_by_plates_and_markers(name, column, late_ms, sides):
     """No stride shows it, as people differ by more; the file's own markers do."""
-    table = read_any_table(read_lab_file(FILES[name]))
+    table = read_any_table(read_lab_file(PLUG_IN_GAIT[name]))
     time_s = table["time"]
     for one in [one for one in table if f"Ankle{column}" in one and one.endswith(".X")]:
         table[one] = np.interp(time_s - late_ms / 1000, time_s, table[one])
@@ -167,7 +152,7 @@ def test_a_moment_or_angle_out_of_time_is_told_by_plates_and_markers(name, colum
 
 
 def test_a_c3d_whose_second_axis_is_upward_gets_its_plates(tmp_path):
-    path = read_lab_file(FILES["BTK motion3"])
+    path = read_lab_file(PLUG_IN_GAIT["BTK motion3"])
     file, turned = ezc3d.c3d(str(path)), tmp_path / "y_up.c3d"
     points = file["data"]["points"]
     points[:3] = points[[1, 2, 0]]  # x, y, z become z, x, y
@@ -213,7 +198,7 @@ def write_type(file, kind):
 
 @pytest.mark.parametrize("kind", [1, 3])
 def test_plates_of_other_types_come_to_the_same(kind, tmp_path):
-    path = read_lab_file(FILES["BTK motion3"])
+    path = read_lab_file(PLUG_IN_GAIT["BTK motion3"])
     file, other = ezc3d.c3d(str(path)), tmp_path / "other.c3d"
     write_type(file, kind)
     del file["data"]["meta_points"]
@@ -265,7 +250,7 @@ def test_columns_of_markers_take_the_place_of_moment_and_angle():
 def test_streamed_markers_give_the_strides_of_the_file(chunk, tmp_path):
     """By frame: the same numbers, whatever the chunks."""
     walk = open_corpus("BTK motion3")
-    table = read_any_table(read_lab_file(FILES["BTK motion3"]))
+    table = read_any_table(read_lab_file(PLUG_IN_GAIT["BTK motion3"]))
     legs = own_legs(table)
     expected = measure_strides(
         walk.t_s, legs, rate_hz=1000.0, mass_kg=74.0, look_ahead_s=0.05, is_overground=True
