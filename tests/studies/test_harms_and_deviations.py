@@ -150,7 +150,7 @@ def test_pages_tell_a_visit_that_was_simulated_cut_short_changed_or_on_another_d
     study = running_study(world)
     enrollment = enrolled(study, new_patient(world))
     later = NOW + timedelta(days=3)
-    session = start_session(enrollment, Place(simulated=True), None, later)
+    session = start_session(enrollment, Place(source_args=("synthetic",)), None, later)
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=later)
     SessionEvent.everywhere.create(
         session=session, after_number=0, kind=ChangeKind.GOAL.value, value=3.55, at=later

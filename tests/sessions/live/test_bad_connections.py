@@ -6,6 +6,7 @@ import asyncio
 
 import pytest
 
+from rehab.people import clinic_limits
 from rehab.sessions.live.consumers import base
 from tests.support.callers import (
     Caller,
@@ -132,7 +133,7 @@ async def test_a_strange_authorization(place, begun):
 
 
 async def test_a_clinics_share_of_sockets(place, bystander, monkeypatch):
-    monkeypatch.setattr(base.clinic_limits, "max_sockets", lambda: 1)
+    monkeypatch.setattr(clinic_limits, "max_sockets", lambda: 1)
     await place.source().open()
     robot = place.robot()
     await robot.dial()

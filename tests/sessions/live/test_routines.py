@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from contextlib import suppress
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -40,7 +41,7 @@ async def test_each_failure_of_a_task_is_counted_and_it_goes_on():
     def count() -> float | None:
         return REGISTRY.get_sample_value("garry_task_failures_total", {"task": "break"})
 
-    routines = SimpleNamespace(_loop=asyncio.get_running_loop())
+    routines: Any = SimpleNamespace(_loop=asyncio.get_running_loop())
     with suppress(asyncio.CancelledError):
         await Routines._repeat(routines, 0.01, _break)
     assert asked == [0, 1, 2]
