@@ -15,6 +15,7 @@ from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.models import Arm, Study, StudyState
 from rehab.studies.participants import Enrollment
 from rehab.studies.registration.lifecycle import close, register, start
+from rehab.studies.registration.measurable import SEVERAL_VISITS
 from rehab.studies.registration.sealing import seal
 from rehab.studies.results.results import Results, read_results
 from rehab.studies.simulation.example import ARMS, OUTCOME, PHASES, SECONDARY
@@ -84,7 +85,9 @@ def _plan(
         months_since_stroke=6,
         visits=trial.visits,
         primary_outcome=OUTCOME,
-        secondary_outcomes=list(SECONDARY),
+        secondary_outcomes=[
+            slug for slug in SECONDARY if trial.visits > 1 or slug not in SEVERAL_VISITS
+        ],
         facts=dict(facts),
         sealed=seal(trial.secret(seed)),
     )
