@@ -113,7 +113,7 @@ def test_a_browser_measures_movement_there(encrypting):
         )
         page = browser.new_page()
         page.goto(f"http://{address}/sensor/#token=x&place=shank&side=left")
-        assert page.url.startswith("https://")
+        page.wait_for_url("https://**/sensor/*token*")  # once this is trusted, by itself
         assert page.evaluate("isSecureContext && 'DeviceMotionEvent' in window")
         assert page.locator("[data-begin]").is_visible()
         browser.close()

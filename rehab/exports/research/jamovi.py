@@ -1,6 +1,6 @@
 """A table as jamovi opens it: an .omv file.
 
-Source: jamovi's own server/jamovi/server/formatio/omv.py, and jmvReadWrite's write_omv.R (archive
+Source: jamovi's own reader (its module ``formatio.omv``) and jmvReadWrite's write_omv (archive
 version 11.0, which later ones read): a ZIP; data.bin has one column after the other, little-endian,
 texts as numbers of the labels in xdata.json.
 """

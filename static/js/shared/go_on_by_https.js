@@ -2,6 +2,7 @@
 
 const EVERY_MS = 2_000;
 const link = document.querySelector("[data-goes-on]");
+link.hash = location.hash; // a phone's token stands there
 
 async function look() {
   try {
