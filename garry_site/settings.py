@@ -43,6 +43,9 @@ DATA_DIR = Path(
 BACKUP_KEYS = string_list(
     "GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)"
 )
+MOVE_KEYS = string_list(
+    "GARRY_MOVE_KEYS", "", "public keys, beside those, that a host's page writes a clinic's file to"
+)
 BACKUP_DIR = text("GARRY_BACKUP_DIR", "", "folder of nightly backups (manage.py upkeep)")
 BACKUP_DAYS = number("GARRY_BACKUP_DAYS", 30, "days that they are kept", low=2, high=3650)
 RESTORE_KEY = text("GARRY_RESTORE_KEY", "", "file with a secret key, for weekly test restores")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from django import forms
+from django.conf import settings
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
@@ -45,12 +46,19 @@ class ClinicExportForm(forms.Form):
     )
 
     def clean_keys(self) -> str:
-        """Return keys that are valid."""
+        """Return keys that are valid, of those that the server's settings name.
+
+        A host sees no patient: who can only sign in must not choose who opens the file.
+        """
         keys: str = self.cleaned_data["keys"]
         try:
             read_recipients(keys.split())
         except InvalidKey as problem:
             raise forms.ValidationError(str(problem)) from problem
+        if not {*keys.split()} <= {*settings.BACKUP_KEYS, *settings.MOVE_KEYS}:
+            raise forms.ValidationError(
+                _("Name this key in the server’s setting GARRY_MOVE_KEYS first, and restart it.")
+            )
         return keys
 
 

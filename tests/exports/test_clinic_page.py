@@ -50,6 +50,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch, settings: Any, tmp_path: Path) -> N
         return NOBODY
 
     settings.DATA_DIR = tmp_path
+    settings.MOVE_KEYS = [PUBLIC]
     monkeypatch.setattr(job, "run_aside", run)
     monkeypatch.setattr("os.nice", lambda _by: None)
     monkeypatch.setattr("rehab.management.commands.clinic.LEAVES_WITHIN_S", 0.0)
@@ -107,6 +108,13 @@ def test_written_fetched_taken_in_elsewhere_and_removed(amber, host, tmp_path, c
     assert f"where it was: {receipt}" in capsys.readouterr().out
     there = Clinic.everywhere.get(name=clinic.name)
     assert receipt in host.get(page_of(there)).content.decode()
+
+
+def test_a_host_cannot_choose_who_opens_the_file(amber, host):
+    """Only the server's settings do: who signs in as a host sees no patient."""
+    _, own = generate_key()
+    assert "GARRY_MOVE_KEYS" in press(host, amber.clinic, "export", keys=f"{PUBLIC} {own}")
+    assert not Job(amber.clinic.pk).file.exists()
 
 
 def test_what_was_changed_since_the_export_or_runs_stays(amber, host, tmp_path):
