@@ -61,5 +61,5 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
 
     # Stations and devices have a page of their own: the token ends with one tap.
     page.goto("/stations/")
-    page.locator("section li", has_text="Force plate").locator("[name=revoke]").click()
-    expect(page.locator("section li", has_text="Force plate")).to_contain_text("revoked")
+    page.locator(".entry", has_text="Force plate").locator("[name=revoke]").click()
+    expect(page.locator(".entry", has_text="Force plate")).to_contain_text("revoked")
