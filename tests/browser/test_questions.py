@@ -14,7 +14,8 @@ from tests.support.servers import Server
 pytestmark = pytest.mark.browser
 # A finger that is not steady needs some room; nothing may lie beyond the screen's sides.
 SMALLEST = """() => {
-  const boxes = [...document.querySelectorAll(".scale label, footer > *")];
+  const all = [...document.querySelectorAll(".scale label, footer > *")];
+  const boxes = all.filter((one) => one.checkVisibility()); // Continue waits for an answer
   const sides = boxes.map((one) => one.getBoundingClientRect());
   return {
     least: Math.min(...sides.flatMap(({ width, height }) => [width, height])),
