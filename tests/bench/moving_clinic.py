@@ -1,4 +1,4 @@
-"""A clinic with many steps in a sealed file: `python -m tests.bench.moving_clinic STEPS FILE`."""
+"""A clinic with many steps in a sealed file: `python -m tests.bench.moving_clinic STEPS FILE N`."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if __name__ == "__main__":
     from tests.bench.own_database import copy_rows, set_up
     from tests.support.walks import strides, walk
 
-    steps, file = int(sys.argv[1]), Path(sys.argv[2])
+    steps, file, number = int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
     set_up()
-    clinic = Clinic.everywhere.create(name="Mover")
+    clinic = Clinic.everywhere.create(name=f"Mover {number}")
     patient = Patient.everywhere.create(clinic=clinic, code="0", nickname="0", paretic_side="left")
     first = walk(patient, "positive", strides(A_SESSION, A_SESSION // 2))
     count = steps // A_SESSION - 1

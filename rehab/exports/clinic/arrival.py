@@ -8,7 +8,6 @@ nobody can sign in to the clinic and none of its tokens is valid.
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from datetime import datetime
@@ -22,7 +21,7 @@ from django.db import connection, transaction
 from django.db.models import DateField, DateTimeField, TimeField
 from pyrage.x25519 import Identity
 
-from rehab.exports.clinic.departure import delete_rows
+from rehab.exports.clinic.departure import delete_rows, transaction_and_rest
 from rehab.exports.clinic.keys import reserve_keys
 from rehab.exports.clinic.rows import (
     ENCRYPTED,
@@ -51,8 +50,7 @@ from rehab.sessions.live.database import owners
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.setup.recordings import recordings_folder
 
-BATCH_ROWS = 500
-REST = 1.0  # times as long as a batch took is waited after it
+BATCH_ROWS = 200
 USER, CLINIC = User._meta.label_lower, Clinic._meta.label_lower
 
 
@@ -272,10 +270,8 @@ def insert_in_batches(table: Table, rows: Iterator[list[Any]]) -> None:
 
 
 def _insert_and_rest(table: Table, rows: list[list[Any]]) -> None:
-    began_s = time.monotonic()
-    with transaction.atomic():
+    with transaction_and_rest():
         _insert(table, rows)
-    time.sleep(REST * (time.monotonic() - began_s))
 
 
 def _insert(table: Table, rows: list[list[Any]]) -> None:
