@@ -95,7 +95,7 @@ def sign_on(page: Page, name: str) -> None:
 
 def sign_out(page: Page) -> None:
     page.goto("/account/")
-    page.click(".top >> text=Sign out")
+    page.click("main >> text=Sign out")
     page.click("text=Yes, sign me out")
     page.wait_for_url("**/sign-in/**")
 
