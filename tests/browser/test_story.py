@@ -65,7 +65,7 @@ def begin(story: Story) -> None:
     page.tap(f"text=Rosa {story.number}")
     page.tap("text=Change something")
     page.tap(f".type[data-theme={story.valence}]")
-    page.tap("label:has-text('W/kg')")
+    page.locator("label").get_by_text("W/kg", exact=True).tap()
     page.tap("label:has-text('Training only')")
     page.tap(".try summary")
     page.tap("label:has-text('Simulated patient, good')")
@@ -131,7 +131,7 @@ def end(story: Story, server: Server) -> None:
         expect(you.locator(".value")).to_have_text(f"{metric['value']:.0f}".replace("-", "−"))
     expect(page.locator(f".you[data-session='{story.session}'] >> visible=true")).to_have_count(1)
     page.tap("text=Continue")
-    expect(page.locator(".huge")).to_contain_text("Like last time")
+    expect(page.locator(".primary.huge")).to_contain_text("Like last time")
 
 
 @pytest.mark.timeout(300)
