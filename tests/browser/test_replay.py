@@ -75,7 +75,7 @@ def test_room_is_played_again_from_its_log(server, visit):
     assert patient.locator(".words").inner_text() == "Step not measured."
 
     # A note leads to its moment; that moment has an address.
-    page.click(".told button:has-text('Pain')")
+    page.click(".told button:has-text('Dizziness')")
     patient.locator("body[data-step='2']").wait_for()
     page.wait_for_function("() => location.search.startsWith('?at=')")
     page.reload()
