@@ -1,8 +1,8 @@
 """What a robot does with the server's messages. Time is a parameter, so that hours take a second.
 
-It moves only while all of this holds: the server was heard within ``SERVER_SILENT_S``, the session
-runs, and ``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is
-not played later, nor one whose steps waited while this program hung.
+It moves only while all of this holds: the server was heard lately, the session runs, and
+``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is not played
+later, nor one whose steps waited while this program hung.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robot.behavior.beside_answers import MOMENTS, BesideAnswers
 from robot.behavior.body import Body
 from robot.behavior.cue import Cue
 from robot.behavior.gesture_library import GestureLibrary
-from robot.behavior.safety import LAPSED_S, SERVER_SILENT_S, STOPPED
+from robot.behavior.safety import LAPSED_S, STOPPED, is_server_silent
 from robot.behavior.status import Report
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
@@ -146,7 +146,7 @@ class Performer:
         """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
         self._has_hung, self._ticked_s = now_s - self._ticked_s > LAPSED_S, now_s
         # Without a session it does not move, and the server sends no heartbeat.
-        if self.session is not None and self.is_linked and now_s - self._heard_s > SERVER_SILENT_S:
+        if self.session is not None and self.is_linked and is_server_silent(self._heard_s, now_s):
             self.disconnect(NO_LINK)
         free_s = self.decider.free_s(self._step_s + now_s - self._stepped_s)
         may_idle = self.decider.cue.idles and self.may_act

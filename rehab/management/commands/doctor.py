@@ -29,7 +29,7 @@ from rehab.people.audit.seals import LogSeal
 from rehab.people.server_keys import ServerKey
 from rehab.people.sign_in.first_start import count_pending_migrations
 from rehab.sessions import seals as session_seals
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import DamagedLog, check_log
@@ -163,7 +163,7 @@ def examine_files() -> Iterator[Diagnosis]:
 def examine_sessions() -> Iterator[Diagnosis]:
     """Diagnose running sessions, among them those of a process that no longer exists."""
     running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
-    clinics, _ = owners.find_ownerless()
+    clinics, _ = clinic_owners.find_ownerless()
     left = list(running.filter(clinic__in=clinics).order_by("pk").values_list("pk", flat=True))
     if left:
         yield Diagnosis(

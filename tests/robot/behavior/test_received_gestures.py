@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot.behavior.performer import Performer
-from robot.motion.gesture_spec import Move, to_data
+from robot.motion.composed_gestures import Move, to_data
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME
