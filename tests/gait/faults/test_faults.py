@@ -21,7 +21,6 @@ from tests.gait.walks import make_walk, pair_up
 
 pytestmark = pytest.mark.matrix
 
-SYNTHETIC = [name for name in RECORDINGS if name != "moore"]
 
 
 @pytest.mark.parametrize("name", RECORDINGS)
