@@ -22,7 +22,7 @@ from robot.behavior.safety import LAPSED_S, STOPPED, is_server_silent
 from robot.behavior.status import Report
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
-from robot.motion.gestures import BUILT_IN, ORIGINALS
+from robot.motion.gestures import ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
@@ -48,8 +48,6 @@ class Performer:
         An open base; nothing else may order it.
     limits
         Speeds and accelerations of every gesture.
-    gestures
-        The gestures that a cue may name.
     homing
         Drives it home by its tag; None where it has learned none.
 
@@ -71,11 +69,10 @@ class Performer:
         self,
         base: MobileBase,
         limits: Limits = DEFAULT_LIMITS,
-        gestures: Mapping[str, Gesture] = BUILT_IN,
         homing: Homing | None = None,
     ) -> None:
         self.body = Body(base, limits, homing)
-        self.gestures = GestureLibrary(gestures, limits)
+        self.gestures = GestureLibrary(limits)
         self.decider = WindowDecider(Cue())
         self.answers, self._beside = AnswerChooser(0), BesideAnswers(self.body, 0)
         self.decision: Decision | None = None

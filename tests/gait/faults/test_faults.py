@@ -22,7 +22,6 @@ from tests.gait.walks import make_walk, pair_up
 pytestmark = pytest.mark.matrix
 
 
-
 @pytest.mark.parametrize("name", RECORDINGS)
 @pytest.mark.parametrize("width_ms", [15, 50, 150])
 def test_samples_that_come_late_are_put_back(name, width_ms):

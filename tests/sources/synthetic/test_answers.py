@@ -22,7 +22,6 @@ OPTIONS = dict.fromkeys(("side", "strides", "treadmill", "heart_rate")) | {
 }
 
 
-
 def training(gain):
     return make_phase("training", gain=gain)
 
