@@ -120,7 +120,7 @@ def test_plot(lab_file, tmp_path, capsys):
 
 def test_each_panel_of_a_plot_says_which_leg_and_what(monkeypatch, tmp_path):
     walk, _ = make_walk(strides=6)
-    drawn = []
+    drawn: list[list[Mock]] = []
 
     def subplots(rows, columns, **_):
         panel = {"get_ylim.return_value": (0, 1)}

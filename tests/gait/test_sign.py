@@ -1,6 +1,7 @@
 """With which sign a worn sensor's axis points to the walker's left."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -32,7 +33,7 @@ def make_readings(quiet, other=1.0, counts=(5, 5), is_plausible=True):
     ],
 )
 def test_a_sign_counts_where_the_leg_is_quiet_in_its_stances(quiet, ahead, is_sure, counts, found):
-    axis = SimpleNamespace(left_sign=ahead, is_sure=is_sure)
+    axis: Any = SimpleNamespace(left_sign=ahead, is_sure=is_sure)
     sign = find_sign(make_readings(quiet, counts=counts), axis)
     assert (sign and sign.sign) == found
     assert find_sign(make_readings(quiet, counts=counts, is_plausible=False), axis) is None

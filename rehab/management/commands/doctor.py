@@ -22,7 +22,7 @@ from django.utils import timezone
 
 from rehab.exports.research.sinks import FORMATS
 from rehab.gait.recordings.readers import READERS
-from rehab.management.new_file import new_file
+from rehab.management.files import new_file
 from rehab.management.problem_report import write_report
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
