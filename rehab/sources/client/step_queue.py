@@ -134,11 +134,6 @@ class StepQueue:
         return len(self._kept)
 
     @property
-    def in_flight(self) -> int:
-        """How many steps were sent and are not acknowledged."""
-        return self._sent
-
-    @property
     def can_send(self) -> bool:
         """Whether a step can be sent now."""
         return self._sent < min(len(self._kept), MAX_STEPS)

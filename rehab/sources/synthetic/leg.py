@@ -14,7 +14,6 @@ STRIDE_S, SWING_S = 1.2, 0.4
 RISE_S, SLAP_S = 0.2, 0.1  # heel rise before the swing, landing after it
 LENGTH_M = 0.9
 GRAVITY_M_S2 = 9.81
-CONTACT_S = SWING_S  # in each stride, which begins with the swing
 
 
 def turn_foot(t_s: Floats) -> Floats:
