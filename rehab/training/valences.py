@@ -53,7 +53,7 @@ class Valence:
 
     Attributes
     ----------
-    slug, label
+    slug, label, hue
         Its name in programs, its name for people (translated by pages), its pages' color.
     hit_points, miss_points
         Added to the score; None for both means that points do not exist.
@@ -70,6 +70,7 @@ class Valence:
 
     slug: str
     label: str
+    hue: str
     hit_points: int | None
     miss_points: int | None
     bands: tuple[Band, ...]
@@ -172,6 +173,7 @@ class Valence:
 POSITIVE = Valence(
     slug="positive",
     label=gettext_noop("Positive"),
+    hue="blue",
     hit_points=1,
     miss_points=0,
     bands=POSITIVE_BANDS,
@@ -180,6 +182,7 @@ POSITIVE = Valence(
 NEGATIVE = Valence(
     slug="negative",
     label=gettext_noop("Negative"),
+    hue="apricot",
     hit_points=0,
     miss_points=-1,
     bands=NEGATIVE_BANDS,
@@ -188,6 +191,7 @@ NEGATIVE = Valence(
 BINARY = Valence(
     slug="binary",
     label=gettext_noop("Binary"),
+    hue="rose",
     hit_points=1,
     miss_points=-1,
     bands=BINARY_BANDS,
@@ -196,6 +200,7 @@ BINARY = Valence(
 EXPLICIT = Valence(
     slug="explicit",
     label=gettext_noop("Explicit"),
+    hue="graphite",
     hit_points=None,
     miss_points=None,
     bands=EXPLICIT_BANDS,

@@ -24,7 +24,7 @@ def missing_parts(valence: Valence) -> Iterator[str]:
     """Yield what pages lack of a feedback type, each with where it belongs."""
     theme, slug = f'[data-theme="{valence.slug}"] {{', valence.slug
     wanted = [
-        ("static/css/shared/tokens.css", theme, "the colors of its pages"),
+        ("static/css/shared/tokens.css", theme, f"the colors of its pages ({valence.hue})"),
         ("static/css/sessions/history.css", f".type.{slug}::after", "its sign in lists"),
         ("static/js/shared/labels.js", f'{slug}: _("{valence.label}")', "its name for scripts"),
     ]
@@ -47,9 +47,9 @@ def test_each_type_has_all_its_parts(valence: Valence) -> None:
 
 
 def test_what_a_new_type_lacks_is_named() -> None:
-    praise = replace(POSITIVE, slug="praise", label="Praise")
+    praise = replace(POSITIVE, slug="praise", label="Praise", hue="moss")
     assert [re.sub(r"^locale/\w+", "locale", part) for part in missing_parts(praise)] == [
-        "static/css/shared/tokens.css: the colors of its pages",
+        "static/css/shared/tokens.css: the colors of its pages (moss)",
         "static/css/sessions/history.css: its sign in lists",
         "static/js/shared/labels.js: its name for scripts",
         "static/css/walk/walk.css: the colors of its confetti",

@@ -54,6 +54,7 @@ def words_of(text: str) -> list[str]:
 def test_it_is_found_by_its_name(valence: Valence) -> None:
     assert find_valence(valence.slug) is VALENCES[valence.slug] is valence
     assert valence.label
+    assert valence.hue
 
 
 def test_words_are_few_and_whole(valence: Valence) -> None:
@@ -179,7 +180,7 @@ def edited(slug: str, **changes: object) -> Valence:
 def test_a_clinic_words_and_pays_a_valence_in_its_own_way() -> None:
     bands = (Band(0, "Go on."), Band(1, "There!", Confetti.MOST))
     mine = edited("positive", hit_points=5, bands=bands, cue=CueGestures(above="nod"))
-    assert mine.label == VALENCES["positive"].label
+    assert (mine.label, mine.hue) == (VALENCES["positive"].label, VALENCES["positive"].hue)
     assert (mine.points(True), mine.points(False), mine.band(1.3).words) == (5, 0, "There!")
 
 
