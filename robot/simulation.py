@@ -11,7 +11,7 @@ from typing import Any
 from robot.bases import BASES
 from robot.behavior.control_loop import control_loop
 from robot.behavior.performer import Performer
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
+from robot.motion.limits import TICK_S
 
 # Simulated bases that run on any clock.
 SIMULATED_BASES = [
@@ -30,8 +30,6 @@ class Simulation:
         One of ``SIMULATED_BASES``.
     cue
         The session's order to its robot, as the server sends it.
-    limits
-        Speeds and accelerations.
 
     Attributes
     ----------
@@ -43,13 +41,13 @@ class Simulation:
     Raises ValueError for a base that is not simulated, and for an invalid cue.
     """
 
-    def __init__(self, base: str, cue: Mapping[str, Any], limits: Limits = DEFAULT_LIMITS) -> None:
+    def __init__(self, base: str, cue: Mapping[str, Any]) -> None:
         self._now_s = 0.0
         self._source_s: float | None = None
         robot = BASES[base](lambda: self._now_s)
         if not robot.abilities.simulated or robot.abilities.real_time:
             raise ValueError(f"The base {base} is no simulation that keeps to a clock of ours.")
-        self._performer = Performer(robot, limits)
+        self._performer = Performer(robot)
         self._handle({"type": "welcome", "session": 0, "state": "running", "cue": cue})
         if not self._performer.is_linked:
             raise ValueError(self._performer.last_bad_message)

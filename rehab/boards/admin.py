@@ -19,7 +19,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.people.access import user_of
 from rehab.people.models import BoardsConsent, Patient
-from rehab.people.models.blinding import hidden_patients
+from rehab.people.models.hidden_patients import hidden_patients
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors

@@ -9,6 +9,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.training.summary.metrics import METRICS
 
+FEWEST_PATIENTS = 5  # whose results a board shows together
 METRIC_LABELS = {
     "hit_rate": _("Steps at the goal (%)"),
     "mean_performance": _("Mean step, in % of the own goal"),

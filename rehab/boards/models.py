@@ -12,6 +12,7 @@ from django.db.models import Exists, Q
 from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.choices import (
+    FEWEST_PATIENTS,
     Aggregation,
     CountedTypes,
     DisplayMode,
@@ -141,8 +142,8 @@ class Leaderboard(ClinicModel):
     )
     min_participants = models.PositiveSmallIntegerField(
         _("fewest patients"),
-        default=5,
-        validators=between(5),
+        default=FEWEST_PATIENTS,
+        validators=between(FEWEST_PATIENTS),
         help_text=_("With fewer, everyone sees the own sessions only."),
     )
     occasion = models.CharField(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehab.gait.contacts.contact import Contact
-from rehab.gait.contacts.force_plate import ContactFinder
+from rehab.gait.contacts.contact_finder import ContactFinder
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.samples import FORCE

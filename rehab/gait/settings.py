@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
+from rehab.gait.contacts.contact_finder import CONTACT_N, RELEASE_N
 from rehab.gait.signals.filters import CUTOFF_HZ
 from rehab.gait.strides import GaitInputError
 

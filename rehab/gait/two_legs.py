@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from rehab.gait.contacts.contact import Contact
-from rehab.gait.contacts.force_plate import STEP_PEAK
+from rehab.gait.contacts.contact_finder import STEP_PEAK
 from rehab.gait.detector import Detector
 from rehab.gait.one_leg import LegDetector, OneLegStride, OtherLeg
 from rehab.gait.signals.filters import find_maximum

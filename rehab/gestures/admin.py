@@ -20,9 +20,9 @@ from rehab.gestures.tracks import read_tracks
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
+from robot.motion.composed_gestures import MAX_MOVES, NAME, to_data
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import MAX_MOVES, NAME, to_data
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import REACH_M, TETHER_M
 from robot.motion.preview import preview

@@ -13,8 +13,8 @@ from rehab.gestures.tracks import read_tracks
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
+from robot.motion.composed_gestures import Move, check_name, to_data
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import Move, check_name, to_data
 
 
 class ComposedGesture(ClinicModel):

@@ -21,7 +21,7 @@ import rehab.people.models.patients
 import rehab.people.networks
 import rehab.people.sign_in.tokens
 
-# Leases of the servers on a hosted database (rehab/sessions/live/database/lease.py). No model: the
+# Leases of the servers on a hosted database (rehab/sessions/live/database/server_lease.py). No model: the
 # rows are no clinic's, are read and written by the database's clock alone, and belong in no backup.
 # SQLite has one server, which needs none.
 LEASES = """

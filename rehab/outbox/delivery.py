@@ -15,10 +15,12 @@ from django.conf import settings
 from django.db.models import QuerySet
 
 from rehab.outbox.http_post import Answer, Refused, post
-from rehab.outbox.models import Endpoint, OutboxMessage
+from rehab.outbox.models import MAX_ANSWER_CHARS, Endpoint, OutboxMessage
 
 CLAIMED_FOR = timedelta(minutes=2)  # by a server, which may die meanwhile
 BATCH = 20
+# After each failed attempt; then a message waits for a person. By the example of Standard Webhooks.
+PAUSES = [timedelta(seconds=s) for s in (5, 60, 300, 1800, 7200, 18000, 36000, 50400, 72000, 86400)]
 # Answers by which a receiver says that no repetition helps; 410 also ends the receiver.
 GONE = 410
 REFUSALS = {400, 401, 403, 404, 405, 413, 415, 422, GONE}
@@ -99,27 +101,32 @@ def deliver_due(now: datetime, send: Callable[..., Answer] = post) -> int:
 
 def _attempt(message: OutboxMessage, now: datetime, send: Callable[..., Answer]) -> bool:
     """Send a message and store what that came to. Return whether it was received."""
-    endpoint = message.endpoint
+    endpoint, is_final, is_delivered = message.endpoint, False, False
     try:
         request = WRITERS[endpoint.kind](message, now)
         answer = send(endpoint.url, request.body, request.headers, settings.PRIVATE_RECEIVERS)
     except (Refused, NothingToSend) as problem:
-        message.note(str(problem), is_final=True, is_delivered=False, now=now)
-        return False
+        words, is_final = str(problem), True
     except InvalidToken:
-        cure = "The server has another key now. Give the receiver a new secret."
-        message.note(cure, is_final=True, is_delivered=False, now=now)
-        return False
+        words, is_final = "The server has another key now. Give the receiver a new secret.", True
     except (OSError, ValueError) as problem:
-        message.note(str(problem), is_final=False, is_delivered=False, now=now)
-        return False
-    is_delivered = 200 <= answer.status < 300
-    said = "" if is_delivered else _tell_why(endpoint, answer)
-    words = f"{answer.status} {said}".strip()
-    message.note(words, is_final=answer.status in REFUSALS, is_delivered=is_delivered, now=now)
-    if answer.status == GONE:
-        endpoint.active = False
-        endpoint.save(update_fields=["active"])
+        words = str(problem)
+    else:
+        is_final, is_delivered = answer.status in REFUSALS, 200 <= answer.status < 300
+        said = "" if is_delivered else _tell_why(endpoint, answer)
+        words = f"{answer.status} {said}".strip()
+        if answer.status == GONE:
+            endpoint.active = False
+            endpoint.save(update_fields=["active"])
+    message.attempts += 1
+    message.answer = words[:MAX_ANSWER_CHARS]
+    if is_delivered:
+        message.state = message.State.DELIVERED
+    elif is_final or message.attempts > len(PAUSES):
+        message.state = message.State.REFUSED
+    else:
+        message.due_at = now + PAUSES[message.attempts - 1]
+    message.save(update_fields=["attempts", "answer", "state", "due_at"])
     return is_delivered
 
 

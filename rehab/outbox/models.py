@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from base64 import b64encode
 from collections.abc import Mapping
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
@@ -18,8 +18,6 @@ from rehab.people.scope import ClinicModel, Scope
 from rehab.people.server_keys import Purpose, decrypt_text, encrypt_text
 
 SECRET_BYTES = 32  # Standard Webhooks asks for 24 to 64
-# After each failed attempt; then a message waits for a person. By the example of Standard Webhooks.
-PAUSES = [timedelta(seconds=s) for s in (5, 60, 300, 1800, 7200, 18000, 36000, 50400, 72000, 86400)]
 MAX_ANSWER_CHARS = 500
 
 
@@ -153,18 +151,6 @@ class OutboxMessage(ClinicModel):
 
     def __str__(self) -> str:
         return self.key
-
-    def note(self, answer: str, *, is_final: bool, is_delivered: bool, now: datetime) -> None:
-        """Store what an attempt came to: delivered, refused for good, or to be tried again."""
-        self.attempts += 1
-        self.answer = answer[:MAX_ANSWER_CHARS]
-        if is_delivered:
-            self.state = self.State.DELIVERED
-        elif is_final or self.attempts > len(PAUSES):
-            self.state = self.State.REFUSED
-        else:
-            self.due_at = now + PAUSES[self.attempts - 1]
-        self.save(update_fields=["attempts", "answer", "state", "due_at"])
 
     def send_again(self, now: datetime) -> None:
         """Let it be sent again, under its old key: receivers know what they have."""

@@ -20,7 +20,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents, consent_withdrawn
 from rehab.people.field_policy import deleted, personal_fields
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.models.blinding import hidden_patients, is_in_running_study
+from rehab.people.models.hidden_patients import hidden_patients, is_in_running_study
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.sign_in.tokens import TOKEN_BYTES, hash_token
 

@@ -17,7 +17,7 @@ from rehab.feedback.models import FeedbackType, feedback_text_edited
 from rehab.people.models import Patient, User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession

@@ -87,17 +87,16 @@ def merge_entries(
 
 
 def log_rows(
-    session: TrainingSession, kinds: Iterable[str], after: int = 0
+    session: TrainingSession, kinds: Iterable[str]
 ) -> Iterator[tuple[datetime, Measurement | SessionEvent]]:
     """Return a session's committed steps and its events of these kinds, by our clock, in order.
 
-    ``after``, errors: as in ``log_entries``.
+    Errors: as in ``log_entries``.
     """
     chosen = SessionEvent.everywhere.filter(session=session, kind__in=list(kinds))
-    events = chosen.filter(after_number__gte=after).order_by("pk")
-    steps = Step.everywhere.filter(session=session, number__gt=after).order_by("number")
+    steps = Step.everywhere.filter(session=session).order_by("number")
     stored = steps.values_list("received_at", *MEASURED).iterator()
-    return _merge(session.pk, after, stored, list(events))
+    return _merge(session.pk, 0, stored, list(chosen.order_by("pk")))
 
 
 def _merge(

@@ -14,7 +14,7 @@ from django.utils.translation import gettext
 from rehab.feedback.clinic_valences import valences_of
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
-from rehab.people.models.blinding import hidden_patients
+from rehab.people.models.hidden_patients import hidden_patients
 from rehab.sessions.alarms import ACKNOWLEDGMENTS, Alarm, OpenAlarms
 from rehab.sessions.live import runtime
 from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder

@@ -31,31 +31,31 @@ BUFFER_S = 360
 # What pylsl raises for streams that do not answer or are gone: TimeoutError, LostError.
 LOST = (RuntimeError, TimeoutError)
 CHUNK = 1024
+SLEW, JUMP_S = 0.001, 0.1
 
 
 class ClockCorrection:
     """Converts a sender's time stamps to this machine's clock, without steps in between.
 
-    The measured difference varies by fractions of a millisecond. It is followed by at most ``slew``
-    of the time that passes; a change of more than ``jump_s`` is another clock, and applied at once.
+    The measured difference varies by fractions of a millisecond. It is followed by at most ``SLEW``
+    of the time that passes; a change of more than ``JUMP_S`` is another clock, and applied at once.
     """
 
-    def __init__(self, measured_s: float, slew: float = 0.001, jump_s: float = 0.1) -> None:
+    def __init__(self, measured_s: float) -> None:
         self.offset_s = self._target_s = measured_s
-        self._slew, self._jump_s = slew, jump_s
         self._last_s: float | None = None
 
     def update(self, measured_s: float) -> None:
         """Set the newly measured difference [s], our clock less the sender's."""
         self._target_s = measured_s
-        if abs(measured_s - self.offset_s) > self._jump_s:
+        if abs(measured_s - self.offset_s) > JUMP_S:
             self.offset_s = measured_s
 
     def correct(self, stamps_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the times of stamps on this machine's clock."""
         passed_s = 0.0 if self._last_s is None else max(0.0, float(stamps_s[-1]) - self._last_s)
         self._last_s = float(stamps_s[-1])
-        most_s = self._slew * passed_s
+        most_s = SLEW * passed_s
         before_s = self.offset_s
         self.offset_s += min(max(self._target_s - self.offset_s, -most_s), most_s)
         # Spread over the stamps, so that their order stays.

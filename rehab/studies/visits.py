@@ -18,8 +18,8 @@ from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
 from rehab.studies.registration.document import find_rule
 from rehab.studies.registration.lifecycle import check_no_open_session, current_version
-from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.changes import State
+from rehab.training.goal_adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from robot.wire.cue_limits import SEED_MAX

@@ -47,13 +47,18 @@ class Band:
         return tuple(filter(None, map(str.strip, self.words.splitlines())))
 
 
-# The bands of hits that earn points. Their limits: docs/reference/scoring.md#bands (they split the
-# recorded strides usefully; the original's did not).
-REWARDING = (
+# The default bands of the feedback types. Their limits: docs/reference/scoring.md#bands (they split
+# the recorded strides usefully; the original's did not).
+_REWARDING = (
     Band(1, phrases.REACHED, Confetti.LITTLE),
     Band(1.1, phrases.STRONG, Confetti.MUCH),
     Band(1.25, phrases.STRONGEST, Confetti.MOST),
 )
+_MISSED = (Band(0, phrases.FAR_BELOW), Band(0.75, phrases.BELOW))
+POSITIVE_BANDS = (Band(0, phrases.ONWARD), Band(0.75, phrases.NEAR), *_REWARDING)
+NEGATIVE_BANDS = (*_MISSED, Band(1, phrases.NOTHING_LOST))
+BINARY_BANDS = (*_MISSED, *_REWARDING)
+EXPLICIT_BANDS = (Band(0, phrases.MEASURED),)
 
 
 def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:

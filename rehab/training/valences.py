@@ -11,8 +11,15 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 
-from rehab.training import phrases
-from rehab.training.bands import BANDS_MAX, REWARDING, TEXT_MAX, Band
+from rehab.training.bands import (
+    BANDS_MAX,
+    BINARY_BANDS,
+    EXPLICIT_BANDS,
+    NEGATIVE_BANDS,
+    POSITIVE_BANDS,
+    TEXT_MAX,
+    Band,
+)
 from rehab.training.measures import InvalidSetting
 from robot.marking import Marked, gettext_noop
 from robot.wire.cue_limits import VARIED
@@ -169,11 +176,7 @@ POSITIVE = Valence(
     hue="blue",
     hit_points=1,
     miss_points=0,
-    bands=(
-        Band(0, phrases.ONWARD),
-        Band(0.75, phrases.NEAR),
-        *REWARDING,
-    ),
+    bands=POSITIVE_BANDS,
     cue=CueGestures(above=VARIED),
 )
 NEGATIVE = Valence(
@@ -182,11 +185,7 @@ NEGATIVE = Valence(
     hue="apricot",
     hit_points=0,
     miss_points=-1,
-    bands=(
-        Band(0, phrases.FAR_BELOW),
-        Band(0.75, phrases.BELOW),
-        Band(1, phrases.NOTHING_LOST),
-    ),
+    bands=NEGATIVE_BANDS,
     cue=CueGestures(below=VARIED),
 )
 BINARY = Valence(
@@ -195,11 +194,7 @@ BINARY = Valence(
     hue="rose",
     hit_points=1,
     miss_points=-1,
-    bands=(
-        Band(0, phrases.FAR_BELOW),
-        Band(0.75, phrases.BELOW),
-        *REWARDING,
-    ),
+    bands=BINARY_BANDS,
     cue=CueGestures(above=VARIED, below=VARIED),
 )
 EXPLICIT = Valence(
@@ -208,7 +203,7 @@ EXPLICIT = Valence(
     hue="graphite",
     hit_points=None,
     miss_points=None,
-    bands=(Band(0, phrases.MEASURED),),
+    bands=EXPLICIT_BANDS,
     cue=CueGestures(),
 )
 

@@ -81,5 +81,4 @@ class BesideAnswers:
         self._body.perform(
             choice.gesture, cue.intensity, now_s, state, is_quiet=cue.is_quiet, choice=choice
         )
-        self._idle.disturb(now_s)
         return True

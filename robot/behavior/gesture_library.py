@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture import Gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gestures import known_names
+from robot.motion.gestures import BUILT_IN, known_names
 from robot.motion.limits import Limits
 
 # Why a name cannot be performed.
@@ -21,14 +21,11 @@ class GestureLibrary:
 
     Parameters
     ----------
-    builtin
-        Those that no cue may replace.
     limits
         Speeds and accelerations that a gesture must keep to.
     """
 
-    def __init__(self, builtin: Mapping[str, Gesture], limits: Limits) -> None:
-        self.builtin = builtin
+    def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._received: dict[str, Gesture | None] = {}  # None: refused
 
@@ -41,10 +38,6 @@ class GestureLibrary:
         for data in gestures:
             try:
                 gesture = validate_gesture(data, self._limits)
-                if gesture.name in self.builtin:
-                    raise BadGesture(
-                        "This robot has a gesture {name} of its own.", name=gesture.name
-                    )
             except BadGesture as problem:
                 name = data.get("name") if isinstance(data, dict) else None
                 # A name that every robot knows means that gesture, whatever else comes under it.
@@ -60,5 +53,5 @@ class GestureLibrary:
         if name in self._received:
             gesture = self._received[name]
             return gesture, "" if gesture else BAD_GESTURE
-        gesture = self.builtin.get(name)
+        gesture = BUILT_IN.get(name)
         return gesture, "" if gesture else UNKNOWN_GESTURE

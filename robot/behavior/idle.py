@@ -18,12 +18,12 @@ from robot.motion.pools import IDLE
 # else that moved or was decided; and what a late base takes beyond what a motion needs.
 LEAST_S, SPREAD_S = 5.0, 9.0
 PAUSE_S = 0.8
-LATE_S = 0.8
+BASE_LATE_S = 0.8
 
 
 def needed_s(gesture: Gesture, pace: float) -> float:
     """Return how long a motion is to be free of answers [s], its announcement included."""
-    return ANNOUNCE_S + gesture.min_duration_s(pace) + LATE_S
+    return ANNOUNCE_S + gesture.min_duration_s(pace) + BASE_LATE_S
 
 
 class IdleLife:

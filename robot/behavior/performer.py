@@ -1,8 +1,8 @@
 """What a robot does with the server's messages. Time is a parameter, so that hours take a second.
 
-It moves only while all of this holds: the server was heard within ``SERVER_SILENT_S``, the session
-runs, and ``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is
-not played later, nor one whose steps waited while this program hung.
+It moves only while all of this holds: the server was heard lately, the session runs, and
+``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is not played
+later, nor one whose steps waited while this program hung.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from robot.behavior.beside_answers import MOMENTS, BesideAnswers
 from robot.behavior.body import Body
 from robot.behavior.cue import Cue
 from robot.behavior.gesture_library import GestureLibrary
-from robot.behavior.safety import LAPSED_S, SERVER_SILENT_S, STOPPED
+from robot.behavior.safety import LAPSED_S, STOPPED, is_server_silent
 from robot.behavior.status import Report
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
-from robot.motion.gestures import BUILT_IN, ORIGINALS
+from robot.motion.gestures import ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
@@ -48,8 +48,6 @@ class Performer:
         An open base; nothing else may order it.
     limits
         Speeds and accelerations of every gesture.
-    gestures
-        The gestures that a cue may name.
     homing
         Drives it home by its tag; None where it has learned none.
 
@@ -71,11 +69,10 @@ class Performer:
         self,
         base: MobileBase,
         limits: Limits = DEFAULT_LIMITS,
-        gestures: Mapping[str, Gesture] = BUILT_IN,
         homing: Homing | None = None,
     ) -> None:
         self.body = Body(base, limits, homing)
-        self.gestures = GestureLibrary(gestures, limits)
+        self.gestures = GestureLibrary(limits)
         self.decider = WindowDecider(Cue())
         self.answers, self._beside = AnswerChooser(0), BesideAnswers(self.body, 0)
         self.decision: Decision | None = None
@@ -146,7 +143,7 @@ class Performer:
         """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
         self._has_hung, self._ticked_s = now_s - self._ticked_s > LAPSED_S, now_s
         # Without a session it does not move, and the server sends no heartbeat.
-        if self.session is not None and self.is_linked and now_s - self._heard_s > SERVER_SILENT_S:
+        if self.session is not None and self.is_linked and is_server_silent(self._heard_s, now_s):
             self.disconnect(NO_LINK)
         free_s = self.decider.free_s(self._step_s + now_s - self._stepped_s)
         may_idle = self.decider.cue.idles and self.may_act

@@ -77,6 +77,11 @@ OPEN_LOOP = "open_loop"  # too long a gesture for a base without odometry
 PLACE_UNKNOWN = "place_unknown"  # a person has to look at such a base, and arm it
 
 
+def is_server_silent(heard_s: float, now_s: float) -> bool:
+    """Return whether the server was heard too long ago [s] for the robot to move."""
+    return now_s - heard_s > SERVER_SILENT_S
+
+
 def battery_share(battery_v: float) -> float:
     """Return how full a battery of that voltage [V] is, 0 to 1.
 

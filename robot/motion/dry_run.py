@@ -7,9 +7,9 @@ from functools import lru_cache
 from typing import Any
 
 from robot.marking import Marked
+from robot.motion.composed_gestures import parse_gesture
 from robot.motion.gesture import Gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import parse_gesture
 from robot.motion.limits import DEFAULT_LIMITS, TETHER_M, TICK_S, Limits
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME, Pose, advance

@@ -23,7 +23,7 @@ BAD_ODOMETRY = "bad_odometry"
 # turns once more if they have carried it past.
 SETTLE_S = 0.1
 # One that is nearly at home when its time is over goes the rest at half its pace, so long [s].
-LATE_S = 2.0
+LATE_RETURN_S = 2.0
 LATE_PACE = 0.5
 
 
@@ -172,7 +172,7 @@ class Player:
                 if self._is_late or self._waypoints or not _is_near_home(here):
                     self._verdict = OUT_OF_TIME
                 else:
-                    self._is_late, self._until_s = True, time_s + LATE_S
+                    self._is_late, self._until_s = True, time_s + LATE_RETURN_S
             elif self._segments:
                 wanted = self._follower.follow(self._segments[0], here, limits)
                 if wanted is not None:

@@ -52,7 +52,7 @@ WITH_GOOD_STEP = ("positive", "binary")
 
 FRESH_S = 1.0  # an event that could not be sent for this long is dropped
 MAX_EVENTS = 8
-LATE_S = 2.0  # a message without an echo by then has not arrived
+ECHO_S = 2.0  # a message without an echo by then has not arrived
 NUMBER_MAX = 1e6
 FALSE_EVERY_S = 0.5  # a new subscriber, or one that ROS has not connected yet, misses some
 FIRST_FALSES = LAST_FALSES = 3
@@ -231,7 +231,7 @@ class OriginalTopicClient:
     def problem(self, now_s: float) -> str:
         """Return which topic does not arrive; empty where all do."""
         for topic in self._topics:
-            if now_s - self._unconfirmed.get(topic.name, math.inf) > LATE_S:
+            if now_s - self._unconfirmed.get(topic.name, math.inf) > ECHO_S:
                 cure = "; build the package garry_ros there" if topic is DATA else ""
                 return (
                     f"Nothing that is sent on {topic.name} comes back. Its type has to be "

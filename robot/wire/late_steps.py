@@ -7,7 +7,7 @@ from __future__ import annotations
 
 # A step later than this is stored and counted, but never shown as live
 # (docs/reference/scoring.md#late-steps).
-LATE_S = 5.0
+LATE_STEP_S = 5.0
 # How much slower than ours a clock may run. A ceramic resonator, the worst that times a sensor, is
 # off by ±0.5 % when it is made and ±0.2 % by temperature (Murata, CERALOCK catalog P16E), a quartz
 # by less than ±0.01 %; ours is a quartz. So drift alone makes no time late, and the estimate falls
@@ -20,7 +20,7 @@ class RemoteClock:
 
     The time that arrived with the shortest delay so far stands for a fresh one. The estimate decays
     by ``DRIFT_MAX``, so that a clock that runs slow is followed; a delay that grows no faster
-    looks the same. A time more than ``LATE_S`` before the last one was read from a clock
+    looks the same. A time more than ``LATE_STEP_S`` before the last one was read from a clock
     that was set back, by a device that restarted or by its network time: the estimate begins anew.
 
     Parameters
@@ -58,7 +58,7 @@ class RemoteClock:
         now_s
             Ours [s].
         """
-        slack_s = LATE_S * max(1.0, self._speed)
+        slack_s = LATE_STEP_S * max(1.0, self._speed)
         offset = time_s - now_s * self._speed
         known, last_s, self._last_s = self._decayed_offset(now_s), self._last_s, time_s
         if known is None or (last_s is not None and time_s < last_s - slack_s):

@@ -63,8 +63,9 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from django.utils import timezone
 
     from rehab.sessions.live import auth
-    from rehab.sessions.live.database import owners
-    from rehab.sessions.live.protocol import backlog, resent_steps
+    from rehab.sessions.live.consumers import screens
+    from rehab.sessions.live.database import clinic_owners
+    from rehab.sessions.live.protocol import resent_steps
     from rehab.sessions.live.session import loading
     from rehab.sessions.live.session.commits import Job, commit
     from rehab.sessions.models import TrainingSession
@@ -73,9 +74,9 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from rehab.training.measures import Measure
     from rehab.training.steps import Measurement, Side
 
-    yield "find_ownerless", owners.find_ownerless
+    yield "find_ownerless", clinic_owners.find_ownerless
     clinic = TrainingSession.everywhere.get(pk=keys[0]).clinic_id
-    epoch = owners.claim(clinic).epoch
+    epoch = clinic_owners.claim(clinic).epoch
     found = loading.load_together({keys[0]: epoch})[keys[0]]
     assert isinstance(found, loading.LoadedSession), found
     aggregate = found.aggregate
@@ -102,20 +103,20 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
         "commit a change",
         lambda: commit([job(aggregate.change(pause, None, timezone.now()), aggregate.summary())]),
     )
-    yield "a page's past steps", lambda: async_to_sync(backlog.read_backlog)(keys[0], 900, 1800)
+    yield "a page's past steps", lambda: async_to_sync(screens.read_backlog)(keys[0], 900, 1800)
     resent, measure = Measurement(900, 990.0, Side.LEFT, 3.0), aggregate.fold.plan.measure
     assert isinstance(measure, Measure)
     yield (
         "a step that came again",
-        lambda: async_to_sync(resent_steps.is_duplicate)(keys[0], resent, measure),
+        lambda: async_to_sync(resent_steps.check_same)(keys[0], resent, measure, 1),
     )
     device = Device.everywhere.filter(kind=Device.Kind.SOURCE)[0]
     tablet = Device.everywhere.filter(kind=Device.Kind.TABLET)[0]
     yield "a station's open session", lambda: async_to_sync(auth.find_open_session)(device, None)
     yield "its newest", lambda: loading.find_newest_open(device.station_id)
     yield "may a tablet open it", lambda: async_to_sync(auth.may_open)(tablet, keys[0])
-    yield "note ends", lambda: owners.note_ends(keys[:52])
-    yield "release", lambda: owners.release([clinic])
+    yield "note ends", lambda: clinic_owners.note_ends(keys[:52])
+    yield "release", lambda: clinic_owners.release([clinic])
 
 
 def measure(rows: int) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """Mutation bench (`make mutate`): change the product a little, and see whether a test notices.
 
 Each mutant is one small change (a comparison, a number, a condition, a call that goes, …) in a copy
-of the tree. One run of all tests tells which of them come to the changed statements; a mutant meets
-those, the quick files first, and is killed where one fails that passed before. Which mutants are
+of the tree. One run of all tests tells which of them come to the changed statements (for what runs
+while a module is imported: those in the folder that mirrors its own); a mutant meets those, the
+quick files first, and is killed where one fails that passed before. Which mutants are
 made depends on the seed and on the code alone, so that two runs of one tree agree.
 
 `--seed`, `--each` (mutants a package), `--only` (a package), `--tree` (another checkout).
@@ -94,9 +95,19 @@ class Tree:
         found: list[list[str]] = [[] for _ in chosen]
         for line in hits.read_text().splitlines():
             mutant_number, _, test = line.partition("\t")
-            if test in duration_s:
+            if not test:  # at import, once for all tests
+                folder = self.mirror(chosen[int(mutant_number)].file)
+                found[int(mutant_number)] += [one for one in duration_s if one.startswith(folder)]
+            elif test in duration_s:
                 found[int(mutant_number)].append(test)
         return [_quick_files_first(tests, duration_s) for tests in found]
+
+    def mirror(self, file: str) -> str:
+        """Return the folder of tests that mirrors a module's, or the innermost one around it."""
+        folder = Path("tests", Path(file).parent.as_posix().removeprefix("rehab/"))
+        while not (self.checkout / folder).is_dir():
+            folder = folder.parent
+        return f"{folder.as_posix()}/"
 
     def killer(self, mutant: Mutant, tests: list[str]) -> str:
         """Return the test that notices, or ""."""

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from PIL import Image, ImageDraw
 
-from robot.bases.twin.renderer import WALKER, Renderer, View
+from robot.bases.twin.renderer import Renderer, View
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import BUILT_IN
@@ -37,7 +37,9 @@ CLASSES = {
     "idle": ("idle",),
 }
 FRAMES, EVERY_S, ACROSS, LABEL_PX = 16, 0.3, 4, 22  # as far apart in each strip: speed is seen
-BASE = View((2.0, 0.0, 1.55), (0.06, 0.0, 0.08), 15.0, 360, 270)  # from the same eyes, nearer
+# What somebody sees who walks 2 m in front of it, with eyes at 1.55 m; its base alone.
+WALKER = View((2.0, 0.0, 1.55), (0.0, 0.0, 0.335), 28.0, 210, 340)
+BASE = View((2.0, 0.0, 1.55), (0.06, 0.0, 0.08), 15.0, 360, 270)
 SESSION_ACROSS = 8  # answers in a row of a session's sheet
 
 

@@ -12,8 +12,9 @@ from scipy.signal import butter, sosfiltfilt
 from rehab.gait import LegSamples, TwoLegDetector
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake import Intake, IntakeSettings
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.training.steps import Measurement, Side
+from tests.support.synthetic_recordings import make_signals
 
 REPEATS = 5
 CHUNK = 50

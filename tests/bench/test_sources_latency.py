@@ -15,10 +15,11 @@ import pytest
 from rehab.gait import LegSamples, TwoLegDetector
 from rehab.sources.lsl import load_pylsl
 from rehab.sources.reporting import SourceError
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.sources.synthetic.walker import walk
 from tests.support.running_source import NAMES, run_source, send_in_time
 from tests.support.server_restarts import walk_with_restarts
+from tests.support.synthetic_recordings import make_signals
 from tests.support.torture import Torture
 
 LOOK_AHEAD_S = 0.05

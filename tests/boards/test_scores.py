@@ -17,7 +17,6 @@ from rehab.boards.choices import CountedTypes
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels.own_panels import Scale, make_board, scale_of
 from rehab.boards.ranking.anonymity import MAX_OWN, find_visible_own_rows
-from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import CountedSession
 from rehab.boards.ranking.standings import Standings
@@ -232,8 +231,7 @@ def own_session(pk: int, valence: str = "", cost: int = 1, **values: float) -> C
 def rank(scale: Scale, sessions: list[CountedSession], **fields: str) -> Standings:
     board = make_board(scale, CountedTypes.ALL)
     vars(board).update(fields)
-    period = period_of(board, NOW)
-    return Standings(own_results(board, sessions, "", period), board.ties)
+    return Standings(own_results(board, sessions, ""), board.ties)
 
 
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)).filter(any), max_size=30))

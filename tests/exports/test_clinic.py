@@ -444,6 +444,6 @@ def test_a_server_that_has_the_clinic_is_waited_for(world, file, key):
 
 
 def _started(pid: int) -> str:
-    from rehab.sessions.live.database import owners
+    from rehab.sessions.live.database import clinic_owners
 
-    return owners._start_time(pid)
+    return clinic_owners._start_time(pid)

@@ -22,7 +22,7 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.step_up import CONFIRMED_AT, LIFETIME
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.models import TrainingSession
 from tests.support.accounts import PASSWORD
 from tests.support.archives import body_of
@@ -137,7 +137,7 @@ def test_nothing_begins_while_one_runs_or_by_a_wrong_form(amber, host, monkeypat
     assert 'class="errorlist"' in press(host, clinic, "remove", receipt="xyz")
     assert not Job(clinic.pk).folder.exists()
     press(host, clinic, "verify")
-    monkeypatch.setattr(owners, "is_alive", lambda _owner: True)
+    monkeypatch.setattr(clinic_owners, "is_alive", lambda _owner: True)
     answer = host.post(page_of(clinic), {"part": "export", "keys": PUBLIC})
     assert answer["Refresh"]
     assert "<form" not in re.sub(r"(?s).*<main", "", answer.content.decode()).split("</main")[0]

@@ -19,10 +19,10 @@ from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
 from rehab.people.sign_in.step_up import CONFIRMED_AT
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.participants import Enrollment
 from rehab.studies.record.adverse_events import AdverseEvent
 from rehab.studies.registration.lifecycle import close
-from rehab.studies.unblinding import Task, give_mark
 from tests.support.clock import START as NOW
 from tests.support.programs import ROOT, program_of
 from tests.support.studies import enrolled, new_patient, running_study

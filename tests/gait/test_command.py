@@ -2,13 +2,15 @@
 
 import importlib.util
 import json
+from unittest.mock import MagicMock, Mock
 
 import numpy as np
 import pytest
 
 from rehab.gait import LegSamples
 from rehab.gait.__main__ import main
-from rehab.gait.recordings.plot import compute_curves
+from rehab.gait.recordings import plot
+from rehab.gait.recordings.plot import compute_curves, plot_strides
 from tests.gait.walks import make_walk, read_moore
 from tests.support.data import signals
 
@@ -114,6 +116,24 @@ def test_plot(lab_file, tmp_path, capsys):
     else:
         assert result == 0
         assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_each_panel_of_a_plot_says_which_leg_and_what(monkeypatch, tmp_path):
+    walk, _ = make_walk(strides=6)
+    drawn: list[list[Mock]] = []
+
+    def subplots(rows, columns, **_):
+        panel = {"get_ylim.return_value": (0, 1)}
+        drawn.extend([Mock(**panel) for _ in range(columns)] for _ in range(rows))
+        return MagicMock(), np.array(drawn)
+
+    monkeypatch.setattr(plot, "load_pyplot", lambda: MagicMock(subplots=subplots))
+    legs = {"left": LegSamples(*walk.left), "right": LegSamples(*walk.right)}
+    strides = list(walk.one_leg())
+    plot_strides(tmp_path / "p.png", walk.t_s, legs, strides, rate_hz=100, mass_kg=walk.mass_kg)
+    labels = [panels[0].set_ylabel.call_args.args[0] for panels in drawn]
+    rows = (*plot.ROWS, "A2 [W/kg]")
+    assert labels == [f"{side}\n{row}" for side in legs for row in rows]
 
 
 def test_what_is_plotted_is_what_was_measured():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rehab.gait import LegSamples, check_signals
-from rehab.gait.contacts.force_plate import STUCK_S
+from rehab.gait.contacts.contact_finder import STUCK_S
 from rehab.gait.selfcheck.cures import CURES
 from rehab.gait.stances.lag_watch import BRAKING_S
 from rehab.gait.stances.plausibility import STANCE_MAX_S

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, TwoLegDetector, check_signals, measure_strides
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.training.steps import Measurement, Side
 from tests.support.data import signals
+from tests.support.synthetic_recordings import make_signals
 
 FORCE, MOMENT, ANGLE = range(3)
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from django.core.management import CommandError, call_command
 
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -206,7 +206,7 @@ def test_a_run_that_breaks_leaves_an_aborted_session_with_its_steps(tmp_path):
 
 def test_a_clinic_that_another_process_runs_is_refused_before_anything_is_stored():
     world, parent = build_world("amber"), os.getppid()
-    owner = f"{socket.gethostname()}|{parent}|{owners._start_time(parent)}"
+    owner = f"{socket.gethostname()}|{parent}|{clinic_owners._start_time(parent)}"
     set_owner(world.clinic.pk, owner)
     before = TrainingSession.everywhere.count()
     with pytest.raises(CommandError, match=rf"another process \({parent}\).* --clinic"):

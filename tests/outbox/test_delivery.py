@@ -16,9 +16,9 @@ from django.utils import timezone
 from django.utils.formats import localize
 
 from rehab.exports.encryption import generate_key
-from rehab.outbox.delivery import deliver_due, is_due, sign
+from rehab.outbox.delivery import PAUSES, deliver_due, is_due, sign
 from rehab.outbox.http_post import Answer, Refused
-from rehab.outbox.models import PAUSES, Endpoint, OutboxMessage, Topic, notify
+from rehab.outbox.models import Endpoint, OutboxMessage, Topic, notify
 from rehab.people.roles import Role
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
 from rehab.sessions.log import Remark

@@ -24,8 +24,8 @@ from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, CueGestures, edit_valence
+from robot.motion.composed_gestures import Move, build_gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import Move, build_gesture
 from tests.support.forms import feedback_form, gesture_form, session_form
 from tests.support.programs import program_of
 from tests.support.world import World

@@ -15,7 +15,7 @@ from rehab.people.models import Clinic, SignOnGroup, User
 from rehab.people.roles import Role
 from rehab.people.sign_in import sign_on, step_up
 from rehab.people.sign_in.sign_on import LOGOUT_EVENT, SignOnRefused
-from rehab.studies.unblinding import Task, give_mark
+from rehab.studies.blinding import Task, give_mark
 from tests.support.studies import running_study
 from tests.support.world import NOW, signed_in
 

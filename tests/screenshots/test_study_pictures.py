@@ -26,7 +26,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.sessions.questionnaires import ask
-from rehab.studies.unblinding import Task, give_mark, reveal_arms
+from rehab.studies.blinding import Task, give_mark, reveal_arms
 from rehab.studies.enrolling import withdraw
 from rehab.studies.models import Study
 from rehab.studies.power_runs import plan_run

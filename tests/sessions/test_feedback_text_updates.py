@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from rehab.feedback.models import FeedbackType
 from rehab.people.roles import Role
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from tests.support.walks import make_session
@@ -107,7 +107,7 @@ def test_another_clinic_keeps_its_words(world, pt):
 
 def test_a_session_of_another_process_keeps_its_words_and_the_admin_says_so(world, pt):
     session = begin(world)
-    other = f"{socket.gethostname()}|{os.getppid()}|{owners._start_time(os.getppid())}"
+    other = f"{socket.gethostname()}|{os.getppid()}|{clinic_owners._start_time(os.getppid())}"
     set_owner(session.clinic_id, other)
     page = pt.post(f"{ADD}?slug=positive", form(), follow=True).content.decode()
     assert "keeps its words" in page

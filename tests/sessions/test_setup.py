@@ -18,7 +18,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
-from robot.motion.gesture_spec import parse_gesture
+from robot.motion.composed_gestures import parse_gesture
 from robot.motion.pose import HOME
 from robot.wire.cue_limits import CueRule
 from tests.support.page_text import plain

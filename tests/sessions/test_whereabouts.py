@@ -12,8 +12,8 @@ from rehab.feedback.models import FeedbackType
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.live import runtime
-from rehab.sessions.live.database import owners
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database import clinic_owners
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from tests.support.programs import program_of
 from tests.support.world import signed_in
 
@@ -33,7 +33,7 @@ def asked(world, monkeypatch) -> list[int]:
 
     live: Any = SimpleNamespace(servers=True, clinics=set())
     monkeypatch.setattr(runtime, "peek", lambda: live)
-    monkeypatch.setattr(owners, "find_elsewhere", find_elsewhere)
+    monkeypatch.setattr(clinic_owners, "find_elsewhere", find_elsewhere)
     return clinics
 
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rehab.sources.recording import Recording, parse_recording, read_recording
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.sources.synthetic.walker import walk
 from tests.sources.intake_harness import MASS
+from tests.support.synthetic_recordings import make_signals
 
 REPO = Path(__file__).parents[2]
 

@@ -74,8 +74,8 @@ class SignalRecordingLab(Lab):
     name, sends = "recording", False
 
     def arguments(self):
-        from rehab.sources.synthetic.signals import make_signals
         from rehab.sources.synthetic.walker import walk
+        from tests.support.synthetic_recordings import make_signals
 
         made = make_signals(list(walk(strides=20)))
         left = made.left

@@ -9,9 +9,10 @@ from typing import Any
 
 from rehab.sources.intake import LineReader
 from rehab.sources.synthetic import walk
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from tests.sources.intake_harness import MASS, IntakeHarness
 from tests.support.servers import ROOT
+from tests.support.synthetic_recordings import make_signals
 
 
 def test_the_documented_loop_sends_strides():

@@ -11,10 +11,11 @@ from rehab.gait import measure_strides
 from rehab.gait.recordings.columns import read_column_map
 from rehab.gait.recordings.readers import read_signals
 from rehab.gait.selfcheck.shapes import SHAPES
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.sources.synthetic.walker import walk
 from rehab.training.steps import Side
 from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure, rows_of
+from tests.support.synthetic_recordings import make_signals
 
 
 def same(stride, other):

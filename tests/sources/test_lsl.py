@@ -12,10 +12,10 @@ from rehab.sources.intake import Intake
 from rehab.sources.lsl import ClockCorrection, choose_streams, load_pylsl
 from rehab.sources.reporting import SourceError
 from rehab.sources.synthetic import walk
-from rehab.sources.synthetic.signals import make_signals
 from tests.sources.fake_lsl import FakeLsl
 from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure
 from tests.sources.labs import LslLab, until_strides
+from tests.support.synthetic_recordings import make_signals
 
 
 def test_a_correction_that_wanders_never_turns_the_stamps_around():

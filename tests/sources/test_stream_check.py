@@ -14,8 +14,9 @@ from rehab.sources.__main__ import EXIT_DONE, EXIT_UNSURE, EXIT_UNUSABLE, main
 from rehab.sources.intake import IntakeSettings, stream_check
 from rehab.sources.intake.stream_check import StreamCheck
 from rehab.sources.reporting import SourceError
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.sources.synthetic.walker import walk
+from tests.support.synthetic_recordings import make_signals
 
 MASS = 75.0
 NAMES = ("stamp", "FP1", "FP2", "LMom", "RMom", "LAnk", "RAnk")

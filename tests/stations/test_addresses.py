@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
-from rehab.stations.addresses import reachable_host
+from rehab.stations.pages.pairing import reachable_host
 from tests.support.world import World
 
 

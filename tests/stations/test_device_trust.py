@@ -19,7 +19,7 @@ from rehab.people.roles import Role
 from rehab.stations.models import Device, Station
 from rehab.stations.tablets import COOKIE
 from rehab.stations.tokens import find_device
-from rehab.studies.unblinding import Task, give_mark
+from rehab.studies.blinding import Task, give_mark
 from tests.support.studies import running_study
 from tests.support.tablets import (
     PAIR,

@@ -17,7 +17,7 @@ from rehab.sessions.forms.session import SessionForm
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import WORN_LIFETIME, Device
 from rehab.stations.tokens import find_device
-from rehab.studies.unblinding import Task, give_mark
+from rehab.studies.blinding import Task, give_mark
 from tests.support.studies import running_study
 from tests.support.tablets import shown_code
 from tests.support.world import NOW, World, signed_in

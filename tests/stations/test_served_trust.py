@@ -24,7 +24,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.studies.unblinding import Task, give_mark
+from rehab.studies.blinding import Task, give_mark
 from tests.support.studies import running_study
 from tests.support.tablets import approved
 from tests.support.world import NOW, build_world, signed_in

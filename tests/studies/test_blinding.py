@@ -21,10 +21,10 @@ from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.studies.blinding import Task, UnblindingRefused, give_mark, reveal_arms, take_mark
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.registration.lifecycle import close
-from rehab.studies.unblinding import Task, UnblindingRefused, give_mark, reveal_arms, take_mark
 from rehab.studies.visits import Place, next_visit, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule

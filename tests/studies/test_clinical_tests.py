@@ -12,6 +12,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment
 from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, define_outcomes
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.power_runs import build_trial
@@ -19,7 +20,6 @@ from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.lifecycle import close
 from rehab.studies.results.results import read_results
 from rehab.studies.results.tables import outcome_rows
-from rehab.studies.unblinding import Task, give_mark
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.trials import walk_visit

@@ -8,11 +8,11 @@ from django.urls import reverse
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.studies.analysis.blinding_index import bang_index, james_index
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.enrolling import withdraw
 from rehab.studies.guesses import UNKNOWN, guess_rows, record_guess
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.lifecycle import close
-from rehab.studies.unblinding import Task, give_mark
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.world import NOW, signed_in

@@ -14,10 +14,10 @@ from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
+from rehab.studies.blinding import reveal_arms
 from rehab.studies.record.adverse_events import propose
 from rehab.studies.registration.lifecycle import close
 from rehab.studies.results.results import read_results
-from rehab.studies.unblinding import reveal_arms
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind, NotAllowed
 from rehab.training.fold import SessionFold

@@ -18,12 +18,12 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.studies.allocation.scheme import Secret
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.registration.document import digest_of
 from rehab.studies.registration.lifecycle import close
 from rehab.studies.registration.sealing import unseal
-from rehab.studies.unblinding import Task, give_mark
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World, client_of, signed_in
 

@@ -14,6 +14,7 @@ from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.studies.agreements import agree, agreed_version, agreement_rows
+from rehab.studies.blinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
@@ -23,7 +24,6 @@ from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.lifecycle import close, register, revise
 from rehab.studies.results.results import read_results
-from rehab.studies.unblinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import draft_study, enrolled, new_patient, running_study

@@ -16,10 +16,10 @@ from rehab.people.audit import guards
 from rehab.people.audit.seals import LogSeal, find_broken, seal_logs
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.studies.blinding import Task, give_mark, reveal_arms, take_mark
 from rehab.studies.models import Study, StudyMark
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, empty_reasons
 from rehab.studies.registration.lifecycle import close
-from rehab.studies.unblinding import Task, give_mark, reveal_arms, take_mark
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.world import NOW, World
 

@@ -24,6 +24,7 @@ from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.studies.allocation.scheme import Secret
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Arm, Study
 from rehab.studies.registration.lifecycle import close, register, start
 from rehab.studies.registration.sealing import seal
@@ -35,7 +36,6 @@ from rehab.studies.simulation.study import find_or_plan
 from rehab.studies.simulation.study import walk_study as study_walks
 from rehab.studies.simulation.trial import simulate
 from rehab.studies.simulation.walkers import Population
-from rehab.studies.unblinding import Task, give_mark
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan

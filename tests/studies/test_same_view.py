@@ -22,9 +22,9 @@ from rehab.people.access import for_roles
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Study
 from rehab.studies.results.drawing import FIGURES, TABLES
-from rehab.studies.unblinding import Task, give_mark
 from rehab.training.valences import VALENCES
 from tests.support.archives import body_of, open_archive, words_of
 from tests.support.tenancy import add_routes, all_routes

@@ -19,7 +19,7 @@ import psycopg
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from rehab.sessions.live.database.lease import Server, find_place
+from rehab.sessions.live.database.server_lease import Server, find_place
 from tests.support.servers import ROOT, clean_environment, free_port, run_python
 
 Message = dict[str, Any]

@@ -12,8 +12,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rehab.sources.synthetic.signals import SyntheticRecording
 from tests.support.servers import ROOT
+from tests.support.synthetic_recordings import SyntheticRecording
 
 NAMES = [
     f"{side}_{name}" for side in ("left", "right") for name in ("force_n", "moment_nm", "angle_rad")

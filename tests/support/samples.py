@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rehab.sources.synthetic import walk
-from rehab.sources.synthetic.signals import make_signals
 from rehab.training.phases import make_phase
 from tests.support.servers import ROOT
+from tests.support.synthetic_recordings import make_signals
 
 FOLDER = ROOT / "static" / "samples"
 SIGNALS = ["Time (s)"] + [

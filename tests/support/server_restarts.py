@@ -8,9 +8,10 @@ import re
 import signal
 from pathlib import Path
 
-from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.signals import Sensors
 from rehab.sources.synthetic.walker import walk
 from tests.support.running_source import NAMES, run_source, send_in_time
+from tests.support.synthetic_recordings import make_signals
 from tests.support.torture import Torture, Walk
 
 WARM_S = 1.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from rehab.sources.synthetic.leg import (
-    CONTACT_S,
     STRIDE_S,
     SWING_S,
     Floats,
@@ -14,7 +13,9 @@ from rehab.sources.synthetic.leg import (
     walk_foot,
 )
 
-__all__ = ["CONTACT_S", "STRIDE_S", "SWING_S", "Floats", "stand", "turn_foot", "walk_foot"]
+__all__ = ["STRIDE_S", "SWING_S", "Floats", "stand", "turn_foot", "walk_foot"]
+
+CONTACT_S = SWING_S  # in each stride, which begins with the swing
 
 
 def random_mounting(seed: int) -> Floats:

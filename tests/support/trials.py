@@ -40,11 +40,11 @@ from rehab.stations.models import Station
 from rehab.stations.tablets import COOKIE
 from rehab.stations.tokens import find_device
 from rehab.studies.allocation.scheme import Secret
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.enrolling import withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import AdverseEvent
 from rehab.studies.registration.sealing import seal
-from rehab.studies.unblinding import Task, give_mark
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from rehab.training.adaptation import GoalAdaptation
+from rehab.training.goal_adaptation import GoalAdaptation
 from rehab.training.goals import Target
 from rehab.training.measures import InvalidSetting, check_baseline_percent, check_gain
 from rehab.training.phases import make_phase

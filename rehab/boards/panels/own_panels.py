@@ -88,7 +88,7 @@ def make_own_panel(session: TrainingSession, now: datetime) -> BoardPanel:
         sessions = [
             one for one in sessions if "hit_rate" in one.values or one.session_id in imported
         ]
-    standings = Standings(own_results(board, sessions, session.valence, period))
+    standings = Standings(own_results(board, sessions, session.valence))
     visible = find_visible_own_rows(standings, standings.find_session(session.pk))
     walked = (
         TrainingSession.everywhere.only("created_at", "started_at", "active_s", "legacy_id")

@@ -136,7 +136,7 @@ class BoardViewer:
         neighbors = Leaderboard(among=Participants.SELF, display=DisplayMode.NEIGHBORS)
         period = period_of(board, self.now)
         sessions = read_sessions(board, TrainingSession.everywhere.filter(patient=patient), period)
-        results = own_results(board, sessions, self.valence, period)
+        results = own_results(board, sessions, self.valence)
         standings = Standings(results, board.ties)
         if board.aggregation == Aggregation.SUM:
             mine = format_rows(board, find_visible_rows(neighbors, standings, None))

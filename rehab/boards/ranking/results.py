@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rehab.boards.choices import Aggregation
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
-from rehab.boards.ranking.periods import Period, period_of
+from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.sessions import CountedSession, is_kept, read_sessions
 from rehab.sessions.models import TrainingSession
 
@@ -52,19 +52,18 @@ def read_results(
     eligible = eligible_patients(board)
     if patients is not None:
         eligible = eligible.filter(pk__in=patients)
-    period = period_of(board, now)
     walked = TrainingSession.everywhere.filter(patient__in=eligible)
-    sessions = read_sessions(board, walked, period)
+    sessions = read_sessions(board, walked, period_of(board, now))
     for _, group in groupby(sessions, key=lambda session: session.patient_id):
         lists: dict[str, list[CountedSession]] = defaultdict(list)
         for session in group:
             lists[board.list_key(session.valence)].append(session)
         for valence, own in lists.items():
-            yield aggregate(board, valence, own, period)
+            yield aggregate(board, valence, own)
 
 
 def own_results(
-    board: Leaderboard, sessions: Iterable[CountedSession], valence: str, period: Period
+    board: Leaderboard, sessions: Iterable[CountedSession], valence: str
 ) -> list[Result]:
     """Return the results of one patient's own sessions, in no order.
 
@@ -76,28 +75,24 @@ def own_results(
         if board.list_key(session.valence) == board.list_key(valence) and session.counts_for(board)
     ]
     if board.aggregation == Aggregation.SUM:
-        return [aggregate(board, valence, own, period)] if own else []
-    return [make_result(board, valence, [session], period) for session in own]
+        return [aggregate(board, valence, own)] if own else []
+    return [make_result(board, valence, [session]) for session in own]
 
 
-def aggregate(
-    board: Leaderboard, valence: str, sessions: list[CountedSession], period: Period
-) -> Result:
+def aggregate(board: Leaderboard, valence: str, sessions: list[CountedSession]) -> Result:
     """Return the result of a patient's sessions: their best, latest, mean or sum."""
     match board.aggregation:
         case Aggregation.BEST:
-            results = [make_result(board, valence, [session], period) for session in sessions]
+            results = [make_result(board, valence, [session]) for session in sessions]
             return min(results, key=lambda result: result.key)
         case Aggregation.MEAN:
             sessions = sessions[-board.mean_of :]
         case Aggregation.LATEST:
             sessions = sessions[-1:]
-    return make_result(board, valence, sessions, period)
+    return make_result(board, valence, sessions)
 
 
-def make_result(
-    board: Leaderboard, valence: str, sessions: Sequence[CountedSession], period: Period
-) -> Result:
+def make_result(board: Leaderboard, valence: str, sessions: Sequence[CountedSession]) -> Result:
     """Return the result of some sessions: the sum or the mean of their figures."""
 
     def combined(slug: str, of: Callable[[CountedSession, str], float]) -> int:

@@ -46,7 +46,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.audit.moves import ClinicMove
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.sign_in.tokens import draw_token, hash_token
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.setup.recordings import recordings_folder
 
@@ -158,7 +158,7 @@ class Arrival:
         with transaction.atomic():
             self.move.shared = place_shared(shared, key, self.move.shifts)
             self.move.save()
-            ClinicOwner.everywhere.create(pk=key, owner=owners.own_name())
+            ClinicOwner.everywhere.create(pk=key, owner=clinic_owners.own_name())
 
     def _local(self, table: Table, row: list[Any], column: str, names: dict[str, str]) -> list[Any]:
         """Return a row of the file as it is stored here. Raises CannotMove for another's row."""
@@ -239,7 +239,7 @@ def import_clinic(
                 "or remove it first."
             )
         owner = ClinicOwner.everywhere.filter(pk=move.clinic_id).values_list("owner", flat=True)
-        if (other := owner.first()) and owners.is_alive(other):
+        if (other := owner.first()) and clinic_owners.is_alive(other):
             raise CannotMove("This file is being taken in just now. Wait until that has ended.")
         delete_rows(move.clinic_id)  # of an import that was interrupted
     clinic = Arrival(content, now, log).load(file, identities, name)

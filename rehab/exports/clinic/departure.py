@@ -29,7 +29,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.sessions import seals as session_seals
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device
 
@@ -147,7 +147,7 @@ def _shut(clinic: Clinic, now: datetime) -> Iterator[None]:
         with transaction.atomic():
             User.everywhere.filter(pk__in=keys[0]).update(is_active=True)
             Device.everywhere.filter(pk__in=keys[1]).update(revoked_at=None)
-        owners.release([clinic.pk])
+        clinic_owners.release([clinic.pk])
         raise
 
 
@@ -156,9 +156,9 @@ def _wait_for_servers(clinic: Clinic, wait_s: float) -> None:
     until_s = time.monotonic() + wait_s
     while True:
         try:
-            owners.claim(clinic.pk)
+            clinic_owners.claim(clinic.pk)
             return
-        except owners.OwnedElsewhere as problem:
+        except clinic_owners.OwnedElsewhere as problem:
             if time.monotonic() > until_s:
                 raise CannotMove(
                     f"A server still has {clinic}, though nobody could sign in meanwhile. Restart "

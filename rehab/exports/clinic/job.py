@@ -11,7 +11,7 @@ from typing import IO
 
 from django.conf import settings
 
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 
 
 class Job:
@@ -30,7 +30,7 @@ class Job:
     @property
     def is_running(self) -> bool:
         """Whether its process runs, whichever server started it."""
-        return self._process.exists() and owners.is_alive(self._process.read_text("utf-8"))
+        return self._process.exists() and clinic_owners.is_alive(self._process.read_text("utf-8"))
 
     @property
     def said(self) -> str:
@@ -44,7 +44,7 @@ class Job:
         if not self.is_running:
             with self._output.open("wb") as output:
                 pid = run_aside([sys.executable, "-m", "garry_site", "clinic", *arguments], output)
-            self._process.write_text(owners.process_name(pid), "utf-8")
+            self._process.write_text(clinic_owners.process_name(pid), "utf-8")
 
 
 def run_aside(command: Sequence[str], output: IO[bytes]) -> int:

@@ -11,7 +11,7 @@ from rehab.outbox.delivery import WRITERS, NothingToSend, Request
 from rehab.outbox.models import Endpoint, OutboxMessage
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import User
-from rehab.people.models.blinding import is_in_running_study
+from rehab.people.models.hidden_patients import is_in_running_study
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 

@@ -27,7 +27,7 @@ from rehab.gait.setup.own_kinetics import compare_with_own
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
-from rehab.gait.stances.gaps import LATE_S
+from rehab.gait.stances.gaps import LATE_SAMPLE_S
 from rehab.gait.stances.lag_watch import find_moment_lag, find_pace
 from rehab.gait.strides import GaitInputError, Stride
 
@@ -110,7 +110,7 @@ def check_setup(
         if (values := [s.a2_w_kg for s in strides if s.side == side and s.valid and s.a2_w_kg])
     }
     (times,), late_s = SampleClock().add(np.array([time_s]))
-    late = 0 if late_s is None else int((late_s > LATE_S).sum())
+    late = 0 if late_s is None else int((late_s > LATE_SAMPLE_S).sum())
     lost = int((np.diff(times) > 2.5 / proposal.rate_hz).sum())
     check = check_signals(
         time_s,

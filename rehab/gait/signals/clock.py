@@ -19,7 +19,7 @@ from rehab.gait.strides import GaitInputError
 FIRST_SAMPLES = 64  # from which the period is known
 LINE_SAMPLES = 256  # of the newest, through which the line is drawn
 ANCHOR_SAMPLES = 32
-LATE_PERIODS, LATE_S = 0.5, 0.003  # beyond a period; jitter is a fifth of that (moore2013)
+LATE_PERIODS, LATE_STAMP_S = 0.5, 0.003  # beyond a period; jitter is a fifth of that (moore2013)
 # After a loss the stamps go on at the sensors' rate; after a stall they come in a burst, of half
 # a period a sample and less, until the line is reached.
 BURST_PACE = 0.9
@@ -221,7 +221,7 @@ def estimate_rate(t_s: Floats) -> float:
 
 
 def _find_tolerance(period_s: float) -> float:
-    return max(LATE_PERIODS * period_s, LATE_S)
+    return max(LATE_PERIODS * period_s, LATE_STAMP_S)
 
 
 def _first(found: NDArray[np.bool_]) -> int:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from rehab.gait.signals.clock import (
     FIRST_SAMPLES,
     LATE_PERIODS,
-    LATE_S,
+    LATE_STAMP_S,
     UNDECIDED_S,
     SampleClock,
 )
@@ -213,7 +213,9 @@ class FrameClock:
             first_s = float(np.median(behind))
             self._base = float(frames[0]), first_s
             spread_s = float(np.median(np.abs(behind - first_s)))
-            self._tolerance_s = max(LATE_PERIODS * usual * period_s, LATE_S, SPREAD * spread_s)
+            self._tolerance_s = max(
+                LATE_PERIODS * usual * period_s, LATE_STAMP_S, SPREAD * spread_s
+            )
         return not self.problem
 
     def _follow(self, stamps: list[float], frames: list[float]) -> tuple[list[int], Floats, int]:

@@ -14,7 +14,7 @@ from rehab.gait.strides import Flag, RejectionReason
 # Stalls before do no harm: 10.6 % rms between neighbors against 11.6 % without a stall, and 16 to
 # 31 % after (docs/reference/gait.md#time-base).
 HARMFUL_FROM = 0.55  # of stance
-LATE_S = 0.01
+LATE_SAMPLE_S = 0.01
 GAP_S = 0.05  # bridged by a straight line up to here (docs/reference/gait.md#time-base)
 GAP_MAX_S = 0.25  # before 55 % of stance; the filter settles in 0.15 s
 # Around late samples a curve of fourth order is drawn through moment and angle, by stamp and by
@@ -108,9 +108,9 @@ class ClockJudge:
         self._weigh(window, late_s)
         is_by_number = self._by_number > CERTAIN
         latest_s = float(late_s[stance:].max(initial=0.0))
-        if late_s[critical:].max(initial=0.0) > LATE_S and not is_by_number:
+        if late_s[critical:].max(initial=0.0) > LATE_SAMPLE_S and not is_by_number:
             reasons.append(RejectionReason.LATE)
-        elif latest_s > LATE_S:
+        elif latest_s > LATE_SAMPLE_S:
             flags.append(Flag.LATE)
         kinetics_s = time
         if not is_by_number:
@@ -120,7 +120,7 @@ class ClockJudge:
 
     def _weigh(self, window: Floats, late_s: Floats) -> None:
         """Add the evidence of this stance's late samples on how its moment and angle are made."""
-        is_late = np.concatenate(([False], late_s > LATE_S / 2, [False]))
+        is_late = np.concatenate(([False], late_s > LATE_SAMPLE_S / 2, [False]))
         edges = np.flatnonzero(is_late[1:] != is_late[:-1]).reshape(-1, 2)
         for first, last in edges:
             part = slice(max(0, first - self._around), last + self._around)

@@ -16,16 +16,13 @@ from rehab.gait.wearables.history import History, Moment
 from rehab.gait.wearables.mounting import Mounting
 from rehab.gait.wearables.orientation import NOWHERE, Orientation, Vector, dot
 from rehab.gait.wearables.readings import Reading
+from rehab.gait.wearables.sign import STRIDES_SURE, find_sign
 from rehab.gait.wearables.standing import Standing
 from rehab.gait.wearables.strides import Doubt, Place, WearableStride
 from rehab.gait.wearables.swings import GAP_S
 
 HELD_S = 60.0  # how long samples wait until the axis is known
-STRIDES_MIN, STRIDES_SURE = 3, 5  # of a sign that may be right; of the one with more of them
 STRIDES_ASKED = 12  # from which a sign that is still unknown is asked for
-# A leg moves less in the middle of a stance than in what is taken for one with the wrong sign; by
-# half where travel does not say where ahead is, which counts only about a certain axis.
-QUIETER, QUIETER_ALONE = 0.9, 0.5
 STRIDES_MOVED = 5  # that do not count after the sensor moved
 
 
@@ -225,22 +222,12 @@ class WearableDetector:
 
     def _judge(self) -> None:
         """Find the sign by the strides of both, or see that the one that is used is wrong."""
-        if max(one.count for one in self._readings) < STRIDES_SURE:
-            return
-        known = [one for one in self._readings if one.count >= STRIDES_MIN]
-        quiet = min(known, key=lambda one: one.motion_rad_s)
-        other = next(one for one in self._readings if one is not quiet)
-        ahead = self._axis.left_sign
-        if ahead not in (None, quiet.sign):
-            return
-        if ahead is None and (len(known) < 2 or not self._axis.is_sure):
-            return
-        limit = QUIETER_ALONE if ahead is None else QUIETER
-        if not quiet.is_plausible or quiet.motion_rad_s > other.motion_rad_s * limit:
+        found = find_sign(self._readings, self._axis)
+        if found is None:
             return
         if self._best is None:
-            self._best = quiet
-        elif quiet is self._best:
+            self._best = found
+        elif found is self._best:
             self._contrary = 0
         else:
             self._contrary += 1

@@ -13,7 +13,7 @@ from django.utils import timezone
 
 from rehab.exports.backup import write_backup
 from rehab.exports.encryption import InvalidKey, read_recipients
-from rehab.management.new_file import new_file
+from rehab.management.files import new_file
 from rehab.outbox.models import Topic, notify
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act

@@ -26,8 +26,7 @@ from rehab.exports.clinic.departure import (
 from rehab.exports.clinic.rows import CannotMove, ClinicRows
 from rehab.exports.clinic.sealed_file import inspect, write_clinic
 from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_recipients
-from rehab.management.key_files import opened, read_key_file
-from rehab.management.new_file import new_file
+from rehab.management.files import new_file, opened, read_key_file
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
 from rehab.people.audit.moves import ClinicMove

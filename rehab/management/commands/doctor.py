@@ -22,14 +22,14 @@ from django.utils import timezone
 
 from rehab.exports.research.sinks import FORMATS
 from rehab.gait.recordings.readers import READERS
-from rehab.management.new_file import new_file
+from rehab.management.files import new_file
 from rehab.management.problem_report import write_report
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
 from rehab.people.server_keys import ServerKey
 from rehab.people.sign_in.first_start import count_pending_migrations
 from rehab.sessions import seals as session_seals
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import DamagedLog, check_log
@@ -163,7 +163,7 @@ def examine_files() -> Iterator[Diagnosis]:
 def examine_sessions() -> Iterator[Diagnosis]:
     """Diagnose running sessions, among them those of a process that no longer exists."""
     running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
-    clinics, _ = owners.find_ownerless()
+    clinics, _ = clinic_owners.find_ownerless()
     left = list(running.filter(clinic__in=clinics).order_by("pk").values_list("pk", flat=True))
     if left:
         yield Diagnosis(

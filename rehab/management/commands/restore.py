@@ -10,7 +10,7 @@ from django.core.management import BaseCommand, CommandError, call_command
 
 from rehab.exports.backup import CannotRestore, restore_backup
 from rehab.exports.encryption import CannotDecrypt
-from rehab.management.key_files import opened, read_key_file
+from rehab.management.files import opened, read_key_file
 from rehab.people.server_keys import close_keys_again
 
 

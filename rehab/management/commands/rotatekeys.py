@@ -14,7 +14,7 @@ from django.core.management import BaseCommand, CommandError
 
 from rehab.exports.clinic.rows import ENCRYPTED
 from rehab.exports.encryption import InvalidKey, read_recipients
-from rehab.management.key_files import read_key_file
+from rehab.management.files import read_key_file
 from rehab.people.server_keys import Purpose, ServerKey, add_key, close_keys_again, encrypt_again
 from rehab.people.sign_in.factors.factors import Authenticator
 

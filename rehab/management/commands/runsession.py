@@ -15,7 +15,7 @@ from django.core.management import BaseCommand, CommandError
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.sign_in.first_start import first_clinic, prepare_database
-from rehab.sessions.live.database.owners import OwnedElsewhere, find_elsewhere
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere, find_elsewhere
 from rehab.sessions.live.headless import (
     Pace,
     robot_steps,

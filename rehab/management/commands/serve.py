@@ -24,7 +24,7 @@ from rehab.people.sign_in.first_start import (
     first_password,
     prepare_database,
 )
-from rehab.sessions.live.database.lease import Lease
+from rehab.sessions.live.database.server_lease import Lease
 from rehab.sessions.live.pulse import notify
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.supervisor import local_address

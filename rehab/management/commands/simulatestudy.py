@@ -23,7 +23,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from rehab.sessions.live.headless import GIVE_WAY_S, Pace
 from rehab.studies.models import Study
 from rehab.studies.record.checklists import ITEMS, checklist_rows, checklist_text

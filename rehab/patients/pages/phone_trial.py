@@ -19,7 +19,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import StationTaken, change_session

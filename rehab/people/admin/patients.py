@@ -17,7 +17,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.aliases import format_alias
 from rehab.people.field_policy import details
 from rehab.people.models import Patient
-from rehab.people.models.blinding import is_in_running_study
+from rehab.people.models.hidden_patients import is_in_running_study
 from rehab.people.web.admin_base import ScopedAdmin
 
 

@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.append_only import Allowed, AppendOnlyModel
 from rehab.people.field_policy import personal_fields, retained
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
-from rehab.people.models.blinding import hidden_patients
+from rehab.people.models.hidden_patients import hidden_patients
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from asgiref.sync import sync_to_async
 
-from rehab.sessions.live.database import owners
-from rehab.sessions.live.database.owners import Claim
+from rehab.sessions.live.database import clinic_owners
+from rehab.sessions.live.database.clinic_owners import Claim
 
 
 class OwnedClinics:
@@ -55,7 +55,7 @@ class OwnedClinics:
 
     async def _claim(self, clinic_id: int) -> int:
         try:
-            claim = await sync_to_async(owners.claim)(clinic_id)
+            claim = await sync_to_async(clinic_owners.claim)(clinic_id)
             self.epochs[clinic_id] = claim.epoch
             self._on_claimed(claim)
             return claim.epoch
@@ -78,7 +78,7 @@ class OwnedClinics:
             for work in after:
                 await work
             if self.epochs.pop(clinic_id, None) is not None:
-                await sync_to_async(owners.release)([clinic_id])
+                await sync_to_async(clinic_owners.release)([clinic_id])
         finally:
             released.set()
             del self._releasing[clinic_id]
@@ -87,4 +87,4 @@ class OwnedClinics:
         """Release all clinics; what runs there goes on where the next process claims them."""
         await asyncio.gather(*self._claiming.values(), return_exceptions=True)
         held, self.epochs = list(self.epochs), {}
-        await sync_to_async(owners.release)(held)
+        await sync_to_async(clinic_owners.release)(held)

@@ -9,8 +9,8 @@ import logging
 from asgiref.sync import sync_to_async
 from django.utils import timezone
 
-from rehab.sessions.live.database import owners
-from rehab.sessions.live.database.owners import Claim, OwnedElsewhere
+from rehab.sessions.live.database import clinic_owners
+from rehab.sessions.live.database.clinic_owners import Claim, OwnedElsewhere
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.training.changes import Change, ChangeKind, PauseReason
@@ -32,7 +32,7 @@ class Recovery:
 
         Sessions of clinics that a process released when it was stopped go on as they are.
         """
-        orphaned, released = await sync_to_async(owners.find_ownerless)()
+        orphaned, released = await sync_to_async(clinic_owners.find_ownerless)()
         await self._take(orphaned)
         paused = len(self._orphaned)
         await self._take(released)
@@ -43,16 +43,16 @@ class Recovery:
         """Take over clinics whose server is gone, or that nobody has had for a beat.
 
         One that was just released is left to the server that is asked for it. ``thorough``: as of
-        ``owners.find_ownerless``.
+        ``clinic_owners.find_ownerless``.
         """
-        orphaned, released = await sync_to_async(owners.find_ownerless)(thorough=thorough)
+        orphaned, released = await sync_to_async(clinic_owners.find_ownerless)(thorough=thorough)
         left = {*orphaned, *released}
         again, self._left_before = left & self._left_before, left
         if not self._host.draining:
             await self._take(sorted(again))
 
     async def _take(self, clinic_ids: list[int]) -> None:
-        for clinic_id in filter(owners.belongs_here, clinic_ids):
+        for clinic_id in filter(clinic_owners.belongs_here, clinic_ids):
             try:
                 await self._host.clinics.own(clinic_id)
             except OwnedElsewhere:

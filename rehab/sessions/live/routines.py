@@ -16,11 +16,11 @@ from rehab.outbox.delivery import deliver_due, is_due
 from rehab.people.audit.seals import seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
-from rehab.sessions.live.session.instruments import LATE_S, TASK_FAILURES
+from rehab.sessions.live.session.instruments import LOOP_LATE_S, TASK_FAILURES
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.seals import PAUSE_S, seal_sessions
 from rehab.stations.models import Device
@@ -77,7 +77,7 @@ class Routines:
         while True:
             due_s = self._loop.time() + beats * ROBOT_HEARTBEAT_S
             await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
-            LATE_S.observe(self._loop.time() - due_s)
+            LOOP_LATE_S.observe(self._loop.time() - due_s)
             try:
                 await work()
             except Exception:
@@ -139,7 +139,7 @@ class Routines:
 
     async def _seal_logs(self) -> None:
         await database_sync_to_async(seal_logs)(timezone.now())
-        own = ClinicOwner.everywhere.filter(owner__in=("", owners.own_name()))
+        own = ClinicOwner.everywhere.filter(owner__in=("", clinic_owners.own_name()))
         mine = Q(clinic__in=own.values("clinic"))
         # In a thread apart: it pauses between batches, and pages must not wait for it.
         seal = database_sync_to_async(seal_sessions, thread_sensitive=False)

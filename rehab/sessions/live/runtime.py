@@ -16,7 +16,7 @@ from django.db import DatabaseError
 
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.clinics import OwnedClinics
-from rehab.sessions.live.database import lease, owners
+from rehab.sessions.live.database import clinic_owners, server_lease
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
 from rehab.sessions.live.orders import Order, carry_out
@@ -62,7 +62,7 @@ class Runtime:
         self.clinics = OwnedClinics(self.recovery.load)
         self._loader = Loader(self.clinics.own)
         self._opening: dict[int, asyncio.Task[None]] = {}
-        own = lease.held()
+        own = server_lease.held()
         # The other servers on the database, where there may be any.
         self.servers = Servers(self, self.recovery, own) if own is not None else None
         self.routines = Routines(self)
@@ -200,7 +200,7 @@ class Runtime:
         """
         paused = await self.recovery.recover()
         self.is_ready = True
-        if (own := lease.held()) is not None:
+        if (own := server_lease.held()) is not None:
             own.is_ready = True
         return paused
 
@@ -209,7 +209,7 @@ class Runtime:
         if live.is_running:
             return  # its source may reconnect
         self.sessions.pop(live.id, None)
-        await sync_to_async(owners.note_ends)([live.id])
+        await sync_to_async(clinic_owners.note_ends)([live.id])
 
     async def close_unused_clinics(self) -> None:
         """Release the clinics of which nobody is here."""
@@ -221,7 +221,7 @@ class Runtime:
     async def drain(self) -> None:
         """Close every socket so that clients reconnect, commit everything, stop."""
         self.draining = True
-        if (own := lease.held()) is not None:
+        if (own := server_lease.held()) is not None:
             own.is_ready = False
         await self.supervisor.stop_all()
         await self.routines.stop()
@@ -236,7 +236,7 @@ class Runtime:
         left = list(self.sessions)
         self.sessions.clear()
         try:
-            await sync_to_async(owners.note_ends)(left)
+            await sync_to_async(clinic_owners.note_ends)(left)
             await self.clinics.release_all()
         except DatabaseError:
             log.exception("Clinics could not be released; their sessions come back paused")

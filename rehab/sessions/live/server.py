@@ -19,7 +19,7 @@ from twisted.protocols.tls import TLSMemoryBIOProtocol
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database import lease
+from rehab.sessions.live.database import server_lease
 from rehab.sessions.live.encryption import encrypt
 from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
@@ -109,7 +109,7 @@ class LiveServer(Server):  # type: ignore[misc]
 
     def _run_tasks(self, loop: asyncio.AbstractEventLoop) -> None:
         faulthandler.enable()  # a supervisor ends a server that hangs by SIGABRT
-        own = lease.held()
+        own = server_lease.held()
         pulse = loop.create_task(keep_pulse(None if own is None else own.show_pulse))
         self._hold(pulse)  # it goes on while the server drains
         self._hold(loop.create_task(self._start()))

@@ -16,7 +16,7 @@ from collections.abc import Awaitable, Callable, Collection
 from asgiref.sync import sync_to_async
 from django.conf import settings
 
-from rehab.sessions.live.database import lease, owners
+from rehab.sessions.live.database import clinic_owners, server_lease
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.recovery import Recovery
@@ -56,7 +56,7 @@ class Servers:
         self,
         host: Host,
         recovery: Recovery,
-        own: lease.Lease,
+        own: server_lease.Lease,
         ask: Callable[[str], bool | None] = ask_if_ready,
     ) -> None:
         self._host = host
@@ -85,7 +85,8 @@ class Servers:
     async def _beat(self) -> None:
         """Each second: drop what others took, take over what is left, go where clinics belong."""
         if (entered := self._own.entered) != self._entered:
-            for clinic_id in await sync_to_async(owners.find_taken)(self._host.clinics.epochs):
+            taken = await sync_to_async(clinic_owners.find_taken)(self._host.clinics.epochs)
+            for clinic_id in taken:
                 self._host.lose(clinic_id)
             self._entered = entered
         if self._own.may_judge:
@@ -98,7 +99,7 @@ class Servers:
         """Release clinics that belong to another server, while no session there is open."""
         open_ones = {one.clinic_id for one in self._host.sessions.values() if one.is_open}
         for clinic_id in self._host.clinics:
-            place = lease.find_place(clinic_id, self._own.servers)
+            place = server_lease.find_place(clinic_id, self._own.servers)
             if clinic_id not in open_ones and place is not None and place.id != self._own.id:
                 await self._host.give_up(clinic_id)
 

@@ -20,7 +20,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.forms.names import refuse_names
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession

@@ -44,8 +44,8 @@ from rehab.training.controls import CONTROLS, Audience
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.steps import InvalidMeasurement, Measurement
+from robot.motion.composed_gestures import parse_gesture
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import parse_gesture
 from robot.motion.gestures import BUILT_IN
 from robot.motion.preview import preview
 from robot.wire.frames import BadFrame

@@ -10,8 +10,8 @@ from rehab.sessions.setup.option import (
     Option,
     OptionColumn,
 )
-from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.changes import ChangeKind
+from rehab.training.goal_adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import INTERVAL_MAX, Schedule, ScheduleKind
 from robot.wire.cue_limits import (

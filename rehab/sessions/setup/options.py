@@ -17,7 +17,7 @@ from rehab.sessions.setup.main_options import MAIN_OPTIONS
 from rehab.sessions.setup.option import Group, Option, OptionColumn
 from rehab.sessions.setup.walking import WalkingConditions
 from rehab.sessions.setup.walking_options import WALKING_OPTIONS
-from rehab.training.adaptation import GoalAdaptation
+from rehab.training.goal_adaptation import GoalAdaptation
 from rehab.training.goals import GoalRule, Target
 from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule

@@ -13,7 +13,7 @@ from rehab.sources.client.journal import Journal
 from rehab.sources.client.journal_state import JournalState
 from rehab.training.steps import InvalidReason, Measurement
 from robot.wire.frames import NAME
-from robot.wire.late_steps import LATE_S
+from robot.wire.late_steps import LATE_STEP_S
 from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 
 Message = dict[str, Any]
@@ -38,7 +38,7 @@ class _QueuedStep(NamedTuple):
     since_s: float  # when it was added, by our clock
 
     def is_late(self, now_s: float) -> bool:
-        return now_s - self.since_s > LATE_S
+        return now_s - self.since_s > LATE_STEP_S
 
 
 def add_own_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
@@ -132,11 +132,6 @@ class StepQueue:
     def unacknowledged(self) -> int:
         """How many steps are kept."""
         return len(self._kept)
-
-    @property
-    def in_flight(self) -> int:
-        """How many steps were sent and are not acknowledged."""
-        return self._sent
 
     @property
     def can_send(self) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.frames import FrameClock, read_frames
-from rehab.gait.stances.gaps import GAP_S, LATE_S
+from rehab.gait.stances.gaps import GAP_S, LATE_SAMPLE_S
 from rehab.sources.intake.alignment import Floats
 from rehab.training.steps import Measurement
 
@@ -92,7 +92,7 @@ class SignalQuality:
         if not len(times):
             return
         if late_s is not None:
-            self.late += int((late_s > LATE_S).sum())
+            self.late += int((late_s > LATE_SAMPLE_S).sum())
             self._latest_s = max(self._latest_s, float(late_s.max()))
         steps = np.diff(times, prepend=self._times_s.get(stream, times[0]))
         gaps = steps[steps > usual_s]

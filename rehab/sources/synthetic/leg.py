@@ -14,10 +14,9 @@ STRIDE_S, SWING_S = 1.2, 0.4
 RISE_S, SLAP_S = 0.2, 0.1  # heel rise before the swing, landing after it
 LENGTH_M = 0.9
 GRAVITY_M_S2 = 9.81
-CONTACT_S = SWING_S  # in each stride, which begins with the swing
 
 
-def turn_foot(t_s: Floats, strength: float = 1.0) -> Floats:
+def turn_foot(t_s: Floats) -> Floats:
     """Return the rate of rotation toes-down [rad/s] at these times."""
     phase = t_s % STRIDE_S
     swing = np.where(phase < SWING_S, -4.0 * np.sin(np.pi * phase / SWING_S), 0.0)
@@ -28,16 +27,14 @@ def turn_foot(t_s: Floats, strength: float = 1.0) -> Floats:
     )
     late = phase - (STRIDE_S - RISE_S)
     rise = np.where(late > 0, 5.5 * np.sin(np.pi * late / RISE_S), 0.0)
-    return strength * (swing + slap + rise)
+    return np.asarray(swing + slap + rise)
 
 
-def walk_foot(
-    seconds: float, rate_hz: float = 100.0, strength: float = 1.0
-) -> tuple[Floats, Floats, Floats]:
+def walk_foot(seconds: float, rate_hz: float = 100.0) -> tuple[Floats, Floats, Floats]:
     """Return times [s], rates [rad/s] and accelerations [m/s²] of a foot sensor, x ahead, z up."""
     t_s = np.arange(0, seconds, 1 / rate_hz)
     fine_s = np.arange(0, seconds, 0.001)
-    turned = np.cumsum(turn_foot(fine_s, strength)) * 0.001
+    turned = np.cumsum(turn_foot(fine_s)) * 0.001
     turned -= np.median(turned)
     phase = fine_s % STRIDE_S
     speed = np.where(
@@ -46,7 +43,7 @@ def walk_foot(
     pitch = np.interp(t_s, fine_s, turned)
     ahead = np.interp(t_s, fine_s, np.gradient(speed, 0.001))
     rate = np.zeros((len(t_s), 3))
-    rate[:, 1] = turn_foot(t_s, strength)
+    rate[:, 1] = turn_foot(t_s)
     acceleration = np.zeros_like(rate)
     # A foot that is turned toes-down by the pitch sees up and ahead turned the other way.
     acceleration[:, 0] = ahead * np.cos(pitch) - GRAVITY_M_S2 * np.sin(pitch)

@@ -7,9 +7,7 @@ stride's push-off is scaled so that moment × angular velocity peaks at the A2 t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,17 +39,6 @@ A2_DEFAULT_W_KG = 2.5
 
 
 @dataclass(frozen=True, slots=True)
-class TrueStride:
-    """What a synthetic stride was made with. ``is_bad``: its force was cut off in stance."""
-
-    side: str
-    initial_contact_s: float
-    terminal_contact_s: float
-    a2_w_kg: float | None
-    is_bad: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class LegSignals:
     """One leg's channels, shape (n,) each: plantarflexion, upward and forward are positive."""
 
@@ -59,18 +46,6 @@ class LegSignals:
     moment_nm: Floats
     angle_rad: Floats
     forward_n: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class SyntheticRecording:
-    """Signals of a walk and the strides that they were made from, in order of time."""
-
-    t_s: Floats
-    left: LegSignals
-    right: LegSignals
-    rate_hz: float
-    mass_kg: float
-    strides: tuple[TrueStride, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +84,10 @@ class LegBuilder:
 
     t_s: Floats
     mass_kg: float
-    side: str
     force: Floats = field(init=False)
     moment: Floats = field(init=False)
     angle: Floats = field(init=False)
     forward: Floats = field(init=False)
-    strides: list[TrueStride] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.force, self.moment, self.angle, self.forward = np.zeros((4, len(self.t_s)))
@@ -133,7 +106,7 @@ class LegBuilder:
         Its stance time is that of a stride of ``pace_s`` if given, else of its own time.
         """
         pace_s = pace_s or stride_s
-        stance_s = pace_s * min(0.8, STANCE_SHARE + 0.08 * (pace_s - 1.1))
+        stance_s = find_stance_s(pace_s)
         peak_nm_kg = min(max(0.5 + 0.35 * a2_w_kg, 0.4), 1.7)
         push_rad_s = _find_push(a2_w_kg, peak_nm_kg, stance_s)
         span = slice(*np.searchsorted(self.t_s, (begin_s, begin_s + stance_s)))
@@ -145,67 +118,15 @@ class LegBuilder:
         first = begin_s + angle_delay_s
         whole = slice(*np.searchsorted(self.t_s, (first, first + stride_s)))
         self.angle[whole] = _make_angle(stance_s, stride_s, push_rad_s)(self.t_s[whole] - first)
-        is_bad = stance is not None and bool(stance.reasons)
-        is_missing = stance is not None and stance.value is None
-        if is_bad:
+        if stance is not None and stance.reasons:
             self.force[span][len(share) // 2 : len(share) // 2 + max(1, len(share) // 10)] = 0
-        if is_missing:
+        if stance is not None and stance.value is None:
             self.moment[span] = np.nan
-        truth = None if is_missing else a2_w_kg
-        self.strides.append(TrueStride(self.side, begin_s, begin_s + stance_s, truth, is_bad))
 
 
-def make_signals(
-    strides: Sequence[Measurement],
-    mass_kg: float = 75.0,
-    sensors: Sensors | None = None,
-    seed: int = 0,
-    other_a2_w_kg: float = A2_DEFAULT_W_KG,
-    longest_s: float = 3.0,
-) -> SyntheticRecording:
-    """Return the signals of a walk whose strides of one leg are given, as ``walk`` yields them.
-
-    A stride lasts until the next one's time; where that is no stride time (pauses between trials),
-    it lasts 1.1 s: a time beyond ``longest_s`` is a pause. The other leg steps half a stride later.
-    A stride with reasons loses its force in mid-stance, one without a value its moment.
-    """
-    sensors = sensors or Sensors()
-    rng = np.random.default_rng(seed)
-    lengths = [b.time_s - a.time_s for a, b in pairwise(strides)]
-    lengths = [*lengths, lengths[-1] if lengths else 1.1]
-    lengths = [length if 0.5 <= length <= longest_s else 1.1 for length in lengths]
-    total_s = sum(lengths) + 2.0
-    count = int(total_s * sensors.rate_hz)
-    t_s = np.arange(count) / sensors.rate_hz
-    jitter = rng.normal(0, sensors.jitter_s, count)
-    t_s = t_s + np.clip(jitter, -0.4 / sensors.rate_hz, 0.4 / sensors.rate_hz)
-    trained = strides[0].side.value
-    other = "right" if trained == "left" else "left"
-    legs = {side: LegBuilder(t_s, mass_kg, side) for side in (trained, other)}
-    begin_s = 1.0
-    legs[other].walk(
-        begin_s - lengths[0] / 2, lengths[0], other_a2_w_kg, None, sensors.angle_delay_s
-    )
-    for stride, length, following in zip(
-        strides, lengths, [*lengths[1:], lengths[-1]], strict=True
-    ):
-        value = A2_DEFAULT_W_KG if stride.value is None else stride.value
-        legs[trained].walk(begin_s, length, value, stride, sensors.angle_delay_s)
-        legs[other].walk(
-            begin_s + length / 2,
-            (length + following) / 2,
-            other_a2_w_kg,
-            None,
-            sensors.angle_delay_s,
-        )
-        begin_s += length
-    signals = {side: add_sensors(leg, sensors, rng) for side, leg in legs.items()}
-    truth = sorted(
-        (s for leg in legs.values() for s in leg.strides), key=lambda s: s.terminal_contact_s
-    )
-    return SyntheticRecording(
-        t_s, signals["left"], signals["right"], sensors.rate_hz, mass_kg, tuple(truth)
-    )
+def find_stance_s(stride_s: float) -> float:
+    """Return how long a stride's stance lasts [s]."""
+    return stride_s * min(0.8, STANCE_SHARE + 0.08 * (stride_s - 1.1))
 
 
 def add_sensors(leg: LegBuilder, sensors: Sensors, rng: np.random.Generator) -> LegSignals:

@@ -29,7 +29,7 @@ STRIDE_S = 1.1  # for one that has no time, as after a pause
 class SignalMaker:
     """Makes signals of both legs that end with the newest stride, in constant memory.
 
-    The other leg steps half a stride later. Strides are made as in ``make_signals``.
+    The other leg steps half a stride later.
     """
 
     def __init__(self, mass_kg: float, sensors: Sensors, seed: int, side: Side) -> None:
@@ -49,7 +49,7 @@ class SignalMaker:
         t_s = np.arange(self._index, stop) / sensors.rate_hz
         most_s = 0.4 / sensors.rate_hz
         t_s += np.clip(self._random.normal(0, sensors.jitter_s, len(t_s)), -most_s, most_s)
-        legs = {side: LegBuilder(t_s, self._mass_kg, side) for side in (self._side, self._other)}
+        legs = {side: LegBuilder(t_s, self._mass_kg) for side in (self._side, self._other)}
         delay_s = sensors.angle_delay_s
         value = A2_DEFAULT_W_KG if stride.value is None else stride.value
         legs[self._side].walk(begin_s, stride_s, value, stride, delay_s)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from ipaddress import ip_address
 from typing import Any
 
 import segno
 from django.conf import settings
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.http.request import split_domain_port
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils import timezone
@@ -21,7 +24,6 @@ from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
 from rehab.people.sign_in.devices import describe_browser
-from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import NotTrusted
 from rehab.stations.https.certificate import network_address, secure_host
@@ -132,3 +134,33 @@ def leave(request: HttpRequest) -> HttpResponse:
     response = JsonResponse({"go": reverse("tablet")})
     response.delete_cookie(COOKIE)
     return response
+
+
+def _is_for_others(name: str) -> bool:
+    """Return whether other machines reach a name or address: no loopback, wildcard or pattern."""
+    if not name or name.startswith((".", "*")) or name == "localhost":
+        return False
+    try:
+        address = ip_address(name.strip("[]"))
+    except ValueError:
+        return True
+    return not (address.is_loopback or address.is_unspecified)
+
+
+def reachable_host(host: str, names: Iterable[str]) -> str | None:
+    """Return the host and port that a tablet opens; None where only this machine can.
+
+    Parameters
+    ----------
+    host
+        Where the therapist's own page was opened, `name:port`.
+    names
+        Names and addresses that the server answers to, the best one first.
+    """
+    name, port = split_domain_port(host)
+    if _is_for_others(name):
+        return host
+    for other in names:
+        if _is_for_others(other):
+            return f"{other}:{port}" if port else other
+    return None

@@ -119,14 +119,14 @@ class Canvas:
             left += wide
         return y
 
-    def stroke(self, path: str, arm: int, width: float = 2.4) -> None:
+    def stroke(self, path: str, arm: int) -> None:
         """Draw a line in an arm's color and dash."""
         self.add(
             "path",
             d=path,
             fill="none",
             stroke=COLORS[arm % len(COLORS)],
-            stroke_width=width,
+            stroke_width=2.4,
             stroke_dasharray=DASHES[arm % len(DASHES)],
             stroke_linejoin="round",
         )

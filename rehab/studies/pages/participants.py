@@ -18,6 +18,13 @@ from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.stations.builtin import first_station
 from rehab.studies.agreements import agree, agreed_version, version_to_agree_to
+from rehab.studies.blinding import (
+    arms_of,
+    find_request,
+    may_read_arm,
+    must_not_know_arms,
+    reveal_arms,
+)
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.guesses import GUESSERS, UNKNOWN, group_labels, may_guess, record_guess
 from rehab.studies.pages.planning import get_study
@@ -25,13 +32,6 @@ from rehab.studies.pages.refusals import refuse
 from rehab.studies.participant_forms import EnrollmentForm, PlaceForm
 from rehab.studies.participants import Enrollment
 from rehab.studies.screening import find_unmet, turn_away
-from rehab.studies.unblinding import (
-    arms_of,
-    find_request,
-    may_read_arm,
-    must_not_know_arms,
-    reveal_arms,
-)
 from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.changes import OPEN_STATES

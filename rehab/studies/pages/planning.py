@@ -28,6 +28,7 @@ from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.analysis.outcomes import define_outcomes
+from rehab.studies.blinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
@@ -40,7 +41,6 @@ from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import plan_rows, write_pdf
 from rehab.studies.results.reading import UNREAD
 from rehab.studies.results.results import may_look
-from rehab.studies.unblinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
 from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting

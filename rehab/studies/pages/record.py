@@ -17,6 +17,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.sessions.log import SessionEvent
+from rehab.studies.blinding import must_not_know_arms
 from rehab.studies.models import Study, StudyState
 from rehab.studies.pages.planning import get_study
 from rehab.studies.pages.refusals import refuse
@@ -35,7 +36,6 @@ from rehab.studies.registration.lifecycle import revise
 from rehab.studies.results.drawing import write_table
 from rehab.studies.results.harms_and_deviations import label_of
 from rehab.studies.results.results import read_results
-from rehab.studies.unblinding import must_not_know_arms
 from rehab.training.measures import InvalidSetting
 
 Proposed = dict[str, tuple[Enrollment, SessionEvent]]  # by the key of the log's entry

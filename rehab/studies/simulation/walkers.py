@@ -98,9 +98,7 @@ class Person:
     response_percent: float
     leaves_before: int
 
-    def at_visit(
-        self, visit: int, effect_percent: float, retained: float, side: Side = Side.LEFT
-    ) -> SimulatedParticipant:
+    def at_visit(self, visit: int, effect_percent: float, retained: float) -> SimulatedParticipant:
         """Return the walker of one visit.
 
         Parameters
@@ -111,13 +109,11 @@ class Person:
             What the arm adds to training [% of the baseline].
         retained
             Share of what training adds that remains without feedback (ratio).
-        side
-            The leg that is trained.
         """
         draw = random.Random(f"{self.seed}/{visit}")  # noqa: S311 (chance for walking)
         return SimulatedParticipant(
             draw.getrandbits(48),
-            side,
+            Side.LEFT,
             baseline_w_kg=self.baseline_w_kg,
             is_first=visit == 1,
             percent=effect_percent + self.response_percent,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rehab.training.adaptation import AdaptationMode, check_adaptation_mode
 from rehab.training.changes import (
     ChangeKind,
     PauseReason,
@@ -21,6 +20,7 @@ from rehab.training.controls.control import (
     ValueFormat,
     ValueKind,
 )
+from rehab.training.goal_adaptation import AdaptationMode, check_adaptation_mode
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.plans import (
     ROBOT_LEVELS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from rehab.training.adaptation import (
+from rehab.training.goal_adaptation import (
     DEFAULT_HIT_RATE,
     SUGGESTION_STRIDES,
     Staircase,

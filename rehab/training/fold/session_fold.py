@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.training.adaptation import AdaptationMode
 from rehab.training.changes import (
     STATE_LABELS,
     Change,
@@ -18,6 +17,7 @@ from rehab.training.fold.feedback_delivery import FeedbackDelivery
 from rehab.training.fold.goal_following import GoalFollowing
 from rehab.training.fold.tallies import Block, Tally
 from rehab.training.fold.valence_course import ValenceCourse
+from rehab.training.goal_adaptation import AdaptationMode
 from rehab.training.goals import GoalRule
 from rehab.training.heart_rate_limit import is_above_limit, is_near_limit
 from rehab.training.measures import InvalidSetting

@@ -53,7 +53,7 @@ LAST_STOPS = 3  # one may be lost (docs/reference/kobuki.md#orders)
 # Where rosapi runs, it knows who uses a topic; called this often [s], while the base stands.
 SUBSCRIBERS, PUBLISHERS = "/rosapi/subscribers", "/rosapi/publishers"
 CALL_EVERY_S = 2.0
-LATE_S = 1.0  # after this it is reported as a problem
+UNCONFIRMED_S = 1.0  # after this it is reported as a problem
 RELAY_SILENT_S = 0.5  # the relay reports every 0.1 s
 
 # Refusals, see ``SensorState``.
@@ -239,9 +239,9 @@ class BaseClient:
     def problem(self, now_s: float) -> str:
         """Return what is wrong at a bridge that answers; empty where nothing is."""
         order, odometry = self.topics.order.name, self.topics.odometry
-        if not self._is_open or now_s - self._opened_s < LATE_S:
+        if not self._is_open or now_s - self._opened_s < UNCONFIRMED_S:
             return ""
-        if not self.orders.is_confirmed or self.orders.unconfirmed_s(now_s) > LATE_S:
+        if not self.orders.is_confirmed or self.orders.unconfirmed_s(now_s) > UNCONFIRMED_S:
             kind = self.topics.order.kind
             return f"Nothing that is sent on {order} comes back: is it of the type {kind}?"
         if self._refusal(now_s) == NOT_WATCHED:
@@ -255,7 +255,7 @@ class BaseClient:
                 f"Its driver is in {self._mode!r} mode, in which it is not driven: bring it to "
                 f"{self.topics.mode[1]!r} mode."
             )
-        if odometry is not None and now_s - self.odometry.seen_s > LATE_S:
+        if odometry is not None and now_s - self.odometry.seen_s > UNCONFIRMED_S:
             return f"No {ODOMETRY} comes on {odometry.name}: does its driver run?"
         for topic, reason in self._missing.items():
             if reason == NOBODY_LISTENS:

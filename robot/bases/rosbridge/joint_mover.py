@@ -22,7 +22,7 @@ GOAL_EVERY_S = 0.25
 # A goal that has not ended so long after its motion should have [s] never will: bridges of before
 # 2026 do not tell that one was rejected (docs/reference/rosbridge.md#actions).
 OVERDUE_S = 1.0
-LATE_S = 0.5  # a motion that is late may last so much longer
+LATE_MOTION_S = 0.5  # a motion that is late may last so much longer
 
 
 class JointMover(Protocol):
@@ -77,7 +77,9 @@ class TrajectoryTopic:
         if following is None or (following is HOLD and now_s > self._moves_until_s):
             return
         is_moving = following is not HOLD
-        self._moves_until_s = now_s + self._joints.takes_s + LATE_S if is_moving else -math.inf
+        self._moves_until_s = (
+            now_s + self._joints.takes_s + LATE_MOTION_S if is_moving else -math.inf
+        )
         yield publish(self._joints.server.topic, following)
 
     def disconnect(self) -> None:
@@ -146,7 +148,7 @@ class TrajectoryAction:
             return
         if self._next is not None:
             following, self._next = self._next, None
-            self._moves_until_s = now_s + self._joints.takes_s + LATE_S
+            self._moves_until_s = now_s + self._joints.takes_s + LATE_MOTION_S
             yield self._send(following, now_s, is_hold=False)
         elif self.is_holding and self._joints.server.states is not None:
             yield from self._hold(now_s)

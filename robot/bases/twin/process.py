@@ -19,7 +19,7 @@ from robot.motion.pose import HOME
 from robot.wire.frames import to_number
 
 HELD_BYTES = 4096  # of a stalled line, as many as a pty holds; the oldest are lost
-LATE_S = 0.1  # a twin that is later than this skips the time instead of catching up
+SKIP_AFTER_S = 0.1  # a twin that is later than this skips the time instead of catching up
 LONGEST_S = 3600.0
 
 
@@ -150,7 +150,7 @@ class Twin:
                 now_s = monotonic()
                 self.receive(now_s)
             self.max_delay_s = max(self.max_delay_s, now_s - next_s)
-            next_s = next_s + FRAME_S if now_s - next_s < LATE_S else now_s + FRAME_S
+            next_s = next_s + FRAME_S if now_s - next_s < SKIP_AFTER_S else now_s + FRAME_S
             while not orders.empty():
                 answer(self._answer(orders.get(), now_s))
             self.step(now_s)

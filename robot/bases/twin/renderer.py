@@ -32,10 +32,8 @@ class View(NamedTuple):
     height_px: int
 
 
-# The whole tether is in the picture; and what somebody sees who walks 2 m in front of it, with eyes
-# at 1.55 m (ours; a part of what they see, without what is beside it).
+# The whole tether is in the picture.
 ROOM = View((1.25, -1.05, 1.25), (0.0, 0.0, 0.35), 50.0, 320, 240)
-WALKER = View((2.0, 0.0, 1.55), (0.0, 0.0, 0.335), 28.0, 210, 340)
 
 
 class Renderer:

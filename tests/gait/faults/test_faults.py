@@ -21,8 +21,6 @@ from tests.gait.walks import make_walk, pair_up
 
 pytestmark = pytest.mark.matrix
 
-SYNTHETIC = [name for name in RECORDINGS if name != "moore"]
-
 
 @pytest.mark.parametrize("name", RECORDINGS)
 @pytest.mark.parametrize("width_ms", [15, 50, 150])

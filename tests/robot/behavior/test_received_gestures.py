@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot.behavior.performer import Performer
-from robot.motion.gesture_spec import Move, to_data
-from robot.motion.gestures import GESTURES
+from robot.motion.composed_gestures import Move, to_data
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME
 from tests.support.robot_stage import CUE, WELCOME, IdealBase, RealBase, Stage
@@ -61,13 +60,6 @@ def test_what_comes_under_a_built_in_name_does_not_take_the_gesture_away(stage, 
     decision = stage.of("decision")[0]
     assert (decision["gesture"], decision["reason"]) == ("celebrate", "")
     assert "celebrate" in stage.robot.last_bad_message
-
-
-def test_a_robot_s_own_gesture_is_not_replaced(stage):
-    stage.robot.gestures.builtin = {**GESTURES} | {"wave": GESTURES["nod"]}
-    stage.hear(type="cue", cue=CUE | {"above": "wave", "gestures": [WAVE]})
-    stage.walk(*[1.2] * 6)
-    assert stage.of("decision")[0]["reason"] == "bad_gesture"
 
 
 def test_a_slower_robot_refuses_what_it_cannot_reach_in_time(stage):

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from rehab.training.valences import VALENCES
 from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.behavior.expression import Expression
+from robot.motion.composed_gestures import Move, parse_gesture, to_data
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import Move, parse_gesture, to_data
 from robot.motion.gestures import BUILT_IN, GESTURES
 from robot.motion.pools import IDLE, POOLS
 from robot.motion.preview import ANNOUNCED_S, preview

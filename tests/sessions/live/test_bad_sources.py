@@ -10,7 +10,7 @@ from asgiref.sync import sync_to_async
 from django.utils import timezone
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.log import Step
 from tests.support.callers import (
     Message,
@@ -115,7 +115,7 @@ async def test_the_same_device_again_takes_over(place, begun, bystander, kind):
 async def test_a_session_of_another_process(place, ready):
     session = await ready(place)
     parent = os.getppid()
-    owner = f"{socket.gethostname()}|{parent}|{owners._start_time(parent)}"
+    owner = f"{socket.gethostname()}|{parent}|{clinic_owners._start_time(parent)}"
     await sync_to_async(set_owner)(session.clinic_id, owner)
     for caller in (place.source(), place.robot(), place.tablet(session), place.monitor(session)):
         await caller.dial()

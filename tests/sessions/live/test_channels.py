@@ -13,7 +13,7 @@ import pytest
 
 from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.instruments import REGISTRY
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.training.phases import make_phase
@@ -176,7 +176,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
     robot, tablet = await place.robot().open(), await place.tablet(session).open()
     monkeypatch.setattr(routines, "move_database_log", move_log)
     monkeypatch.setattr(routines, "extend_sign_ins", extend_sign_ins)
-    monkeypatch.setattr(owners, "note_ends", release)
+    monkeypatch.setattr(clinic_owners, "note_ends", release)
     await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
     while len(waiting) < 3:
         await robot.hear("heartbeat")

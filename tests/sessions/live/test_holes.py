@@ -6,7 +6,7 @@ import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database.owners import note_ends
+from rehab.sessions.live.database.clinic_owners import note_ends
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.training.fold import SessionFold

@@ -13,8 +13,8 @@ import pytest
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import servers as servers_module
 from rehab.sessions.live.consumers.isolation_gate import IsolationGate
-from rehab.sessions.live.database import owners
-from rehab.sessions.live.database.lease import Server
+from rehab.sessions.live.database import clinic_owners
+from rehab.sessions.live.database.server_lease import Server
 from rehab.sessions.live.servers import Servers, applies, ask_if_ready
 from tests.support.callers import turns
 
@@ -91,7 +91,7 @@ async def test_nobody_is_admitted_before_what_others_took_is_dropped(world, monk
         return set(epochs)
 
     monkeypatch.setattr(servers_module, "sync_to_async", lambda function: function)
-    monkeypatch.setattr(owners, "find_taken", find_taken)
+    monkeypatch.setattr(clinic_owners, "find_taken", find_taken)
     assert await world.look(2)
     world.lease.is_current, world.lease.entered = True, 2
     assert not world.servers.may_move_robots

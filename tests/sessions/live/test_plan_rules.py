@@ -6,7 +6,7 @@ import pytest
 
 from rehab.sessions.log import Step
 from rehab.sessions.setup.protocols import Protocol
-from rehab.training.adaptation import AdaptationMode, GoalAdaptation
+from rehab.training.goal_adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase
 from rehab.training.plans import ROBOT_LEVELS

@@ -8,8 +8,8 @@ import pytest
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
-from rehab.sessions.live.database import owners
-from rehab.sessions.live.protocol.backlog import PAGE_STEPS
+from rehab.sessions.live.consumers.screens import PAGE_STEPS
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.loading import LoadedSession, find_newest_open, load_together
 from rehab.sessions.log import RobotEntry, Step
@@ -36,10 +36,10 @@ def test_no_table_that_grows_is_scanned(at_station):
     session = open_session(place, at_station=at_station)
     with CaptureQueriesContext(connection) as asked:
         load(session.pk)
-        owners.find_ownerless()
-        owners.claim(session.clinic_id)
-        owners.note_ends([session.pk])
-        owners.release([session.clinic_id])
+        clinic_owners.find_ownerless()
+        clinic_owners.claim(session.clinic_id)
+        clinic_owners.note_ends([session.pk])
+        clinic_owners.release([session.clinic_id])
         find_newest_open(place.station.pk)
         list(Step.everywhere.filter(session_id=1, number__gt=5, number__lte=9)[:PAGE_STEPS])
     plans = []

@@ -84,11 +84,10 @@ def check_no_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def take_other_content_for_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def is_stored(*_: Any) -> bool:
+    async def look(*_: Any) -> None:
         await callers.turns()  # as long as a look into the database takes: one ack for each step
-        return True
 
-    monkeypatch.setattr(source_consumers, "is_duplicate", is_stored)
+    monkeypatch.setattr(source_consumers, "check_same", look)
 
 
 def forget_where_a_change_stood(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,8 +25,8 @@ from django.test import Client
 
 from rehab.sessions.live import process, routines
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database import lease
 from rehab.sessions.live.database import own_connection as own_connections
+from rehab.sessions.live.database import server_lease
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.live.session.commits import Job
@@ -57,7 +57,7 @@ async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeyp
     assert (await monitor.watch())["presence"]["storage"] == ""
     assert (await robot.hello())["state"] == "running"
     source = await place.source().open()
-    monkeypatch.setattr(writers, "LATE_S", 0.05)
+    monkeypatch.setattr(writers, "LATE_COMMIT_S", 0.05)
     stall.begin()
     await source.say(a_step(1))
     await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["storage"] == "late")
@@ -66,7 +66,7 @@ async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeyp
     status, words = await health()
     assert status == 503
     assert "database does not answer" in words
-    monkeypatch.setattr(writers, "LATE_S", 1.0)
+    monkeypatch.setattr(writers, "LATE_COMMIT_S", 1.0)
     stall.end()
     await source.acked(1)
     await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["storage"] == "")
@@ -106,7 +106,7 @@ async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_th
         assert "cut off" in (await health("/readyz"))[1]
         assert "garry_ready 0.0" in await figures()
     with monkeypatch.context() as expired:
-        expired.setattr(lease, "held", lambda: SimpleNamespace(is_current=False))
+        expired.setattr(server_lease, "held", lambda: SimpleNamespace(is_current=False))
         assert "expired" in (await health("/readyz"))[1]
         assert "garry_ready 0.0" in await figures()
     await runtime.drain()

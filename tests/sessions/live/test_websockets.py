@@ -65,6 +65,8 @@ async def main():
     protocol.send_text("too late")
     print(json.dumps([data.hex() for data in frames_sent]))
     print(json.dumps([frames * 60_000, MAX_WAITING_BYTES, transport.reading, transport.told]))
+    server.connections = {}  # it closed meanwhile
+    print(json.dumps(server.create_application(protocol, {"type": "websocket"})))
 
 asyncio.run(main())
 """
@@ -77,7 +79,7 @@ SIZES = [0, 1, 125, 126, 65_535, 65_536]
 def said(tmp_path_factory) -> list[Any]:
     environment = clean_environment(tmp_path_factory.mktemp("server"), 8000)
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, json.dumps(SIZES)],
+        [sys.executable, "-W", "error::RuntimeWarning", "-c", SCRIPT, json.dumps(SIZES)],
         cwd=ROOT,
         env=environment | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},
         capture_output=True,
@@ -85,6 +87,7 @@ def said(tmp_path_factory) -> list[Any]:
         timeout=60,
     )
     assert done.returncode == 0, done.stderr
+    assert "never awaited" not in done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
@@ -107,6 +110,12 @@ def test_frames_of_every_length_are_whole(said):
             next(parsing)
         frame = done.value.value
         assert (frame.opcode, frame.fin, frame.data) == (Opcode.TEXT, True, b"x" * size)
+
+
+@pytest.mark.server
+def test_a_connection_that_closed_meanwhile_begins_nothing(said):
+    """Nor is its application left behind, which Python would warn of."""
+    assert said[2] is None
 
 
 @pytest.mark.server

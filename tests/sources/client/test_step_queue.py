@@ -119,7 +119,7 @@ def test_an_ack_covers_all_steps_up_to_its_number():
     take_numbers(queue)
     queue.acknowledge(3)
 
-    assert (queue.unacknowledged, queue.in_flight) == (2, 2)
+    assert (queue.unacknowledged, queue._sent) == (2, 2)
     queue.acknowledge(2)  # late, and covered already
     assert queue.unacknowledged == 2
     queue.acknowledge(5)
@@ -132,7 +132,7 @@ def test_no_more_than_the_window_is_on_the_way():
     assert take_numbers(queue) == list(range(1, MAX_STEPS + 1))
     queue.acknowledge(10)
     assert take_numbers(queue) == list(range(MAX_STEPS + 1, MAX_STEPS + 11))
-    assert queue.in_flight == MAX_STEPS
+    assert queue._sent == MAX_STEPS
 
 
 def test_steps_with_much_to_say_are_spread_over_frames():
@@ -145,7 +145,7 @@ def test_steps_with_much_to_say_are_spread_over_frames():
     while frame := queue.next_frame():
         sizes.append(len(json.dumps(frame)))
 
-    assert queue.in_flight == 256
+    assert queue._sent == 256
     assert max(sizes) <= 64 * 1024
     assert len(sizes) < 25
 
@@ -248,7 +248,7 @@ def test_whatever_happens_every_step_is_stored_once_and_in_order(happenings):
             case "crash":
                 seen = committed
                 queue.join(7, seen + 1)
-        assert queue.in_flight <= MAX_STEPS
+        assert queue._sent <= MAX_STEPS
     queue.join(7, seen + 1)
     while frame := queue.next_frame():
         deliver(frame)

@@ -21,8 +21,6 @@ OPTIONS = dict.fromkeys(("side", "strides", "treadmill", "heart_rate")) | {
     "profile": "good",
 }
 
-OF_A_WALKER = {"seed": 3, "profile": "good", "side": None, "strides": None, "treadmill": False}
-
 
 def training(gain):
     return make_phase("training", gain=gain)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rehab.sources.synthetic.profiles import PROFILES
-from rehab.sources.synthetic.signals import GRAVITY_M_S2, Sensors, make_signals
+from rehab.sources.synthetic.signals import GRAVITY_M_S2, Sensors
 from rehab.sources.synthetic.walker import walk
+from tests.support.synthetic_recordings import make_signals
 
 QUIET = Sensors(rate_hz=1000, jitter_s=0, force_noise_n=0, moment_noise_nm=0, angle_noise_rad=0)
 

@@ -17,7 +17,7 @@ from rehab.people.token_buckets import TokenBucket
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.protocol.messages import read_frame

@@ -18,10 +18,10 @@ from rehab.sessions.live.protocol.messages import (
     read_plain,
     read_sensor,
 )
-from rehab.sessions.live.protocol.resent_steps import is_duplicate
+from rehab.sessions.live.protocol.resent_steps import check_same
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
-from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.source_clock import SourceClock
 from rehab.sessions.payloads import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State
@@ -41,7 +41,7 @@ class SourceConsumer(DeviceSocket):
 
     kind = Device.Kind.SOURCE
     slot = "source"
-    lateness: Lateness
+    clock: SourceClock
     side: Side | None = None  # of a worn sensor
     plain_s: float | None = None  # plain text's time when our clock shows 0
 
@@ -71,7 +71,7 @@ class SourceConsumer(DeviceSocket):
         _check_open_steps(live)
         _check_worn(step, live)
         # What a source calls late is no measure of its clock, which may be another one by now.
-        late = is_marked or self.lateness.is_late(step.time_s, time.monotonic())
+        late = is_marked or self.clock.is_late(step.time_s, time.monotonic())
         live.record_step(step, received_at, late=late)
 
     async def on_message(self, message: Message, text: str) -> None:
@@ -116,7 +116,7 @@ class SourceConsumer(DeviceSocket):
 
     async def _handle_hello(self, hello: Hello) -> None:
         self.side, self.plugin = hello.side, hello.plugin
-        self.lateness = Lateness(
+        self.clock = SourceClock(
             hello.run,
             time.monotonic(),
             hello.clock_s,
@@ -133,11 +133,11 @@ class SourceConsumer(DeviceSocket):
             await self.send_message({"type": "welcome", "session": live.id, **state})
             return
         # A clock that pauses and is not in hello stands: what was known of it is out of date.
-        is_unknown = not (self.lateness.is_known or self.lateness.clock_pauses)
+        is_unknown = not (self.clock.is_known or self.clock.clock_pauses)
         clock = live.source_clock
-        if is_unknown and clock is not None and clock.run == self.lateness.run:
-            self.lateness = clock
-        live.source_clock = self.lateness
+        if is_unknown and clock is not None and clock.run == self.clock.run:
+            self.clock = clock
+        live.source_clock = self.clock
         live.source_state = None  # a sensor says so again
         await self.send_message(
             {
@@ -170,7 +170,11 @@ class SourceConsumer(DeviceSocket):
         received_at = timezone.now()
         for measurement, is_marked in steps:
             if measurement.number < live.next_number:
-                await self._check_same(live, measurement)
+                if measurement.number > live.committed:
+                    await live.wait_until_committed()
+                plan = live.aggregate.fold.plan
+                await check_same(live.id, measurement, plan.measure, live.next_number)
+                self.outbox.acknowledge(live.committed)
             elif measurement.number > live.next_number:
                 raise BadFrame(
                     f"Step {measurement.number} leaves a gap: send {live.next_number} next.", "gap"
@@ -186,18 +190,6 @@ class SourceConsumer(DeviceSocket):
                 return
             else:
                 self._record(live, measurement, received_at, is_marked=is_marked)
-
-    async def _check_same(self, live: LiveSession, measurement: Measurement) -> None:
-        """Acknowledge a step that is stored already; refuse other content under its number."""
-        if measurement.number > live.committed:
-            await live.wait_until_committed()
-        if not await is_duplicate(live.id, measurement, live.aggregate.fold.plan.measure):
-            raise BadFrame(
-                f"Step {measurement.number} is stored with other content. A source that starts "
-                f"over takes a new run and counts from {live.next_number}.",
-                "conflict",
-            )
-        self.outbox.acknowledge(live.committed)
 
     async def _handle_plain(self, value: float | None, goal: float | None) -> None:
         """Record a plain-text step: the server numbers and times it; the PT's goal counts."""

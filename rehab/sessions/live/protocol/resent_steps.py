@@ -18,11 +18,23 @@ from rehab.training.steps import (
     find_invalid_reasons,
     select_value,
 )
+from robot.wire.frames import BadFrame
 
 
 @database_sync_to_async
-def is_duplicate(session_id: int, measurement: Measurement, measure: Measure) -> bool:
-    """Return whether the stored step of that number has the same content, reasons included."""
+def check_same(
+    session_id: int, measurement: Measurement, measure: Measure, next_number: int
+) -> None:
+    """Raise BadFrame where the stored step of that number has other content, or other reasons."""
+    if not _is_duplicate(session_id, measurement, measure):
+        raise BadFrame(
+            f"Step {measurement.number} is stored with other content. A source that starts over "
+            f"takes a new run and counts from {next_number}.",
+            "conflict",
+        )
+
+
+def _is_duplicate(session_id: int, measurement: Measurement, measure: Measure) -> bool:
     measurement = select_value(measurement, measure)
     stored = Step.everywhere.get(session_id=session_id, number=measurement.number)
     same = (

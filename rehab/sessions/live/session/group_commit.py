@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 MAX_ROWS = 5000  # rows a transaction
 SPACING_S = 0.012  # between the beginnings of commits while several sessions walk
-LATE_S = 1.0  # a commit that takes longer is reported to people and robots
+LATE_COMMIT_S = 1.0  # a commit that takes longer is reported to people and robots
 CLOSE_S = 20.0  # how long a stop waits for a database that does not answer
 # Of the writer's own connection to PostgreSQL: what waits longer has failed, and is reported.
 LOCK_TIMEOUT_MS = 3_000
@@ -63,7 +63,7 @@ class Writer:
     def trouble(self) -> Trouble:
         """Why nothing is stored at present, if that is so."""
         since_s = self._busy_since_s
-        if since_s is not None and time.monotonic() - since_s > LATE_S:
+        if since_s is not None and time.monotonic() - since_s > LATE_COMMIT_S:
             return Trouble.LATE
         return self._failure
 

@@ -36,7 +36,7 @@ TASK_FAILURES = Counter(
     ["task"],
     registry=REGISTRY,
 )
-LATE_S = Histogram(
+LOOP_LATE_S = Histogram(
     "garry_loop_late_seconds",
     "How late the event loop came to a periodic task: pages and robots waited as long.",
     registry=REGISTRY,

@@ -27,8 +27,8 @@ from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow
 from rehab.sessions.live.session.commits import Job
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
-from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.robot_orders import RobotOrders
+from rehab.sessions.live.session.source_clock import SourceClock
 from rehab.sessions.log import (
     ALARM_KINDS,
     RULE_PAUSES,
@@ -77,7 +77,7 @@ class LiveSession:
         self.feed = EventFeed()
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
         self.source: ConnectedDevice | None = None
-        self.source_clock: Lateness | None = None  # of its latest run
+        self.source_clock: SourceClock | None = None  # of its latest run
         self.source_state: SensorState | None = None  # what a worn sensor says of itself
         self.companion: ConnectedDevice | None = None  # a sensor on the leg that is not trained
         self.companion_state: SensorState | None = None

@@ -14,7 +14,7 @@ from asgiref.sync import sync_to_async
 from django.db.models import QuerySet
 
 from rehab.sessions.alarms import OpenAlarms
-from rehab.sessions.live.database import owners
+from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import MARKS, SessionAggregate, kinds_with_marks
 from rehab.sessions.live.session.live_session import RECENT_STEPS
 from rehab.sessions.log import ALARM_KINDS, RobotEntry, SessionEvent, Step
@@ -155,7 +155,7 @@ def _load(epochs: Mapping[int, int]) -> dict[int, LoadResult]:
             found[key] = problem
     behind = [key for key, last in last_numbers.items() if last > sessions[key].last_number]
     if behind:  # their owner did not come to note it
-        owners.note_ends(behind)
+        clinic_owners.note_ends(behind)
     logs, marked = _read_events(last_numbers), kinds_with_marks()
     for key, last in last_numbers.items():
         session, events = sessions[key], logs.get(key, [])

@@ -7,7 +7,7 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import public
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.database import lease
+from rehab.sessions.live.database import server_lease
 from rehab.sessions.live.database.trouble import WORDS
 
 
@@ -40,7 +40,7 @@ def find_unready() -> str:
         return "The server is starting or stopping."
     if live.servers is not None and live.servers.is_isolated:
         return "The server was cut off from its database, which another one has."
-    if (own := lease.held()) is not None and not own.is_current:
+    if (own := server_lease.held()) is not None and not own.is_current:
         return "The server's lease has expired: the database does not answer."
     return ""
 

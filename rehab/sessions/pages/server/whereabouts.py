@@ -16,8 +16,8 @@ from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from rehab.people.models import User
 from rehab.people.web.api_base import caller
 from rehab.sessions.live import runtime
-from rehab.sessions.live.database import owners
-from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database import clinic_owners
+from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from robot.wire.limits import SERVER_COOKIE, SERVER_HEADER
 
 SAFE = ("GET", "HEAD", "OPTIONS")
@@ -29,7 +29,7 @@ def find_elsewhere(request: HttpRequest, user: Any) -> OwnedElsewhere | None:
     live = runtime.peek()
     if clinic_id is None or request.method in SAFE or live is None or live.servers is None:
         return None
-    return None if clinic_id in live.clinics else owners.find_elsewhere(clinic_id)
+    return None if clinic_id in live.clinics else clinic_owners.find_elsewhere(clinic_id)
 
 
 def is_named(request: HttpRequest, server: str) -> bool:

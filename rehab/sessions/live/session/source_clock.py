@@ -5,7 +5,7 @@ from __future__ import annotations
 from robot.wire.late_steps import RemoteClock
 
 
-class Lateness:
+class SourceClock:
     """Relates the clock of one run of a source to ours; the session retains it over reconnections.
 
     A source's hello gives its clock and speed; what it then sends is as late as our clock has run

@@ -7,18 +7,18 @@ from types import SimpleNamespace
 import pytest
 
 from rehab.sessions.live.consumers import source as source_module
-from rehab.sessions.live.session.lateness import Lateness
+from rehab.sessions.live.session.source_clock import SourceClock
 from rehab.sessions.log import Step
-from robot.wire.late_steps import DRIFT_MAX, LATE_S
+from robot.wire.late_steps import DRIFT_MAX, LATE_STEP_S
 from tests.support.callers import a_step, change
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 10.0])
 def test_lateness_is_told_by_the_clock_in_hello(speed):
     def is_late(time_s, now_s):
-        return Lateness("r", 100.0, clock_s=50.0, speed=speed).is_late(time_s, now_s)
+        return SourceClock("r", 100.0, clock_s=50.0, speed=speed).is_late(time_s, now_s)
 
-    slack = LATE_S * max(1.0, speed)
+    slack = LATE_STEP_S * max(1.0, speed)
     assert not is_late(50.0, 100.0)
     assert not is_late(50.0 + 10 * speed, 110.0)
     assert not is_late(50.0 - slack, 100.0)
@@ -27,43 +27,43 @@ def test_lateness_is_told_by_the_clock_in_hello(speed):
 
 
 def test_nothing_is_late_at_full_speed():
-    lateness = Lateness("r", 100.0, clock_s=50.0, speed=None)
-    assert not lateness.is_late(-1e9, 1e9)
+    clock = SourceClock("r", 100.0, clock_s=50.0, speed=None)
+    assert not clock.is_late(-1e9, 1e9)
 
 
 def test_without_a_clock_the_quickest_step_stands_for_a_fresh_one():
-    lateness = Lateness("r", 0.0, clock_s=None, speed=1.0)
-    assert not lateness.is_late(7.0, 3.0)
-    assert not lateness.is_late(8.0, 9.0)
-    assert lateness.is_late(9.0, 10.1)
-    assert not lateness.is_late(20.0, 10.2)
-    assert lateness.is_late(20.0, 15.3)
+    clock = SourceClock("r", 0.0, clock_s=None, speed=1.0)
+    assert not clock.is_late(7.0, 3.0)
+    assert not clock.is_late(8.0, 9.0)
+    assert clock.is_late(9.0, 10.1)
+    assert not clock.is_late(20.0, 10.2)
+    assert clock.is_late(20.0, 15.3)
 
 
 def test_a_clock_that_was_told_late_is_corrected_by_a_quicker_step():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
-    assert not lateness.is_late(3.0, 0.0)
-    assert lateness.is_late(3.0, 5.1)
+    clock = SourceClock("r", 0.0, clock_s=0.0, speed=1.0)
+    assert not clock.is_late(3.0, 0.0)
+    assert clock.is_late(3.0, 5.1)
 
 
 def test_a_clock_that_stood_still_with_the_session_makes_nothing_late():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0, clock_pauses=True)
-    assert not lateness.is_late(1.0, 1.0)
-    lateness.resume()  # the session goes on after half a minute
-    assert not lateness.is_late(2.0, 32.0)
-    assert lateness.is_late(3.0, 38.1)  # and what is late from then on is late
+    clock = SourceClock("r", 0.0, clock_s=0.0, speed=1.0, clock_pauses=True)
+    assert not clock.is_late(1.0, 1.0)
+    clock.resume()  # the session goes on after half a minute
+    assert not clock.is_late(2.0, 32.0)
+    assert clock.is_late(3.0, 38.1)  # and what is late from then on is late
 
 
 def test_a_clock_that_went_on_with_the_session_is_not_excused_by_a_pause():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
-    lateness.resume()
-    assert lateness.is_late(1.0, 80.0)
+    clock = SourceClock("r", 0.0, clock_s=0.0, speed=1.0)
+    clock.resume()
+    assert clock.is_late(1.0, 80.0)
 
 
 def test_late_steps_tell_nothing_of_the_clock():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
-    assert [lateness.is_late(t, 60.0) for t in (1.0, 2.0, 54.0)] == [True, True, True]
-    assert not lateness.is_late(56.0, 60.0)
+    clock = SourceClock("r", 0.0, clock_s=0.0, speed=1.0)
+    assert [clock.is_late(t, 60.0) for t in (1.0, 2.0, 54.0)] == [True, True, True]
+    assert not clock.is_late(56.0, 60.0)
 
 
 @pytest.mark.parametrize("tells_its_clock", [True, False])

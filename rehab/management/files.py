@@ -1,4 +1,4 @@
-"""Files that commands are given: a secret key, and what is encrypted to it."""
+"""Files that commands are given or write: a secret key, what is encrypted to it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from django.core.management import CommandError
 from pyrage.x25519 import Identity
 
 from rehab.exports.encryption import InvalidKey, read_identities
+from robot.atomic_file import replacing
 
 
 def read_key_file(path: Path | None) -> list[Identity]:
@@ -35,3 +36,18 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         raise CommandError(f"{path} cannot be read: {problem.strerror}.") from problem
     with file:
         yield file
+
+
+@contextmanager
+def new_file(file: Path) -> Iterator[BinaryIO]:
+    """Provide a new file that only its owner reads; it gets its name at the end of the block.
+
+    Raises CommandError where it cannot be written.
+    """
+    try:
+        with replacing(file) as out:
+            yield out
+    except OSError as problem:
+        raise CommandError(
+            f"{file} cannot be written ({problem.strerror}). Choose another place."
+        ) from problem

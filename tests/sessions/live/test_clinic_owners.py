@@ -20,7 +20,7 @@ from django.db import DatabaseError
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
-from rehab.sessions.live.database import lease, owners
+from rehab.sessions.live.database import clinic_owners, server_lease
 from rehab.sessions.live.session import loading
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.supervisor import source_name
@@ -54,7 +54,7 @@ def dead_pid() -> int:
     ids=["nobody", "nonsense", "no start", "another name", "another process"],
 )
 def test_which_owners_live(owner, alive):
-    assert owners.is_alive(owner) == alive
+    assert clinic_owners.is_alive(owner) == alive
 
 
 @pytest.mark.parametrize(
@@ -70,45 +70,47 @@ def test_which_owners_live(owner, alive):
 def test_a_hosted_owner_lives_as_long_as_its_lease(valid, knows, alive, settings, monkeypatch):
     settings.HOSTED = True
     own = SimpleNamespace(may_judge_by=lambda ids: "here" in ids)
-    monkeypatch.setattr(lease, "held", lambda: own if knows else None)
-    monkeypatch.setattr(lease, "valid_servers", lambda: [SimpleNamespace(id=one) for one in valid])
-    assert owners.is_alive("there") == alive
+    monkeypatch.setattr(server_lease, "held", lambda: own if knows else None)
+    monkeypatch.setattr(
+        server_lease, "valid_servers", lambda: [SimpleNamespace(id=one) for one in valid]
+    )
+    assert clinic_owners.is_alive("there") == alive
 
 
 def test_a_process_that_has_ended_is_dead_and_this_one_lives():
-    assert not owners.is_alive(f"{HOST}|{dead_pid()}|5")
-    assert owners.is_alive(owners.own_name())
+    assert not clinic_owners.is_alive(f"{HOST}|{dead_pid()}|5")
+    assert clinic_owners.is_alive(clinic_owners.own_name())
     parent = os.getppid()
-    assert owners.is_alive(f"{HOST}|{parent}|{owners._start_time(parent)}")
+    assert clinic_owners.is_alive(f"{HOST}|{parent}|{clinic_owners._start_time(parent)}")
 
 
 def call_processes(monkeypatch: pytest.MonkeyPatch) -> threading.local:
     """Let threads stand for processes that all live; each says its name in what this gives."""
     process = threading.local()
-    monkeypatch.setattr(owners, "own_name", lambda: process.name)
-    monkeypatch.setattr(owners, "is_alive", lambda owner, _: owner.startswith("process"))
+    monkeypatch.setattr(clinic_owners, "own_name", lambda: process.name)
+    monkeypatch.setattr(clinic_owners, "is_alive", lambda owner, _: owner.startswith("process"))
     return process
 
 
 async def test_of_two_that_claim_a_clinic_at_once_one_has_it(place, monkeypatch):
     process = call_processes(monkeypatch)
-    clinic_id, find, refused = place.clinic.pk, owners.find_elsewhere, list[Any]()
+    clinic_id, find, refused = place.clinic.pk, clinic_owners.find_elsewhere, list[Any]()
 
     def find_late(*args: Any) -> Any:
         found = find(*args)
         if process.name == "process|1|0" and not refused:  # the other one comes before it writes
             process.name = "process|2|0"
-            owners.claim(clinic_id)
+            clinic_owners.claim(clinic_id)
             process.name = "process|1|0"
             refused.append(found)
         return found
 
     def claim() -> None:
         process.name = "process|1|0"
-        with pytest.raises(owners.OwnedElsewhere, match=r"another process \(2\)"):
-            owners.claim(clinic_id)
+        with pytest.raises(clinic_owners.OwnedElsewhere, match=r"another process \(2\)"):
+            clinic_owners.claim(clinic_id)
 
-    monkeypatch.setattr(owners, "find_elsewhere", find_late)
+    monkeypatch.setattr(clinic_owners, "find_elsewhere", find_late)
     await sync_to_async(claim)()
     stored = await ClinicOwner.everywhere.aget(pk=clinic_id)
     assert (stored.owner, stored.epoch) == ("process|2|0", 1)
@@ -119,15 +121,15 @@ async def test_a_clinic_released_while_it_is_claimed_is_no_dead_servers(place, b
     session = await begun(place)
     await runtimes.current().drain()
     await own(session, f"{HOST}|{dead_pid()}|5")
-    find = owners.find_elsewhere
+    find = clinic_owners.find_elsewhere
 
     def find_late(clinic_id: int, owner: str) -> Any:
         found = find(clinic_id, owner)
-        set_owner(clinic_id, owners.HANDED_ON)
+        set_owner(clinic_id, clinic_owners.HANDED_ON)
         return found
 
-    monkeypatch.setattr(owners, "find_elsewhere", find_late)
-    claimed = await sync_to_async(owners.claim)(place.clinic.pk)
+    monkeypatch.setattr(clinic_owners, "find_elsewhere", find_late)
+    claimed = await sync_to_async(clinic_owners.claim)(place.clinic.pk)
     assert (claimed.running, claimed.is_orphaned) == ([session.pk], False)
 
 
@@ -138,31 +140,31 @@ echo "$LC_ALL $TZ  {when}  "
 
 
 def test_where_no_folder_tells_of_processes_ps_tells_when_they_started(tmp_path, monkeypatch):
-    monkeypatch.setattr(owners, "PROC_DIR", tmp_path / "none")
+    monkeypatch.setattr(clinic_owners, "PROC_DIR", tmp_path / "none")
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     pid = os.getppid()
     ps = tmp_path / "ps"
     ps.write_text(FAKE_PS.format(pid=pid, when="Sat Nov  7 09:05:01 2026"))
     ps.chmod(0o755)
-    started = owners._start_time(pid)
+    started = clinic_owners._start_time(pid)
     assert started == "C UTC Sat Nov 7 09:05:01 2026"
     owner = f"{HOST}|{pid}|{started}"
-    assert owners.is_alive(owner)
+    assert clinic_owners.is_alive(owner)
     # After a crash and a restart of the computer the number is another process's.
     ps.write_text(FAKE_PS.format(pid=pid, when="Sun Nov  8 08:00:00 2026"))
-    assert not owners.is_alive(owner)
-    assert owners._start_time(1) == ""
+    assert not clinic_owners.is_alive(owner)
+    assert clinic_owners._start_time(1) == ""
     ps.unlink()
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert owners._start_time(pid) == ""
+    assert clinic_owners._start_time(pid) == ""
 
 
 @pytest.mark.skipif(shutil.which("ps") is None, reason="this machine has no ps")
 def test_what_the_real_ps_tells(tmp_path, monkeypatch):
-    monkeypatch.setattr(owners, "PROC_DIR", tmp_path / "none")
-    started = owners._start_time(os.getpid())
+    monkeypatch.setattr(clinic_owners, "PROC_DIR", tmp_path / "none")
+    started = clinic_owners._start_time(os.getpid())
     assert re.fullmatch(r"\w{3} \w{3} \d{1,2} [\d:]{8} \d{4}", started)
-    assert owners._start_time(dead_pid()) == ""
+    assert clinic_owners._start_time(dead_pid()) == ""
 
 
 async def own(session: TrainingSession, owner: str) -> None:
@@ -177,7 +179,7 @@ async def test_a_clinic_is_claimed_from_the_dead_and_released_at_the_drain(place
     session = await ready(place)
     await own(session, f"{HOST}|{dead_pid()}|5")
     live = await runtimes.current().session(session.pk)
-    assert (await owner_of(session), live.epoch) == (owners.own_name(), 1)
+    assert (await owner_of(session), live.epoch) == (clinic_owners.own_name(), 1)
     await runtimes.current().drain()
     assert await owner_of(session) == ""
 
@@ -187,14 +189,14 @@ async def test_a_clinic_is_released_when_nobody_is_there(place, ready):
     source = await place.source().open()
     for _ in range(3):
         await runtime.close_unused_clinics()
-    assert await owner_of(session) == owners.own_name()
+    assert await owner_of(session) == clinic_owners.own_name()
     await source.hang_up()
     await runtime.close(runtime.sessions[session.pk])
     for _ in range(2):
         await runtime.close_unused_clinics()
     assert await owner_of(session) == ""
     assert (await (await place.source().dial()).hello())["session"] == session.pk
-    assert await owner_of(session) == owners.own_name()
+    assert await owner_of(session) == clinic_owners.own_name()
 
 
 async def test_a_device_that_waits_has_its_clinic_here(place):
@@ -216,7 +218,7 @@ async def test_a_clinic_that_another_process_took_is_dropped_with_all_its_socket
 
     monkeypatch.setattr(runtime.supervisor, "stop", stop)
     taken = ClinicOwner.everywhere.filter(pk=place.clinic.pk)
-    other = f"{HOST}|{parent}|{owners._start_time(parent)}"
+    other = f"{HOST}|{parent}|{clinic_owners._start_time(parent)}"
     await taken.aupdate(owner=other, epoch=7)
     await source.say(a_step(1))
     assert (await source.sent_away())[0] == 4011
@@ -241,10 +243,10 @@ async def test_a_session_that_loads_while_its_clinic_goes_is_not_kept_here(
     async def lose_clinic(live: LiveSession) -> None:
         monkeypatch.setattr(runtime.recovery, "pause_orphaned", pause_orphaned)
         await runtime.clinics.release(live.clinic_id)
-        await own(session, f"{HOST}|{parent}|{owners._start_time(parent)}")
+        await own(session, f"{HOST}|{parent}|{clinic_owners._start_time(parent)}")
 
     monkeypatch.setattr(runtime.recovery, "pause_orphaned", lose_clinic)
-    with pytest.raises(owners.OwnedElsewhere):
+    with pytest.raises(clinic_owners.OwnedElsewhere):
         await runtime.session(session.pk)
     assert session.pk not in runtime.sessions
 
@@ -255,7 +257,7 @@ async def test_a_clinic_without_an_open_session_moves_to_another_server(place, s
     await source.walk(4.0, 4.0)
     await change(session, "pause")
     await runtime.give_up(place.clinic.pk)  # it is open: nothing happens
-    assert await owner_of(session) == owners.own_name()
+    assert await owner_of(session) == clinic_owners.own_name()
     await change(session, "finish")
     await runtime.give_up(place.clinic.pk)
     assert await owner_of(session) == ""
@@ -318,7 +320,7 @@ async def test_a_session_of_a_dead_server_is_paused_by_whoever_takes_it_over(
     await source.say({"type": "hello", "version": 1, "run": "r1", "last": 3})
     assert (await source.sent_away())[0] == 4011
     stall.problem = None
-    assert await owner_of(session) == owners.own_name()
+    assert await owner_of(session) == clinic_owners.own_name()
     source = await place.source().dial()
     welcome = await source.hello()
     assert (welcome["state"], welcome["next"]) == ("paused", 4)
@@ -333,7 +335,7 @@ async def test_a_session_that_runs_elsewhere_is_left_alone(place, begun, setting
     session = await left_running(place, begun, 1)
     parent = os.getppid()
     settings.HOSTED = True  # there, other machines share the database
-    for owner in (f"{HOST}|{parent}|{owners._start_time(parent)}", "elsewhere|1|1"):
+    for owner in (f"{HOST}|{parent}|{clinic_owners._start_time(parent)}", "elsewhere|1|1"):
         await own(session, owner)
         assert await runtimes.current().recover() == 0
     assert (await reread(session)).state == "running"
@@ -352,7 +354,9 @@ async def test_a_session_that_another_server_recovered_meanwhile_is_not_paused_a
         assert await runtimes.current().recover() == 1
     runtimes.current().lose(place.clinic.pk)
     # There it was resumed, and released.
-    await ClinicOwner.everywhere.filter(pk=place.clinic.pk).aupdate(owner=owners.HANDED_ON, epoch=9)
+    await ClinicOwner.everywhere.filter(pk=place.clinic.pk).aupdate(
+        owner=clinic_owners.HANDED_ON, epoch=9
+    )
     runtimes.current().recovery.forget(session.pk)
     live = await runtimes.current().session(session.pk)
     assert live.is_running
@@ -379,7 +383,7 @@ async def test_a_client_that_does_not_listen_keeps_no_session_from_being_handed_
     monkeypatch.setattr(Socket, "close_now", lambda *_: listening.wait())
     await place.tablet(session).watch()
     await runtime.drain()
-    assert await owner_of(session) == owners.HANDED_ON
+    assert await owner_of(session) == clinic_owners.HANDED_ON
     listening.set()
 
 
@@ -387,13 +391,13 @@ async def test_who_asks_for_a_clinic_while_it_is_released_gets_it_again(place, r
     session, runtime = await ready(place), runtimes.current()
     await runtime.session(session.pk)
     await change(session, "abort")
-    release, may_release = owners.release, threading.Event()
+    release, may_release = clinic_owners.release, threading.Event()
 
     def release_late(clinic_ids: Collection[int]) -> None:
         assert may_release.wait(10)
         release(clinic_ids)
 
-    monkeypatch.setattr(owners, "release", release_late)
+    monkeypatch.setattr(clinic_owners, "release", release_late)
     leaving = asyncio.create_task(runtime.give_up(place.clinic.pk))
     await turns()
     opening = asyncio.create_task(runtime.session(session.pk))
@@ -401,7 +405,7 @@ async def test_who_asks_for_a_clinic_while_it_is_released_gets_it_again(place, r
     assert not opening.done()
     may_release.set()
     await asyncio.gather(leaving, opening)
-    assert await owner_of(session) == owners.own_name()
+    assert await owner_of(session) == clinic_owners.own_name()
 
 
 async def test_the_drain_commits_and_closes_every_socket_with_4012(place, sourced, stall):
@@ -448,5 +452,5 @@ async def test_a_session_that_opens_during_the_drain_is_released(place, begun, m
         await runtimes.current().session(session.pk + 1)
     may_read.set()
     await draining
-    assert await owner_of(session) == owners.HANDED_ON
+    assert await owner_of(session) == clinic_owners.HANDED_ON
     assert (await reread(session)).state == "running"

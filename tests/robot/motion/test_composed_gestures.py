@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.motion.dry_run import dry_run, validate_gesture
-from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import (
+from robot.motion.composed_gestures import (
     MAX_MOVES,
     NUMBERS,
     Move,
@@ -19,6 +17,8 @@ from robot.motion.gesture_spec import (
     parse_gesture,
     to_data,
 )
+from robot.motion.dry_run import dry_run, validate_gesture
+from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import known_names
 from robot.motion.limits import DEFAULT_LIMITS, REACH_M, TETHER_M, TICK_S
 from robot.motion.player import DONE, Player

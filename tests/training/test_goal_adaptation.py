@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
-from rehab.training.adaptation import (
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.fold import SessionFold
+from rehab.training.goal_adaptation import (
     DEFAULT_HIT_RATE,
     SUGGESTION_STRIDES,
     AdaptationMode,
@@ -15,8 +17,6 @@ from rehab.training.adaptation import (
     Staircase,
     suggest_goal,
 )
-from rehab.training.changes import Change, ChangeKind
-from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import make_phase

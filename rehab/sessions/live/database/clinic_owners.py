@@ -18,8 +18,8 @@ from django.conf import settings
 from django.db import connection
 from django.db.models import Exists, OuterRef
 
-from rehab.sessions.live.database import lease
-from rehab.sessions.live.database.lease import Server
+from rehab.sessions.live.database import server_lease
+from rehab.sessions.live.database.server_lease import VALID, Server
 from rehab.sessions.log import noted_end
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
@@ -30,15 +30,15 @@ HANDED_ON = "handed on"  # the owner of a clinic that was released while session
 FREE = ("", HANDED_ON)
 # Of servers: by the index of owners. It costs what dead servers had, whatever others have.
 LEFT_BY_SERVERS = f"""
-SELECT clinic_id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {lease.VALID})
+SELECT clinic_id, owner, EXISTS (SELECT 1 FROM rehab_server WHERE id = %(own)s AND {VALID})
 FROM rehab_clinicowner
 WHERE owner = ANY (ARRAY(
-    SELECT id FROM rehab_server WHERE NOT ({lease.VALID}) UNION ALL SELECT %(handed_on)s
+    SELECT id FROM rehab_server WHERE NOT ({VALID}) UNION ALL SELECT %(handed_on)s
 ))
 """  # noqa: S608
 # Also of those that have no lease at all: a database may be a copy, or older than they are.
 LEFT_BY_ANY = f"""
-WITH valid AS MATERIALIZED (SELECT id FROM rehab_server WHERE {lease.VALID})
+WITH valid AS MATERIALIZED (SELECT id FROM rehab_server WHERE {VALID})
 SELECT clinic_id, owner, EXISTS (SELECT 1 FROM valid WHERE id = %(own)s) FROM rehab_clinicowner
 WHERE owner NOT IN ('', %(own)s) AND NOT EXISTS (SELECT 1 FROM valid WHERE id = owner)
 """  # noqa: S608
@@ -100,7 +100,7 @@ def _own_start_time(pid: int) -> str:
 
 def own_name() -> str:
     """Return the name that this process writes as owner."""
-    if (own := lease.held()) is not None:
+    if (own := server_lease.held()) is not None:
         return own.id
     return _name(os.getpid(), _own_start_time(os.getpid()))
 
@@ -119,9 +119,9 @@ def is_alive(owner: str, servers: Collection[Server] | None = None) -> bool:
 
     ``servers``: those whose lease is valid, if they were read already.
     """
-    own = lease.held()
+    own = server_lease.held()
     if owner and settings.HOSTED and "|" not in owner:
-        valid = lease.valid_servers() if servers is None else servers
+        valid = server_lease.valid_servers() if servers is None else servers
         valid_ids = {server.id for server in valid}
         return owner in valid_ids or not (own is None or own.may_judge_by(valid_ids))
     try:
@@ -152,9 +152,9 @@ def find_elsewhere(clinic_id: int, owner: str | None = None) -> OwnedElsewhere |
     if owner is None:
         rows = ClinicOwner.everywhere.filter(pk=clinic_id)
         owner = rows.values_list("owner", flat=True).first() or ""
-    servers = lease.valid_servers() if _has_leases() else []
-    if owner in FREE and lease.held() is not None:
-        place = lease.find_place(clinic_id, servers)
+    servers = server_lease.valid_servers() if _has_leases() else []
+    if owner in FREE and server_lease.held() is not None:
+        place = server_lease.find_place(clinic_id, servers)
         owner = own_name() if place is None else place.id
     if owner in (*FREE, own_name()) or not is_alive(owner, servers):
         return None
@@ -212,7 +212,7 @@ def find_ownerless(*, thorough: bool = True) -> tuple[list[int], list[int]]:
     with connection.cursor() as cursor:
         cursor.execute(statement, {"own": own_name(), "handed_on": HANDED_ON})
         left = sorted(cursor.fetchall())
-    own = lease.held()
+    own = server_lease.held()
     may_judge = own is None or (own.may_judge and any(is_valid for _, _, is_valid in left))
 
     def is_dead(owner: str) -> bool:
@@ -225,6 +225,6 @@ def find_ownerless(*, thorough: bool = True) -> tuple[list[int], list[int]]:
 
 def belongs_here(clinic_id: int) -> bool:
     """Return whether it is this process's to take a clinic that was left."""
-    own = lease.held()
-    place = lease.find_place(clinic_id, own.servers) if own is not None else None
+    own = server_lease.held()
+    place = server_lease.find_place(clinic_id, own.servers) if own is not None else None
     return place is None or place.id == own_name()

@@ -1,0 +1,28 @@
+"""https beside http: what a certificate that comes later begins."""
+
+import asyncio
+from types import SimpleNamespace
+
+from rehab.sessions.live import encryption
+
+
+async def test_the_port_is_opened_once_however_often_the_certificate_is_renewed(monkeypatch):
+    opened, looks, done = [], [], asyncio.Event()
+
+    def find_certificate():
+        looks.append(1)
+        if len(looks) > 3:
+            done.set()
+        return "files" if len(looks) > 1 else None
+
+    reactor = SimpleNamespace(listenTCP=lambda *_, **__: opened.append(len(looks)))
+    monkeypatch.setattr(encryption, "get_reactor", lambda: reactor)
+    monkeypatch.setattr(encryption, "find_certificate", find_certificate)
+    for name in ("_CurrentContext", "_EitherFactory", "answer_to_names", "keep_current"):
+        monkeypatch.setattr(encryption, name, lambda *_: None)
+    monkeypatch.setattr(encryption, "LOOK_S", 0.0)
+    monkeypatch.setattr(encryption, "RENEW_S", 0.0)
+    task = asyncio.create_task(encryption.encrypt(None, asyncio.Event()))
+    await asyncio.wait_for(done.wait(), 5)
+    task.cancel()
+    assert opened == [2]
