@@ -194,7 +194,7 @@ def test_frames_that_stick_out_cost_no_stride_whose_a2_they_do_not_change(name, 
     assert len(pairs) == len(find_clean(walk))
     shown = [(one, stride) for one, stride in pairs if stride.valid]
     assert len(shown) >= (1 - lost) * len(pairs)
-    assert all(abs(stride.a2_w_kg / one.a2_w_kg - 1) < 0.06 for one, stride in shown)
+    assert all(abs(stride.a2_w_kg / one.a2_w_kg - 1) < 0.07 for one, stride in shown)
 
 
 def test_a_spike_that_changes_a2_is_refused_and_another_one_makes_it_less_sure():
@@ -204,7 +204,7 @@ def test_a_spike_that_changes_a2_is_refused_and_another_one_makes_it_less_sure()
     def strike(size):
         def change(angle):
             for stride in truth:
-                angle[np.searchsorted(walk.t_s, stride.terminal_contact_s - 0.1)] += size
+                angle[np.searchsorted(walk.t_s, stride.terminal_contact_s - 0.06)] += size
             return angle
 
         return walk.change(2, change).one_leg()
@@ -248,7 +248,8 @@ def measure_usual() -> dict[str, dict[str, list[float]]]:
                 if off and on:
                     figures["alone"] = (on[0] - off[0]) / (one.end_s - one.begin_s)
             for figure, value in figures.items():
-                found[figure][name] += [] if value is None else [float(value)]
+                if value is not None:
+                    found[figure][name].append(float(value))
     return found
 
 
@@ -306,7 +307,8 @@ RESTS_ON = {  # what each number of these modules rests on, that is no limit of 
         units.MASS_USUAL_KG check.SAME_FACTOR""",
     "how it is computed; nothing is refused by it": """
         analysis.BEFORE_S analysis.LONGEST_S analysis.DECIMATED_HZ analysis.FORWARD_HZ
-        analysis.LATE_FROM continuity.APART_S continuity.MOMENT_TO_S gaps.HARMFUL_FROM gaps.AROUND_S
+        analysis.LATE_FROM continuity.APART_S continuity.WHOLE continuity.SPIKE
+        continuity.MOMENT_TO_S gaps.HARMFUL_FROM gaps.AROUND_S
         gaps.AROUND_SAMPLES gaps.ORDER kinetics.PUSH_OFF_FROM kinetics.STOP_S kinetics.TURN_S
         kinetics.BEYOND_S kinetics.SLOPE_S lag_watch.SEARCH_S lag_watch.SETTLE_S lag_watch.AROUND_S
         lag_watch.GRID_HZ lag_watch.CUTOFF_HZ lag_watch.HALF lag_watch.BRAKING_MIN_RAD_S2

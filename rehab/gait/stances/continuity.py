@@ -50,6 +50,8 @@ ANGLE_JUMP = (0.2, 15.0)
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 8.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 8.0)  # Nm/kg
+WHOLE = 3  # h on each side of a spike or step, which samples of uneven times smear
+SPIKE = 0.5  # of a step that does not stay: then it was a spike, of which nothing stays
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
@@ -242,7 +244,7 @@ def _find_steps(values: Floats, apart: int, least: float, stop: int) -> Floats:
     """Return the steps of a channel, of which a spike has two, added up from its first sample on.
 
     A step is what a change over ``apart`` samples has beyond the median of five such changes in a
-    row, where that is ``least`` or more, and before sample ``stop``.
+    row, where that is ``least`` or more, with its neighbors, and before sample ``stop``.
     """
     moved = values[apart:] - values[:-apart]
     added = np.zeros_like(values)
@@ -250,7 +252,13 @@ def _find_steps(values: Floats, apart: int, least: float, stop: int) -> Floats:
         return added
     in_a_row = np.lib.stride_tricks.sliding_window_view(moved, 4 * apart + 1)[:, ::apart]
     beyond = moved[2 * apart : -2 * apart] - np.median(in_a_row, axis=1)
-    beyond[np.abs(beyond) < least] = 0.0
+    near = np.convolve(np.abs(beyond) >= least, np.ones(2 * WHOLE * apart + 1), "same") >= 1
+    beyond[~near] = 0.0
+    edges = np.flatnonzero(np.diff(near, prepend=False, append=False))
+    for first, last in edges.reshape(-1, 2).tolist():
+        part = beyond[first:last]
+        if abs(float(part.sum())) / apart < SPIKE * float(np.abs(part).max()):
+            part -= part.mean()
     begin = 2 * apart + (apart + 1) // 2  # in the middle of the change
     added[begin : begin + len(beyond)] = beyond / apart
     added[stop:] = 0.0
