@@ -215,8 +215,8 @@ def take_out_steps(
     signals = stance.signals.copy()
     before = max(0, first - 4 * apart)
     for _, row, least, stop in found:
-        steps = _find_steps(rough[row, before:], apart, least, stop - before)
-        signals[MOMENT - FORCE + row, before:] -= steps
+        values = signals[MOMENT - FORCE + row, before:]
+        values -= _find_steps(values, rough[row, before:], apart, least, stop - before)
     return [reason for reason, *_ in found], replace(stance, signals=signals)
 
 
@@ -240,20 +240,19 @@ def _find_limit(
     return limit if highest > limit else None
 
 
-def _find_steps(values: Floats, apart: int, least: float, stop: int) -> Floats:
+def _find_steps(values: Floats, rough: Floats, apart: int, least: float, stop: int) -> Floats:
     """Return the steps of a channel, of which a spike has two, added up from its first sample on.
 
     A step is what a change over ``apart`` samples has beyond the median of five such changes in a
-    row, where that is ``least`` or more, with its neighbors, and before sample ``stop``.
+    row. It is taken, with its neighbors, where it is ``least`` or more in what the channel has
+    beside its smooth curve (``rough``), and before sample ``stop``.
     """
-    moved = values[apart:] - values[:-apart]
     added = np.zeros_like(values)
-    if len(moved) <= 4 * apart:
+    if len(values) <= 5 * apart:
         return added
-    in_a_row = np.lib.stride_tricks.sliding_window_view(moved, 4 * apart + 1)[:, ::apart]
-    beyond = moved[2 * apart : -2 * apart] - np.median(in_a_row, axis=1)
-    near = np.convolve(np.abs(beyond) >= least, np.ones(2 * WHOLE * apart + 1), "same") >= 1
-    beyond[~near] = 0.0
+    near = np.abs(_find_changes(rough, apart)) >= least
+    near = np.convolve(near, np.ones(2 * WHOLE * apart + 1), "same") >= 1
+    beyond = np.where(near, _find_changes(values, apart), 0.0)
     edges = np.flatnonzero(np.diff(near, prepend=False, append=False))
     for first, last in edges.reshape(-1, 2).tolist():
         part = beyond[first:last]
@@ -263,6 +262,13 @@ def _find_steps(values: Floats, apart: int, least: float, stop: int) -> Floats:
     added[begin : begin + len(beyond)] = beyond / apart
     added[stop:] = 0.0
     return np.cumsum(added)
+
+
+def _find_changes(values: Floats, apart: int) -> Floats:
+    """Return each change over ``apart`` samples beyond the median of five of these in a row."""
+    moved = values[apart:] - values[:-apart]
+    in_a_row = np.lib.stride_tricks.sliding_window_view(moved, 4 * apart + 1)[:, ::apart]
+    return np.asarray(moved[2 * apart : -2 * apart] - np.median(in_a_row, axis=1))
 
 
 def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
