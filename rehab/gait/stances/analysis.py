@@ -213,9 +213,9 @@ class StanceAnalyzer:
     ) -> float:
         """Append what a push-off is like; return what spikes and steps make of its A2 [W/kg]."""
         found, without = take_out_steps(stance, push_off, gap_s)
-        other = self._analyzer.measure(without) if found else push_off
-        by_steps = math.inf if other is None else abs(push_off.a2_w_kg - other.a2_w_kg)
-        if not by_steps <= STEPS_SHARE * push_off.a2_w_kg:
+        other = (self._analyzer.measure(without) if found else None) or push_off
+        by_steps = abs(push_off.a2_w_kg - other.a2_w_kg)
+        if found and not by_steps <= STEPS_SHARE * push_off.a2_w_kg:
             reasons += found
         half = stance.index(0.5)
         force_n = stance.signals[0, half : stance.end + 1] - contact.offset_n
