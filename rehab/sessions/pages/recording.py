@@ -154,6 +154,7 @@ def _describe(checked: Checked, chosen: dict[str, dict[str, str]]) -> dict[str, 
         else {
             "rate": round(found["rate_hz"]),
             "kg": found["mass_kg"],
+            "a2": [(legs[side], a2_w_kg) for side, a2_w_kg in found["a2_w_kg"].items()],
             **{name: found[name] for name in ("strides", "valid", "late", "lost")},
         }
     )
