@@ -124,7 +124,7 @@ def test_step_5_of_a_labs_first_day(page, server, browser, file):
     page.locator("[name=paretic_side]").select_option("left")
     page.get_by_role("button", name="Continue").click()
     page.get_by_text("Ten minutes at 60 %").click()
-    page.locator("[name=goal_by][value=value]").check(force=True)
+    page.locator("label:has([name=goal_by][value=value])").click()
     page.locator("[name=goal_value]").fill(goal)
     page.get_by_text(stored).click()
     picture(page, f"first-day-{kg}-set-up")
