@@ -160,6 +160,20 @@ def test_a_silent_sensor_is_seen_heard_and_felt(
     expect(alarm).to_have_count(0)  # in a pause nobody waits for steps
 
 
+def test_a_recording_that_has_ended_is_no_lost_sensor(
+    server: Server, monitor: Page, walk: Walk
+) -> None:
+    with feet_of(server, walk) as feet:
+        begin(monitor, feet)
+        feet.say({"type": "sensor", "trouble": "ended"})
+        expect(monitor.locator("[data-alarm=ended]")).to_contain_text("The recording has ended")
+    source = monitor.locator("[data-presence=source]")
+    expect(source).to_contain_text("– the recording has ended")
+    monitor.wait_for_timeout(1000)
+    expect(monitor.locator("[data-alarm=source]")).to_have_count(0)
+    assert monitor.evaluate("heard") == []
+
+
 def test_strides_that_do_not_count_come_with_a_cure(
     server: Server, monitor: Page, walk: Walk
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
+import time
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from playwright.sync_api import Page, expect
 
 from tests.gait.c3d import write_c3d
 from tests.gait.walks import make_walk
-from tests.support.browsers import Visit
+from tests.support.browsers import Visit, picture
+from tests.support.data import signals
 from tests.support.servers import Server
 from tests.support.walk_seed import make_walks
 
@@ -93,6 +95,46 @@ def test_a_c3d_file_is_checked_and_then_walked_with(page, server, walk, tmp_path
     assert len(valid) >= 3
     for value in valid:  # half of its channels came at half of the rate
         assert min(abs(value / one - 1) for one in measured) < 0.02
+
+
+@pytest.mark.parametrize("file", ["gaitalytics_treadmill_events.c3d", "UnpertPre_data.csv"])
+def test_step_5_of_a_labs_first_day(page, server, browser, file):
+    """docs/first-day.md: from a file of the lab's own to feedback within half a minute."""
+    folder, kg, goal = {
+        "gaitalytics_treadmill_events.c3d": ("lab_files", "55.3", "3"),
+        "UnpertPre_data.csv": ("moore2013_s15_pre", "82.2", "1.5"),
+    }[file]
+    if file.endswith(".c3d"):
+        pytest.importorskip("ezc3d")
+    page.set_input_files("#file", signals(folder) / file)
+    page.get_by_role("button", name="Check the file").click()
+    right = page.get_by_role("button", name="That is right")
+    expect(right).to_be_visible(timeout=CHECKED_MS)
+    expect(page.locator("main")).to_contain_text(re.compile(r"Left: A2 \d\.\d\d W/kg"))
+    picture(page, f"first-day-{kg}-checked")
+    right.click()
+    expect(page.get_by_role("status")).to_contain_text("is ready", timeout=CHECKED_MS)
+    picture(page, f"first-day-{kg}-stored")
+    stored = page.get_by_role("status").get_by_role("heading").inner_text().split()[0]
+    page.get_by_role("link", name="Choose a patient").click()
+    page.get_by_role("link", name="New patient").click()
+    page.locator("[name=nickname]").fill(f"Test {kg}")
+    page.locator("[name=code]").fill(f"T-{kg}")
+    page.locator("[name=body_mass_kg]").fill(kg)
+    page.locator("[name=paretic_side]").select_option("left")
+    page.get_by_role("button", name="Continue").click()
+    page.get_by_text("Ten minutes at 60 %").click()
+    page.locator("label:has([name=goal_by][value=value])").click()
+    page.locator("[name=goal_value]").fill(goal)
+    page.get_by_text(stored).click()
+    picture(page, f"first-day-{kg}-set-up")
+    page.locator("button[name=then][value=walk]").click()
+    page.wait_for_url("**/sessions/*/")
+    began = time.monotonic()
+    page.tap("[data-change=start]")
+    page.wait_for_selector("body[data-look=feedback]", timeout=30_000)
+    print(f"{file}: feedback after {time.monotonic() - began:.0f} s")
+    picture(page, f"first-day-{kg}-feedback")
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from rehab.gait import measure_strides
-from rehab.gait.recordings import c3d_plates
+from rehab.gait import LegSamples, measure_strides
+from rehab.gait.recordings import ankle, c3d_plates
 from rehab.gait.recordings.ankle import JOINT_AHEAD_M, compute_ankle
 from rehab.gait.recordings.columns import MARKED, find_layout, find_required, read_column_map
 from rehab.gait.recordings.markers import PLACES
 from rehab.gait.recordings.readers import read_any_table
 from rehab.gait.setup.check import check_setup
-from tests.gait.corpus import PLUG_IN_GAIT, find_clean, open_corpus, own_legs, read_lab_file
+from tests.gait.corpus import HBM, PLUG_IN_GAIT, find_clean, open_corpus, own_legs, read_lab_file
 from tests.sources.intake_harness import IntakeHarness
+from tests.support.data import signals
 
 ezc3d = pytest.importorskip("ezc3d")
 
@@ -83,6 +84,82 @@ def test_against_the_files_own_moment_and_power(name, by, rms, slow_rms, by_powe
     assert np.median(found.rms) < rms
     assert np.median(found.slow_rms) < slow_rms
     assert abs(np.median(found.by_power)) < by_power
+
+
+def find_frames(name):
+    """Return of each clean stride what its file's own program wrote, frame by frame: the moment
+    [Nm/kg] from contact to contact, and by how much its ground reaction force is off the plates'
+    channels of the same file, without the ends of stance [N/kg].
+    """
+    walk, path = open_corpus(name), read_lab_file(PLUG_IN_GAIT[name])
+    table, file = read_any_table(path), ezc3d.c3d(str(path))
+    rate_hz = file["header"]["points"]["frame_rate"]
+    apart = round(walk.rate_hz / rate_hz)
+    for one in find_clean(walk):
+        letter = one.side[0].upper()
+        moment = np.nan_to_num(table[f"{letter}AnkleMoment.X"][::apart]) / 1000
+        borne = np.nan_to_num(table[f"{letter}GroundReactionForce.Z"][::apart])
+        off = borne - table[f"plates.{one.side}"][::apart] / walk.mass_kg
+        first, stop = (round((at_s - walk.t_s[0]) * rate_hz) for at_s in (one.begin_s, one.end_s))
+        fast = moment - filtfilt(*butter(2, 10 / (rate_hz / 2)), moment)
+        yield fast[first:stop], off[first + 10 : stop - 10]
+
+
+@pytest.mark.parametrize(
+    ("name", "fast_nm_kg", "off_n_kg"),
+    [
+        ("BTK motion3", (0.0, 0.02), (0.0, 0.02)),
+        ("BTK flatfoot", (0.0, 0.02), (0.0, 0.1)),
+        # No moment of this file's plates comes within 0.08: it was computed from other samples.
+        ("gaitalytics treadmill", (0.09, 0.13), (0.11, 0.14)),
+    ],
+)
+def test_of_which_samples_a_file_has_its_moments(name, fast_nm_kg, off_n_kg):
+    """Above 10 Hz walking leaves next to nothing of a moment: the rest is noise of its own."""
+    frames = [[np.sqrt(np.mean(part**2)) for part in parts] for parts in find_frames(name)]
+    fast, off = np.median(frames, axis=0)
+    print(
+        f"\n{name}: its moment above 10 Hz {fast:.3f} Nm/kg rms, its force off {off:.3f} N/kg rms"
+    )
+    assert fast_nm_kg[0] <= fast < fast_nm_kg[1]
+    assert off_n_kg[0] <= off < off_n_kg[1]
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "foot_from", "rms", "by_power"),
+    [
+        (JOINT_AHEAD_M, "ankle", 0.11, 0.2),
+        (0.0, "ankle", 0.05, 0.15),
+        (0.0, "heel", 0.05, 0.05),
+    ],
+)
+def test_against_a_model_whose_joint_is_the_malleolus(
+    ahead_m, foot_from, rms, by_power, monkeypatch
+):
+    """HBM's subject 7 (``leg2d.m``): with its joint and its foot, from heel to toe, we agree."""
+    raw = np.loadtxt(signals(HBM) / "rawdata.txt", comments="%").T
+    walk = open_corpus("HBM subject 7")
+    knee, malleolus, heel, toe = raw[5:7], raw[7:9], raw[9:11], raw[11:13]
+    forward_n, up_n, moment_nm = raw[13:16]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cop_m = moment_nm / up_n
+    monkeypatch.setattr(ankle, "JOINT_AHEAD_M", ahead_m)
+    tip = toe if foot_from == "ankle" else malleolus + toe - heel
+    leg = dict(zip(MARKED, (up_n, forward_n, cop_m, *malleolus, *knee, *tip), strict=True))
+    legs = {"right": LegSamples(up_n, *compute_ankle(leg))}
+    strides = replace(walk, legs=legs).measure()
+    off, ratios = [], []
+    for one in find_clean(walk):
+        part = slice(*np.searchsorted(walk.t_s, (one.begin_s, one.end_s)))
+        both = (np.asarray(each["right"].moment_nm)[part] for each in (legs, walk.legs))
+        off.append(np.sqrt(np.nanmean((next(both) - next(both)) ** 2)) / walk.mass_kg)
+        (own,) = [s for s in strides if abs(s.terminal_contact_s - one.end_s) < 0.05]
+        ratios.append(own.a2_w_kg / one.file_a2_w_kg - 1)
+    print(
+        f"\nfoot from {foot_from}: moment {np.median(off):.3f} Nm/kg, A2 {np.median(ratios):+.1%}"
+    )
+    assert np.median(off) < rms
+    assert abs(np.median(ratios)) < by_power
 
 
 def test_a_file_without_moments_is_measured_from_its_markers(tmp_path):

@@ -145,6 +145,23 @@ def test_what_is_no_force_is_not_proposed_as_one(walk):
         propose(Table(tiny, mass_kg=75.0))
 
 
+@pytest.mark.parametrize(
+    ("unit", "largest", "is_told"),
+    [("Nmm", 40, True), ("Nm/kg", 0.04, True), ("Nmm", 1400, False), ("Nm", 1.4, False),
+     ("", 0.04, False)],  # without a unit it may be by body weight and height
+)  # fmt: skip
+def test_moments_that_were_computed_without_plates_are_told(walk, unit, largest, is_told):
+    columns = {n: v for n, v in label_columns(walk).items() if "Fz" not in n}
+    moments = ("LAnkleMoment", "RAnkleMoment")
+    columns |= {name: columns[name] / columns[name].max() * largest for name in moments}
+    with pytest.raises(GaitInputError) as told:
+        propose(Table(columns, dict.fromkeys(moments, unit)))
+    assert "LAnkleMoment, RAnkleMoment" in str(told.value)
+    assert "LAnkleAngles, RAnkleAngles" in str(told.value)
+    assert ("computed without plates: they reach 0.04 Nm/kg" in str(told.value)) is is_told
+    assert ("Give the files that belong together" in str(told.value)) is not is_told
+
+
 def test_markers_of_a_c3d_have_the_unit_of_lengths():
     pytest.importorskip("ezc3d")
     (path,) = map(type(signals("lab_files")), lab_files("btk_pig_motion3_ff.c3d"))

@@ -14,7 +14,7 @@ from rehab.sessions.services import change_session
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
-from rehab.training.measures import InvalidSetting
+from rehab.training.measures import MEASURES, InvalidSetting
 from rehab.training.robot_cueing import CueTiming
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
@@ -125,6 +125,17 @@ def test_a_goal_in_percent_waits_for_its_baseline(pt, patient, station):
     assert newest().goal is None
 
 
+@pytest.mark.parametrize("slug", [one.slug for one in MEASURES.values()])
+def test_a_simulated_patient_walks_every_measure(pt, patient, station, slug):
+    row = MeasureDefinition.everywhere.get(clinic=None, slug=slug)
+    goal = MEASURES[slug].offered_goal
+    given = choices(station, measure=row.pk, goal_value=str(goal), source="synthetic good")
+    answer = pt.post(f"/patients/{patient.pk}/new/", given)
+    assert answer.status_code == 302
+    assert newest().measure == row
+    assert newest().source_args[0] == "synthetic"
+
+
 def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
     pulse = a_pulse(world)
     url = f"/patients/{patient.pk}/new/"
@@ -136,7 +147,7 @@ def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
     assert "Give one above 40 and up to 200 1/min." in refused
     assert 'data-step="0.5"' in refused
     refused = pt.post(url, chosen | {"source": "synthetic good"}).content.decode()
-    assert "Simulated patients walk with A2 only" in refused
+    assert "Simulated patients do not walk this measure" in refused
     pt.post(url, chosen)
     session = newest()
     assert session.measure == pulse

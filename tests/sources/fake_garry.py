@@ -90,6 +90,8 @@ class FakeGarry:
 
     async def _take(self, socket: ServerConnection, frame: Message) -> None:
         self.frames.append(frame)
+        if frame["type"] == "sensor":
+            return
         steps = frame["steps"] if frame["type"] == "steps" else [frame]
         for step in steps:
             step = {name: value for name, value in step.items() if name != "type"}  # noqa: PLW2901

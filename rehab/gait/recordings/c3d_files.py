@@ -33,7 +33,8 @@ def read_table(path: Path) -> Table:
         ezc3d = importlib.import_module("ezc3d")
     except ImportError:
         raise GaitInputError(
-            "C3D files need ezc3d, which is not installed. Cure: pip install ezc3d, or export CSV."
+            "C3D files need ezc3d, which is not installed. Cure: in GARRY's folder "
+            ".venv/bin/pip install ezc3d, or export CSV."
         ) from None
     _try_apart(path)
     try:

@@ -7,6 +7,7 @@ label says anything; it overrules no label.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -27,15 +28,17 @@ from rehab.gait.setup.find_forces import (
     Force,
     find_force_unit,
     find_forces,
+    find_size,
     looks_overground,
     name_sides,
 )
 from rehab.gait.setup.guess import Guess
 from rehab.gait.setup.names import Label, find_side, names_another, read_label, read_unit
-from rehab.gait.setup.units import CHANNEL_UNITS, find_unit, is_in_units
+from rehab.gait.setup.units import CHANNEL_UNITS, MOMENT_UNITS, find_unit, is_in_units
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.frames import find_frame_problem
+from rehab.gait.stances.plausibility import MOMENT_MIN
 from rehab.gait.strides import GaitInputError
 
 CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next shape
@@ -113,7 +116,7 @@ def propose(
     labels = {name: one for name, one in labels.items() if one or not _is_other(table, name)}
     forces = find_forces(table, labels, time_s)
     if not forces:
-        raise GaitInputError(_describe_no_force(labels))
+        raise GaitInputError(_describe_no_force(table, labels))
     sides, doubts = name_sides(table, labels, time_s, forces)
     if is_overground is None:
         is_overground = says_overground(table) or looks_overground(table, time_s, forces)
@@ -163,31 +166,44 @@ def _is_other(table: Table, name: str) -> bool:
     )
 
 
-def _describe_no_force(labels: dict[str, Label | None]) -> str:
+def _describe_no_force(table: Table, labels: Mapping[str, Label | None]) -> str:
     """Return what a file without a vertical force lacks, and the cure."""
-    named = {
-        channel: [
-            name for name, one in labels.items() if one is not None and one.channel == channel
-        ]
-        for channel in REQUIRED
-    }
-    if named["force"]:
+    named: dict[str, dict[str, str]] = {channel: {} for channel in REQUIRED}
+    known = [(name, one) for name, one in labels.items() if one]
+    for name, one in sorted(known, key=lambda pair: pair[1].is_sagittal):
+        named[one.channel][one.side or name] = name  # of a leg's, the flexion's
+    if forces := list(named["force"].values()):
         return (
-            f"{', '.join(named['force'][:3])} should be a vertical force, but none shows a stance "
+            f"{', '.join(forces[:3])} should be a vertical force, but none shows a stance "
             "from its beginning to its end. Record walking over the plates."
         )
     has = [
-        f"an ankle {channel} ({named[channel][0]})" for channel in REQUIRED[1:] if named[channel]
+        f"ankle {channel}s ({', '.join(sorted(named[channel].values()))})"
+        for channel in REQUIRED[1:]
+        if named[channel]
     ]
-    if has:
+    if not has:
         return (
-            f"This file has {' and '.join(has)}, but no vertical force. Give the files that belong "
-            "together in one command: check FORCES MOMENTS ANGLES."
+            "No column is a vertical force: none is zero in swing and has two humps in stance. "
+            "Walk for half a minute with the plates on, and send their vertical force."
         )
-    return (
-        "No column is a vertical force: none is zero in swing and has two humps in stance. "
-        "Walk for half a minute with the plates on, and send their vertical force."
+    begin = f"This file has {' and '.join(has)}, but no vertical force. "
+    moments = [name for name, one in known if one.channel == "moment"]
+    largest = max((_find_most(table, name) for name in moments), default=math.inf)
+    if largest < MOMENT_MIN:
+        return begin + (
+            f"Its moments were computed without plates: they reach {largest:.2g} Nm/kg, as those "
+            "of a foot that swings. Record the plates too, and compute the moments with them."
+        )
+    return begin + (
+        "Give the files that belong together in one command: check FORCES MOMENTS ANGLES."
     )
+
+
+def _find_most(table: Table, name: str) -> float:
+    """Return what a moment reaches at most, even if by body mass [Nm/kg]; infinite without unit."""
+    factor = MOMENT_UNITS.get(read_unit(name, table.units), math.inf)
+    return factor * max(find_size(table[name]), 1e-9)
 
 
 def _find_frame(columns: Mapping[str, Floats], time_name: str, time_s: Floats) -> str | None:

@@ -83,13 +83,14 @@ def _is_sideways(columns: Mapping[str, Floats], name: str) -> bool:
     for at, letter in enumerate(name):
         axes = next((one for one in ("xyz", "XYZ") if letter in one), "")
         names = [name[:at] + axis + name[at + 1 :] for axis in axes if axis != letter]
-        sizes = [_find_size(columns[one]) for one in names if one in columns]
+        sizes = [find_size(columns[one]) for one in names if one in columns]
         if sizes:
-            return max(sizes) > _find_size(columns[name])
+            return max(sizes) > find_size(columns[name])
     return False
 
 
-def _find_size(values: Floats) -> float:
+def find_size(values: Floats) -> float:
+    """Return the size that a channel's values reach, a few spikes left out."""
     return float(np.percentile(np.abs(np.nan_to_num(values)), 99.0))
 
 

@@ -25,15 +25,12 @@ MOMENT_UNITS = {
 IMPERIAL = {"lbf·ft", "lbf·in"}
 BY_MASS = {"N/kg", "body weights", "% body weight", "Nm/kg", "Nmm/kg"}
 ANGLE_UNITS = {"rad": 1.0, "°": math.pi / 180, "mrad": 1e-3}
-# Mean vertical force of a stance by body weight: half of a stride by its stance. Of the five
-# people of the corpus 0.77 to 0.84 (medians of a leg): enough to tell units apart, not a mass.
+# Mean vertical force of a stance by body weight: half of a stride by its stance. Of the six people
+# of the corpus 0.78 to 0.81 (medians): enough to tell units apart, not a mass.
 STANCE_LOAD, FORCE_SPREAD = 0.8, 0.15
-# The force passes 0.13 to 0.17 m in front of the ankle where the moment peaks (the same five).
-LEVER_M, LEVER_SPREAD = 0.13, 0.25
-ANGLE_RAD, ANGLE_SPREAD = (
-    0.5,
-    0.6,
-)  # range over a stride: 0.40 to 0.64 (the same); 0.3 in an orthosis
+# The force passes 0.127 to 0.173 m in front of the ankle where the moment peaks (the same six).
+LEVER_M, LEVER_SPREAD = 0.15, 0.25
+ANGLE_RAD, ANGLE_SPREAD = 0.5, 0.6  # range in stance: 0.32 to 0.59 (the same); 0.3 in an orthosis
 CHANNEL_UNITS = {"force": FORCE_UNITS, "moment": MOMENT_UNITS, "angle": ANGLE_UNITS}
 MASS_USUAL_KG = (35.0, 160.0)
 

@@ -20,8 +20,8 @@ from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, POSITION, TIME
 from rehab.gait.stances.continuity import (
     check_fills,
     check_samples,
-    check_steps,
     read_moving,
+    take_out_steps,
 )
 from rehab.gait.stances.gaps import HARMFUL_FROM, ClockJudge
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
@@ -57,6 +57,9 @@ LONGEST_S = BEFORE_S + STANCE_MAX_S + 1.0
 # Neighbors are averaged down to 200-400 Hz before the filter: signals up to 6 Hz lose nothing.
 DECIMATED_HZ = 200.0
 FORWARD_HZ = 20.0
+# Of A2: what a spike or a step of moment or angle changes beyond this makes it another value. Less
+# is added to its standard deviation.
+STEPS_SHARE = 0.05
 LATE_FROM = 0.72  # of stance; there moment and force have their late peaks
 
 
@@ -175,11 +178,12 @@ class StanceAnalyzer:
             )
             push_off = None if stance is None else self._analyzer.measure(stance)
             if stance is not None and push_off is not None:
-                self._check_push_off(contact, stance, push_off, gap_s, reasons, flags)
+                by_steps = self._check_push_off(contact, stance, push_off, gap_s, reasons, flags)
                 angle = self._angle_lag
                 a2_sd = self._uncertainty.find(
                     stance, push_off, clock.late_s, angle.moved_s, angle.beyond_s
                 )
+                a2_sd = math.hypot(a2_sd, by_steps)
         if push_off is None and not reasons:
             reasons.append(RejectionReason.NO_PUSH_OFF)
         return Stance(
@@ -206,9 +210,13 @@ class StanceAnalyzer:
         gap_s: float,
         reasons: list[RejectionReason],
         flags: list[Flag],
-    ) -> None:
-        """Append what a push-off is like."""
-        reasons += check_steps(stance, push_off, gap_s)
+    ) -> float:
+        """Append what a push-off is like; return what spikes and steps make of its A2 [W/kg]."""
+        found, without = take_out_steps(stance, push_off, gap_s)
+        other = (self._analyzer.measure(without) if found else None) or push_off
+        by_steps = abs(push_off.a2_w_kg - other.a2_w_kg)
+        if found and not by_steps <= STEPS_SHARE * push_off.a2_w_kg:
+            reasons += found
         half = stance.index(0.5)
         force_n = stance.signals[0, half : stance.end + 1] - contact.offset_n
         moment_nm = stance.signals[1, half : stance.end + 1]
@@ -226,6 +234,7 @@ class StanceAnalyzer:
         reasons += check_push_off(push_off, stance)
         if has_clonus(push_off, stance):
             flags.append(Flag.CLONUS)
+        return by_steps
 
     def _watch_angle(self, sure: tuple[int, float, float] | None, end: int) -> None:
         """Add when the ankle braked after the stance before, if it is sure when that ended.

@@ -7,6 +7,7 @@ These are faults of sensors and of their connection; physiological limits are ch
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -29,9 +30,10 @@ MOMENT_FROZEN_S, ANGLE_FROZEN_S = 0.02, 0.04
 STRAIGHT_S = 0.06
 STRAIGHT_TO = np.array([[4.0], [0.02]])
 # At once [Nm/kg, rad], and by time: the six people of ``plausibility`` reach 13-23 Nm/kg/s and 4-9
-# rad/s. Gaitalytics' unfiltered moment jumps by 0.75 Nm/kg once within 10 ms.
-MOMENT_JUMP = (0.15, 40.0)
-ANGLE_JUMP = (0.05, 15.0)
+# rad/s, and gaitalytics' unfiltered moment 0.37 Nm/kg at once. Beyond, a channel is no ankle's; of
+# less, what it does to A2 judges (``take_out_steps``).
+MOMENT_JUMP = (0.5, 40.0)
+ANGLE_JUMP = (0.2, 15.0)
 
 # Spikes and steps are looked for h = 10 ms apart: in the angle by its fourth difference, to which a
 # push-off adds little however fast it is, a spike six and a step three times its size; in the
@@ -41,12 +43,16 @@ ANGLE_JUMP = (0.05, 15.0)
 # median, for the sensor's noise. Beyond these, where nothing was wrong, k was for the angle 0
 # (BTK's two), 40 (moore2013, OpenSim's subject01) and 225 (gaitalytics, unfiltered) at most; for
 # the moment 110 (moore2013; synthetic people of 0.3 to 6.5 W/kg) and 37 (BTK's motion3). Eight
-# medians are 5.4 sd of white noise, once in 10 million samples; of the unfiltered angles that the
+# medians are 5.4 sd of white noise, once in 10 million samples, and six 4 sd: 25 Nm in a moment of
+# noise are told by these (``tests/gait/test_bad_input.py``). Of the unfiltered angles that the
 # markers of four people make (gaitalytics, BTK's two, HBM's) none exceeds k, of gaitalytics' own
-# the largest is 7.6 medians beyond it.
+# the largest is 7.6 medians beyond it. What exceeds all that is unusual; a stride is refused by it
+# only where its A2 changes once it is taken out (``analysis.STEPS_SHARE``).
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 8.0)  # rad
-MOMENT_STEP = (110.0, 0.02, 8.0)  # Nm/kg
+MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
+WHOLE = 3  # h on each side of a spike or step, which samples of uneven times smear
+SPIKE = 0.5  # of a step that does not stay: then it was a spike, of which nothing stays
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
@@ -166,8 +172,12 @@ def _find_longest_run(found: NDArray[np.bool_]) -> int:
     return int(np.diff(others).max()) - 1
 
 
-def check_steps(stance: ResampledStance, push_off: PushOff, gap_s: float) -> list[RejectionReason]:
-    """Return which channels of a stance have a spike or a step where it changes push-off.
+def take_out_steps(
+    stance: ResampledStance, push_off: PushOff, gap_s: float
+) -> tuple[list[RejectionReason], ResampledStance]:
+    """Return which channels of a stance have a spike or a step, and the stance without these.
+
+    What these do to A2 judges the stance: people's channels differ in noise more than in that.
 
     Parameters
     ----------
@@ -186,37 +196,80 @@ def check_steps(stance: ResampledStance, push_off: PushOff, gap_s: float) -> lis
     last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
     angle = stance.signals[ANGLE - FORCE, first:]
     if last - first <= apart or len(angle) <= 4 * apart:
-        return []
-    reasons = []
+        return [], stance
+    found = []
+    smooth = np.array([push_off.moment_nm_kg * push_off.mass_kg, push_off.angle_rad])
+    rough = stance.signals[MOMENT - FORCE :] - smooth
     moment = push_off.moment_nm_kg[first:last]
-    rough = stance.signals[MOMENT - FORCE, first:last] / push_off.mass_kg - moment
-    steps = np.abs(rough[apart:] - rough[:-apart])
-    if _is_discontinuous(steps, moment, walking, *MOMENT_STEP):
-        reasons.append(RejectionReason.MOMENT_LOST)
+    moved = rough[0, first:last] / push_off.mass_kg
+    steps = np.abs(moved[apart:] - moved[:-apart])
+    if (limit := _find_limit(steps, moment, walking, *MOMENT_STEP)) is not None:
+        found.append((RejectionReason.MOMENT_LOST, 0, limit * push_off.mass_kg, last))
     bends = angle[2 * apart :] - 2 * angle[apart:-apart]
     bends += angle[: -2 * apart]
     fourth = bends[2 * apart :] - 2 * bends[apart:-apart]
     fourth += bends[: -2 * apart]
-    if _is_discontinuous(np.abs(fourth), angle, walking, *ANGLE_FOURTH):
-        reasons.append(RejectionReason.ANGLE_LOST)
-    return reasons
+    if (limit := _find_limit(np.abs(fourth), angle, walking, *ANGLE_FOURTH)) is not None:
+        found.append((RejectionReason.ANGLE_LOST, 1, limit / 6, len(push_off.angle_rad)))
+    if not found:
+        return [], stance
+    signals = stance.signals.copy()
+    before = max(0, first - 4 * apart)
+    for _, row, least, stop in found:
+        values = signals[MOMENT - FORCE + row, before:]
+        values -= _find_steps(values, rough[row, before:], apart, least, stop - before)
+    return [reason for reason, *_ in found], replace(stance, signals=signals)
 
 
-def _is_discontinuous(
+def _find_limit(
     found: Floats,
     curve: Floats,
     walking: float,
     by_walking: float,
     at_once: float,
     by_noise: float,
-) -> bool:
-    """Return whether the largest change of a curve exceeds what walking and noise can make."""
+) -> float | None:
+    """Return what walking and noise make of changes at most, None if the largest is no more."""
     highest = find_maximum(found)
     if not highest > at_once:
-        return False
+        return None
     walking *= find_maximum(curve) - find_minimum(curve)
     limit = by_walking * walking + at_once
-    return highest > limit and highest > limit + by_noise * find_upper_median(found)
+    if not highest > limit:
+        return None
+    limit = limit + by_noise * find_upper_median(found)
+    return limit if highest > limit else None
+
+
+def _find_steps(values: Floats, rough: Floats, apart: int, least: float, stop: int) -> Floats:
+    """Return the steps of a channel, of which a spike has two, added up from its first sample on.
+
+    A step is what a change over ``apart`` samples has beyond the median of five such changes in a
+    row. It is taken, with its neighbors, where it is ``least`` or more in what the channel has
+    beside its smooth curve (``rough``), and before sample ``stop``.
+    """
+    added = np.zeros_like(values)
+    if len(values) <= 5 * apart:
+        return added
+    near = np.abs(_find_changes(rough, apart)) >= least
+    near = np.convolve(near, np.ones(2 * WHOLE * apart + 1), "same") >= 1
+    beyond = np.where(near, _find_changes(values, apart), 0.0)
+    edges = np.flatnonzero(np.diff(near, prepend=False, append=False))
+    for first, last in edges.reshape(-1, 2).tolist():
+        part = beyond[first:last]
+        if abs(float(part.sum())) / apart < SPIKE * float(np.abs(part).max()):
+            part -= part.mean()
+    begin = 2 * apart + (apart + 1) // 2  # in the middle of the change
+    added[begin : begin + len(beyond)] = beyond / apart
+    added[stop:] = 0.0
+    return np.cumsum(added)
+
+
+def _find_changes(values: Floats, apart: int) -> Floats:
+    """Return each change over ``apart`` samples beyond the median of five of these in a row."""
+    moved = values[apart:] - values[:-apart]
+    in_a_row = np.lib.stride_tricks.sliding_window_view(moved, 4 * apart + 1)[:, ::apart]
+    return np.asarray(moved[2 * apart : -2 * apart] - np.median(in_a_row, axis=1))
 
 
 def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:

@@ -30,7 +30,7 @@ from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
 from rehab.training import measures as rules
-from rehab.training.measures import A2, InvalidSetting
+from rehab.training.measures import A2, MEASURES, InvalidSetting
 from rehab.training.steps import Side
 
 ROW_FIELDS: dict[str, Any] = {
@@ -145,8 +145,8 @@ class SessionForm(OptionForm):
         if slugs is not None and measure.slug not in slugs:
             message = _("The sensors that are paired here do not measure this. Choose another.")
             self.add_error("measure", message)
-        if measure.slug != A2.slug and data.get("source", "").startswith(SIMULATED):
-            message = _("Simulated patients walk with A2 only. Choose another source, or A2.")
+        if measure.slug not in MEASURES and data.get("source", "").startswith(SIMULATED):
+            message = _("Simulated patients do not walk this measure. Choose another source.")
             self.add_error("source", message)
         return data
 

@@ -8,6 +8,7 @@ from typing import Any
 from django.conf import settings
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
+from django.utils.formats import number_format
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST
 
@@ -154,6 +155,10 @@ def _describe(checked: Checked, chosen: dict[str, dict[str, str]]) -> dict[str, 
         else {
             "rate": round(found["rate_hz"]),
             "kg": found["mass_kg"],
+            "a2": [
+                f"{legs[side]}: A2 {number_format(a2_w_kg, 2)} W/kg"
+                for side, a2_w_kg in found["a2_w_kg"].items()
+            ],
             **{name: found[name] for name in ("strides", "valid", "late", "lost")},
         }
     )

@@ -105,7 +105,7 @@ class SourceClient:
             self._receive(),
             self._walk(),
             self._send(),
-            self._until(lambda: self._follower.is_done),
+            self._finish(),
         ]
         if self._journal is not None:
             doing.append(self._sync(self._journal))
@@ -206,6 +206,18 @@ class SourceClient:
             frame = self._queue.next_frame()
             if frame is not None:
                 await self._link.send(frame)
+
+    async def _finish(self) -> None:
+        """Tell the server of the end of each recording; return when nothing more will come."""
+        follower = self._follower
+        told: int | None = None
+        while not follower.is_over:
+            await self._until(lambda: follower.is_over or follower.walked not in {None, told})
+            if told := follower.walked:
+                if isinstance(self._feed, StridePlayback):
+                    await self._link.send({"type": "sensor", "trouble": "ended"})
+                if not self._stay:
+                    return
 
     async def _sync(self, journal: Journal) -> None:
         while True:

@@ -77,11 +77,10 @@ class SessionFollower:
         return self.state == State.RUNNING or during_pause
 
     @property
-    def is_done(self) -> bool:
-        """Whether the strides are over and stored, or the session is over."""
-        has_walked = self._queue.session is not None and self._feed.is_over
-        all_stored = has_walked and not self._queue.unacknowledged
-        return self.is_over or (all_stored and not self._stay)
+    def walked(self) -> int | None:
+        """The session whose strides are over and stored, None while there is none."""
+        is_whole = self._feed.is_over and not self._queue.unacknowledged
+        return self._queue.session if is_whole else None
 
     def handle(self, message: Message) -> None:
         """Handle a message of the server. Raises LinkRefused where it breaks the protocol."""

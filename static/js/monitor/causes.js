@@ -61,6 +61,11 @@ function describeRestart({ state, pause_reason: reason }) {
   return _("The server was restarted; nothing was lost. Resume when ready.");
 }
 
+function describeEnd({ presence, state }) {
+  if (state !== "running" || presence.source_trouble !== "ended") return "";
+  return _("The recording has ended: no stride follows. End the session.");
+}
+
 function describeSource({ presence, state: sessionState }, { state }) {
   if (sessionState !== "running") return "";
   if (!presence.source) {
@@ -143,6 +148,7 @@ export const CAUSES = [
     describe: describeRestart,
     isCalm: true,
   },
+  { cause: "ended", hides: ["source", "strides"], describe: describeEnd, isCalm: true },
   { cause: "source", hides: ["strides"], describe: describeSource },
   { cause: "signals", hides: ["strides"], describe: describeDoubt },
   { cause: "strides", hides: [], describe: describeInvalid },

@@ -22,6 +22,7 @@ const TROUBLES = {
   moved: _("the sensor has moved: is the strap tight?"),
   elsewhere: _("it sits differently from last time: strap it on as before, or take a new baseline"),
   battery: _("the phone’s battery is low"),
+  ended: _("the recording has ended"),
   doubt: _("unsure how it is worn: stand still, then lift the toes once (shin: swing the leg forward)"),
 };
 
@@ -61,6 +62,7 @@ function describeAllSources(presence, strides, silent_s, isRunning) {
 }
 
 function describeSource(isThere, strides, silent_s, isRunning, trouble) {
+  if (!isThere && trouble) return ["–", TROUBLES[trouble]];
   if (!isThere) {
     const since = silent_s !== null && fill(_("not connected, last stride %(ago)s"), { ago: ago(silent_s) });
     return ["–", since || _("not connected")];

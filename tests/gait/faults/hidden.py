@@ -27,9 +27,9 @@ class Hidden:
 HIDDEN = {
     1: Hidden(
         "moment × gain has the curve, signs and times of a stronger ankle, and its lever on the "
-        "force, 0.13-0.17 m (five people), stays that of a foot",
+        "force, 0.13-0.17 m (six people), stays that of a foot",
         "a file's plates and markers, from 0.88 and 1.12 on; 'lbf·ft would be as likely as Nm'; "
-        "'its peak is … times too large' from a factor of 1.28 on",
+        "'its peak is … times too large' from 1.1 to 1.5 on, by the foot",
         ("moment × 0.7376", "moment × 0.8", "moment × 1.2"),
     ),
     2: Hidden(

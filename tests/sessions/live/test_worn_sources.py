@@ -71,6 +71,31 @@ async def test_the_therapist_sees_what_plays_instead_of_a_leg(place, sourced):
     assert (await source.sent_away())[0] == 4400
 
 
+async def test_the_end_of_a_recording_outlives_its_source(place, sourced):
+    session, source = await sourced(place)
+    monitor = await place.monitor(session).open()
+
+    def is_told(trouble, *, is_there):
+        def judge(event):
+            presence = event.get("presence", {})
+            told = (presence.get("source_trouble"), presence.get("source"))
+            return event["kind"] == "presence" and told == (trouble, is_there)
+
+        return judge
+
+    for trouble in ("hidden", "ended"):
+        await source.say({"type": "sensor", "trouble": trouble})
+        await monitor.until(is_told(trouble, is_there=True))
+    await source.hang_up()
+    await monitor.until(is_told("ended", is_there=False))
+    again = await place.source().open()
+    await monitor.until(is_told("", is_there=True))
+    await again.say({"type": "sensor", "trouble": "hidden"})
+    await monitor.until(is_told("hidden", is_there=True))
+    await again.hang_up()
+    await monitor.until(is_told("", is_there=False))
+
+
 async def test_a_phone_asks_for_the_time(place, sourced):
     _, source = await sourced(place)
     before_s = time.monotonic()

@@ -37,6 +37,24 @@ async def test_a_walk_is_stored_whole_and_in_order(garry):
     assert len(garry.frames) < 200  # strides that wait together travel together
 
 
+@pytest.mark.parametrize("stay", [False, True])
+async def test_the_end_of_a_recording_is_told_once_all_is_stored(garry, stay):
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(3), stay=stay)
+        async with running(client) as task:
+            await until(lambda: {"type": "sensor", "trouble": "ended"} in garry.frames)
+            assert garry.numbers == [1, 2, 3]
+            assert client.unacknowledged == 0
+            if stay:
+                await garry.change("stop")
+                await garry.open(8)
+                await until(lambda: garry.frames[-1]["type"] == "sensor" and garry.numbers)
+            else:
+                await asyncio.wait_for(task, 5)
+    told = [frame for frame in garry.frames if frame["type"] == "sensor"]
+    assert len(told) == (2 if stay else 1)
+
+
 async def test_never_more_than_the_window_is_on_the_way(garry):
     garry.holds_acks = True
     async with serve_garry(garry):

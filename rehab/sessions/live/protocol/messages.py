@@ -196,7 +196,7 @@ def read_hello(message: Message) -> Hello:
 
 
 class SensorTrouble(StrEnum):
-    """Why a worn sensor's strides do not count for now; the therapist's page says what to do."""
+    """Why strides of a sensor do not count or come; the therapist's page says what to do."""
 
     NONE = ""
     HIDDEN = "hidden"
@@ -206,6 +206,7 @@ class SensorTrouble(StrEnum):
     ELSEWHERE = "elsewhere"
     BATTERY = "battery"
     DOUBT = "doubt"
+    ENDED = "ended"  # of a recording: it stays true when its source has left
 
 
 class Played(StrEnum):

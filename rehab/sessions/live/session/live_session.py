@@ -22,7 +22,7 @@ from rehab.sessions.events.event import (
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live.database.trouble import WORDS, NotStored, classify_failure
 from rehab.sessions.live.devices import ConnectedDevice
-from rehab.sessions.live.protocol.messages import SensorState
+from rehab.sessions.live.protocol.messages import SensorState, SensorTrouble
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
 from rehab.sessions.live.session.group_commit import Writer
@@ -348,7 +348,8 @@ def _for_patient(about: Message) -> Message:
 
 
 def _trouble(device: ConnectedDevice | None, state: SensorState | None) -> str:
-    return state.trouble.value if device and state else ""
+    is_known = state and (device or state.trouble is SensorTrouble.ENDED)
+    return state.trouble.value if state and is_known else ""
 
 
 def _plays(device: ConnectedDevice | None, state: SensorState | None) -> str:
