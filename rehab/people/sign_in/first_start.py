@@ -11,6 +11,7 @@ from django.core.management import CommandError, call_command
 from django.db import DatabaseError, connection, transaction
 from django.db.migrations.executor import MigrationExecutor
 
+from rehab.people.commands import command
 from rehab.people.models import Clinic, User
 from rehab.people.random_codes import random_words
 from rehab.people.roles import Role
@@ -41,7 +42,7 @@ def prepare_database() -> None:
     if settings.HOSTED:
         raise CommandError(
             f"The database lacks {pending} migration(s). Back it up, then run "
-            f"`{settings.PROGRAM} migrate`."
+            f"`{command('migrate')}`."
         )
     call_command("migrate", verbosity=0, interactive=False)
 
