@@ -30,5 +30,7 @@ def reinstall() -> str:
 
 def as_typed_here(text: str, address: str) -> str:
     """Return a page of the documentation with this installation's commands and its address."""
-    text = re.sub(r"(\.venv/bin/python )?manage\.py", lambda _: str(settings.PROGRAM), text)
+    # A container's "python manage.py" stays.
+    pattern = r"\.venv/bin/python manage\.py|(?<!python )manage\.py"
+    text = re.sub(pattern, lambda _: str(settings.PROGRAM), text)
     return text.replace("make run", command("serve")).replace("http://127.0.0.1:8000", address)

@@ -51,7 +51,7 @@ def test_pages_show_their_pictures_and_lead_only_to_pages_that_are_here(world):
 
 def test_pages_name_commands_and_the_address_as_they_are_here(world, settings):
     settings.PROGRAM, settings.IS_INSTALLED = "garry", True
-    for page in ("", "hosting/", "security/"):
+    for page in ("", "security/"):
         read = world.pt.get(f"/help/{page}", headers={"host": "localhost:8765"}).content.decode()
         assert "manage.py" not in read
         assert "make run" not in read
