@@ -39,7 +39,7 @@ UCUM_CODES = {
 STATUS = {State.FINISHED: "finished", State.ABORTED: "cancelled"}
 
 Resource = dict[str, Any]
-# The label of what nobody walked: test health data (hl7.org/fhir/R4/security-labels.html).
+# The label of what nobody walked: test health data (HL7 FHIR 4.0.1, security labels).
 TEST_DATA: Resource = {
     "meta": {
         "security": [
