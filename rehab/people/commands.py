@@ -33,4 +33,5 @@ def as_typed_here(text: str, address: str) -> str:
     # A container's "python manage.py" stays.
     pattern = r"\.venv/bin/python manage\.py|(?<!python )manage\.py"
     text = re.sub(pattern, lambda _: str(settings.PROGRAM), text)
-    return text.replace("make run", command("serve")).replace("http://127.0.0.1:8000", address)
+    text = text.replace("make run", command("serve")).replace("http://127.0.0.1:8000", address)
+    return text.replace("`var/", f"`{settings.DATA_DIR}/") if settings.IS_INSTALLED else text
