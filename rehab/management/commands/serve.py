@@ -103,7 +103,7 @@ class Command(BaseCommand):
         if robot != "none" and settings.HOSTED:
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
         check_port(host, port)
-        prepare_database()
+        prepare_database(self._say)
         if https or is_encrypting():
             prepare_https(make=https)
         lease = take_lease(host, port) if settings.HOSTED else None
@@ -125,9 +125,12 @@ class Command(BaseCommand):
             current().supervisor.start("robot", robot, given)
         for number, line in enumerate(commands, start=1):
             current().supervisor.start(f"child {number}", shlex.split(line))
-        self.stdout.write("Ready. Ctrl-C stops the server.")
-        self.stdout.flush()
+        self._say("Ready. Ctrl-C stops the server.")
         notify("READY=1")
+
+    def _say(self, words: str) -> None:
+        self.stdout.write(words)
+        self.stdout.flush()  # at once, also into a file
 
     def _print_address(self, address: str) -> None:
         self.stdout.write(f"GARRY serves at {address}/")
