@@ -25,7 +25,7 @@ BASE_DIR = Path(__file__).resolve().parent.parent
 # An installed package has the pages' files inside and the data in the user's own folder (setup.py).
 IS_INSTALLED = (BASE_DIR / "garry_site" / "files").is_dir()
 FILES_DIR = BASE_DIR / "garry_site" / "files" if IS_INSTALLED else BASE_DIR
-PROGRAM = "garry" if IS_INSTALLED else ".venv/bin/python manage.py"  # as commands are called here
+PROGRAM = environment.name_program(IS_INSTALLED)
 VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are read
 
 # --- where and how it runs ----------------------------------------------------------------------

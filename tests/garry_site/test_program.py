@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import socket
 import sys
 
@@ -10,6 +11,7 @@ import pytest
 from django.core.management import CommandError, get_commands
 
 from garry_site.__main__ import main
+from garry_site.environment import name_program
 from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.management.commands.serve import check_port
 from rehab.people.commands import as_typed_here
@@ -40,6 +42,23 @@ def test_texts_name_commands_that_are_here(settings, is_installed, program, key,
     assert told.count(doctor) == 2
     assert ("make run" in told) != is_installed
     assert told.endswith("https://clinic.example/")
+
+
+@pytest.mark.parametrize(
+    ("prefix", "is_on_path", "program"),
+    [
+        ("/srv/venv", True, "garry"),
+        ("/srv/venv", False, "/srv/venv/bin/garry"),
+        ("/home/a/.cache/uv/archive-v0/x9", True, "uvx --from 'garry[server]' garry"),
+    ],
+    ids=["path", "environment", "uvx"],
+)
+def test_the_package_s_program_is_named_as_it_can_be_typed(
+    monkeypatch, prefix, is_on_path, program
+):
+    monkeypatch.setattr(sys, "prefix", prefix)
+    monkeypatch.setattr(shutil, "which", lambda name: f"/bin/{name}" if is_on_path else None)
+    assert name_program(is_installed=True) == program
 
 
 @pytest.mark.parametrize("words", [[], ["help"], ["--help"], ["-h"]], ids=str)
