@@ -13,7 +13,7 @@ def test_it_goes_along_can_be_left_and_is_taken_up_again(visit) -> None:
     page.click("text=Five-minute tour")
     tour = page.locator(".tour")
     expect(tour).to_contain_text("1 / 8")
-    page.click(".list >> text=Try a demo")
+    page.get_by_role("button", name="Try a demo").click()
     page.wait_for_url("**/patients/*/")
     expect(tour).to_contain_text("2 / 8")  # by what was done, without a button
     page.click("text=Leave the tour")
