@@ -15,7 +15,8 @@ from rehab.management import demo_clinic
 from rehab.patients.caseload import Flag, load_caseload
 from rehab.patients.first_steps import is_new, look_at_all
 from rehab.patients.visits import Progress, patients_today
-from rehab.people.models import Patient, User
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -23,7 +24,7 @@ from rehab.sessions.reports.day.dashboard import sessions_today
 from rehab.sessions.reports.insight import ANY_GOAL, compare, read_view
 from tests.support.clock import START as NOW
 from tests.support.marks import mark
-from tests.support.world import build_world, scoped_models
+from tests.support.world import build_world, scoped_models, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -104,3 +105,19 @@ def test_a_report_of_a_problem_names_nobody(settings, tmp_path, monkeypatch):
         assert secret not in text
     for model in scoped_models():
         assert mark("amber", model) not in text
+
+
+def test_who_answers_for_the_server_has_the_report_from_its_pages(world):
+    lead, pt = signed_in(world.people[Role.LEAD]), world.pt
+    assert "Report a problem" in lead.get("/help/").content.decode()
+    assert "Report a problem" not in pt.get("/help/").content.decode()
+    answer = lead.get("/problem-report/")
+    assert "attachment" in answer.headers["Content-Disposition"]
+    text = answer.content.decode()
+    assert "rehab.patient: " in text
+    assert world.patient.code not in text
+    assert pt.get("/problem-report/").status_code == 403
+    Clinic.everywhere.create(name="Another clinic, whose rows would be counted, too")
+    assert lead.get("/problem-report/").status_code == 403
+    assert "Report a problem" not in lead.get("/help/").content.decode()
+    assert signed_in(world.people[Role.HOST]).get("/problem-report/").status_code == 200

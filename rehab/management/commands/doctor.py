@@ -7,7 +7,7 @@ import os
 import tempfile
 import time
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
 from statistics import median
@@ -82,8 +82,7 @@ class Command(BaseCommand):
     ) -> None:
         """Print the diagnoses. Exits with status 1 where something needs a cure."""
         last = (examine_session_logs, examine_all_steps) if deep else (examine_new_steps,)
-        examinations = (*EXAMINATIONS, *last)
-        diagnoses = [diagnosis for run in examinations for diagnosis in examine(run)]
+        diagnoses = diagnose(*last)
         for diagnosis in diagnoses:
             mark = "needs care" if diagnosis.cure else "well"
             self.stdout.write(f"{diagnosis.subject:<12} {mark:<11} {diagnosis.state}")
@@ -91,9 +90,7 @@ class Command(BaseCommand):
                 self.stdout.write(f"{'':<24} → {diagnosis.cure}")
         if report is not None:
             with new_file(report) as out:
-                states = [(one.subject, one.state, bool(one.cure)) for one in diagnoses]
-                plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
-                out.write(write_report(states, plugins, timezone.now()).encode())
+                out.write(report_of(diagnoses, timezone.now()).encode())
         if any(diagnosis.cure for diagnosis in diagnoses):
             raise SystemExit(1)
 
@@ -320,3 +317,15 @@ EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (
     examine_seals,
     examine_keys,
 )
+
+
+def diagnose(*more: Callable[[], Iterator[Diagnosis]]) -> list[Diagnosis]:
+    """Return what the usual examinations find, and more of them."""
+    return [diagnosis for run in (*EXAMINATIONS, *more) for diagnosis in examine(run)]
+
+
+def report_of(diagnoses: Iterable[Diagnosis], now: datetime) -> str:
+    """Return what a problem is reported with."""
+    states = [(one.subject, one.state, bool(one.cure)) for one in diagnoses]
+    plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
+    return write_report(states, plugins, now)

@@ -7,11 +7,11 @@ from django.views.decorators.cache import cache_control
 from django.views.decorators.http import conditional_page, require_safe
 from django.views.i18n import JavaScriptCatalog
 
-from rehab.people.access import for_roles, public
+from rehab.people.access import for_roles, public, user_of
 from rehab.people.commands import command
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
-from rehab.people.web.help_pages import read_page
+from rehab.people.web.help_pages import may_report, read_page
 from rehab.training.valences import VALENCES
 
 javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
@@ -41,7 +41,11 @@ def show_help(request: HttpRequest, page: str = "using") -> HttpResponse:
     guide = read_page(page, request.build_absolute_uri("/").rstrip("/"))
     if not guide:
         raise Http404
-    return render(request, "people/help.html", {"guide": guide, "is_using": page == "using"})
+    return render(
+        request,
+        "people/help.html",
+        {"guide": guide, "is_using": page == "using", "may_report": may_report(user_of(request))},
+    )
 
 
 @public

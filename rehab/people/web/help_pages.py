@@ -13,6 +13,8 @@ from django.urls import reverse
 from markdown_it import MarkdownIt
 
 from rehab.people.commands import as_typed_here
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
 
 # The heading, as GitHub writes its anchor, and the pages that it helps on, by their addresses'
 # names; an admin's page has its model's.
@@ -48,6 +50,12 @@ def find_part(name: str) -> str:
     if name.startswith("rehab_"):  # as Django's admin names them: rehab_protocol_change
         name = name.rpartition("_")[0]
     return PARTS.get(name, "")
+
+
+def may_report(user: User) -> bool:
+    """Return whether a person may report a problem with the counts of all clinics' rows."""
+    is_only = user.role == Role.LEAD and Clinic.everywhere.count() == 1
+    return user.role == Role.HOST or is_only
 
 
 def read_page(name: str, address: str) -> str:
