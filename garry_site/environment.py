@@ -4,6 +4,9 @@ ones.
 
 import os
 import re
+import shutil
+import sys
+from pathlib import Path
 
 from django.core.exceptions import ImproperlyConfigured
 
@@ -44,3 +47,12 @@ def number(name: str, default: int, about: str, *, low: int, high: int) -> int:
 def string_list(name: str, default: str, about: str) -> list[str]:
     """Read a variable as a comma-separated list."""
     return [word.strip() for word in text(name, default, about).split(",") if word.strip()]
+
+
+def name_program(is_installed: bool) -> str:
+    """Return how a person here types the program that all commands begin with."""
+    if not is_installed:
+        return ".venv/bin/python manage.py"
+    if Path(sys.prefix).parent.name.startswith("archive-v"):  # uvx runs it, and installs nothing
+        return "uvx --from 'garry[server]' garry"
+    return "garry" if shutil.which("garry") else str(Path(sys.prefix, "bin", "garry"))

@@ -25,7 +25,7 @@ BASE_DIR = Path(__file__).resolve().parent.parent
 # An installed package has the pages' files inside and the data in the user's own folder (setup.py).
 IS_INSTALLED = (BASE_DIR / "garry_site" / "files").is_dir()
 FILES_DIR = BASE_DIR / "garry_site" / "files" if IS_INSTALLED else BASE_DIR
-PROGRAM = "garry" if IS_INSTALLED else "manage.py"  # as commands are called here
+PROGRAM = environment.name_program(IS_INSTALLED)
 VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are read
 
 # --- where and how it runs ----------------------------------------------------------------------
@@ -46,7 +46,7 @@ BACKUP_KEYS = string_list(
 MOVE_KEYS = string_list(
     "GARRY_MOVE_KEYS", "", "public keys, beside those, that a host's page writes a clinic's file to"
 )
-BACKUP_DIR = text("GARRY_BACKUP_DIR", "", "folder of nightly backups (manage.py upkeep)")
+BACKUP_DIR = text("GARRY_BACKUP_DIR", "", "folder of nightly backups (upkeep)")
 BACKUP_DAYS = number("GARRY_BACKUP_DAYS", 30, "days that they are kept", low=2, high=3650)
 RESTORE_KEY = text("GARRY_RESTORE_KEY", "", "file with a secret key, for weekly test restores")
 SHIPPED_LOGS = text("GARRY_SHIPPED_LOGS", "", "file elsewhere that sealed logs are appended to")
@@ -88,7 +88,7 @@ if HOSTED and len(SECRET_KEY) < SECRET_KEY_LENGTH:
     )
 SECRET_KEY = SECRET_KEY or read_secret_key(DATA_DIR)
 SECRET_KEY_FALLBACKS = string_list(
-    "GARRY_SECRET_KEY_FALLBACKS", "", "secret keys from before, until manage.py rotatekeys has run"
+    "GARRY_SECRET_KEY_FALLBACKS", "", "secret keys from before, until rotatekeys has run"
 )
 
 # --- applications -------------------------------------------------------------------------------

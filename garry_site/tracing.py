@@ -69,8 +69,8 @@ def start_tracing() -> bool:
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
     except ImportError:
         log.warning(
-            "No traces are sent: OpenTelemetry is not installed. Run `pip install -c "
-            "constraints.txt -e '.[tracing]'`, or unset %s.",
+            "No traces are sent: OpenTelemetry is not installed. Run "
+            "`pip install 'garry[tracing]'`, or unset %s.",
             " and ".join(ENDPOINTS),
         )
         return False

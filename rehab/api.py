@@ -63,7 +63,7 @@ def for_members(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse
 api = Api(
     title="GARRY",
     version="1",
-    description="Patients, sessions, steps and boards of your clinic. docs/api.md has examples.",
+    description="Patients, sessions, steps and boards of your clinic. /help/api/ has examples.",
     urls_namespace="api",
     auth=[TokenAuth(), SessionAuth()],
     throttle=PerUserThrottle(),

@@ -11,6 +11,7 @@ from django.conf import settings
 from django.core import checks
 from django.core.checks import CheckMessage, Error, Tags, register
 
+from rehab.people.commands import command, reinstall
 from rehab.people.field_policy import find_undeclared
 from rehab.stations.https.certificate import is_encrypting
 
@@ -36,7 +37,7 @@ def check_hosting(**_: Any) -> list[CheckMessage]:
                 checks.Warning(
                     f"The server listens on {settings.HOST} without TLS: passwords and patients' "
                     "data can be read on the network between.",
-                    hint="Serve by `manage.py serve --https`, or use "
+                    hint=f"Serve by `{command('serve --https')}`, or use "
                     "GARRY_HOST in a network of the clinic's own that nobody else can enter.",
                     id="garry.W011",
                 )
@@ -113,7 +114,7 @@ def check_browser_libraries(**_: Any) -> list[CheckMessage]:
     return [
         checks.Warning(
             f"Browser libraries are missing: {', '.join(missing)}. Pages cannot draw charts.",
-            hint="Run `npm ci` in the project's folder, or `make setup`.",
+            hint=f"Run `{reinstall()}`.",
             id="garry.W007",
         )
     ]

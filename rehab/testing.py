@@ -1,6 +1,6 @@
 """What sources, measures and readers promise, as tests of each installed plug-in.
 
-`pytest --pyargs rehab.testing` runs them. A source that needs options is tried by a subclass of
+`pytest --garry` runs them. A source that needs options is tried by a subclass of
 ``SourceContract`` in a test of your own, with your ``arguments``.
 """
 

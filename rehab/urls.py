@@ -3,9 +3,11 @@
 from django.urls import include, path
 
 from rehab import api
+from rehab.management.report_page import report_problem
 
 urlpatterns = [
     path("api/v1/", include((api.urls(), "ninja"), namespace="api")),
+    path("problem-report/", report_problem, name="problem-report"),
     path("", include("rehab.people.urls")),
     path("", include("rehab.stations.urls")),
     path("", include("rehab.sessions.urls")),

@@ -160,7 +160,7 @@ def try_cut(port: str) -> Iterator[Diagnosis]:
         line.close()
     if pressed_s is None:
         yield Diagnosis(
-            "Nothing took its power.", "Add a hardware cut (docs/safety.md) before it drives."
+            "Nothing took its power.", "Add a hardware cut (/help/safety/) before it drives."
         )
     else:
         yield Diagnosis("The emergency stop took its power.")

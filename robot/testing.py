@@ -1,4 +1,4 @@
-"""What every base promises, as tests: `pytest --pyargs robot.testing` tries each installed plug-in.
+"""What every base promises, as tests: `pytest --garry` tries each installed plug-in.
 
 Simulated bases are tried as they are. For a real one, subclass ``BaseContract`` in a test of your
 own, with a fixture ``closed`` that yields a ``Stage`` with your base and a fake of its hardware.

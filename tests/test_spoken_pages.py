@@ -24,7 +24,16 @@ from tests.support.world import World, fill_board, signed_in
 pytestmark = pytest.mark.django_db
 
 # Addresses of machines, and the guide, which is English alone.
-MACHINE = {"help", "healthz", "readyz", "catalog", "tablet-state", "tablet-app", "sign-out"}
+MACHINE = {
+    "help",
+    "problem-report",
+    "healthz",
+    "readyz",
+    "catalog",
+    "tablet-state",
+    "tablet-app",
+    "sign-out",
+}
 # What nobody translates: names of ours, units, codes, what people typed, and how dates are told.
 AS_IT_IS = re.compile(
     r"[Zz]q\w+qz[\w-]*|\bzq\b|NASA-TLX \(raw\)|System Usability Scale \(SUS\)|GARRY|"

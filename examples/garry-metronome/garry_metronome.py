@@ -27,6 +27,8 @@ BEAT_ERROR = Measure(
 class Metronome(PlayedSource):
     """Strides on a beat, more or less."""
 
+    simulated = True  # nobody walks
+
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
         """Add the options of this source to a command line."""

@@ -151,7 +151,10 @@ class LeaderboardAdmin(PreviewAdmin):
                 "It is made of patients, whom a host does not see. Clinics see it on tablets."
             )
             return render(request, "boards/preview_errors.html", {"errors": [("", error)]})
-        board = self._viewer(request, form.instance).make_panel()
+        viewer = self._viewer(request, form.instance)
+        board = viewer.make_panel()
+        if not (form.instance.is_own or board.shared) and (why := viewer.explain_nothing()):
+            board = replace(board, summary=f"{board.summary} {why}", nothing=board.nothing or why)
         return render(request, "boards/scores.html", {"boards": [board], "ranked": True})
 
     def _viewer(self, request: HttpRequest, board: Leaderboard) -> BoardViewer:

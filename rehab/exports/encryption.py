@@ -14,8 +14,9 @@ from types import SimpleNamespace
 from typing import Any, BinaryIO
 
 import pyrage
-from django.conf import settings
 from pyrage.x25519 import Identity, Recipient
+
+from rehab.people.commands import command
 
 AGE_MAGIC = b"age-encryption.org/"
 
@@ -41,7 +42,7 @@ def read_recipients(keys: Iterable[str]) -> list[Recipient]:
     except pyrage.RecipientError as problem:
         raise InvalidKey("A public key begins with age1 and has 62 characters.") from problem
     if not recipients:
-        raise InvalidKey(f"There is no public key. `{settings.PROGRAM} backupkey` makes one.")
+        raise InvalidKey(f"There is no public key. `{command('backupkey')}` makes one.")
     return recipients
 
 

@@ -71,7 +71,7 @@ INCIDENTS = Table(
     _read_columns(RobotIncident, "at", "reason", "recording"),
     (
         Column.time("at", "When the robot was stopped; of its motion, when the part ended."),
-        Column("reason", "Why, as a code (docs/safety.md); motion: a part of how it moved."),
+        Column("reason", "Why, as a code (/help/safety/); motion: a part of how it moved."),
         Column("recording", "What it received, ordered and did: base64 of zlib of JSON lines."),
     ),
 )

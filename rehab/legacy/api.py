@@ -84,7 +84,9 @@ def list_user_sessions(
     """List a user's sessions by non-ascending score; those without a score come last."""
     user = caller(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
-    sessions = visible_sessions(user).filter(patient=patient).select_related("clinic")
+    # The paper has no word for a walk that nobody walked.
+    sessions = visible_sessions(user).filter(patient=patient, simulated=patient.simulated)
+    sessions = sessions.select_related("clinic")
     if filters.feedback_type:
         sessions = sessions.filter(valence=filters.feedback_type)
     page = paginate(sessions.order_by(*ORDERS["best"]), filters)

@@ -12,12 +12,14 @@ from pathlib import Path
 from django.conf import settings
 from django.core.management import CommandError
 
+from rehab.people.commands import command
+
 
 def restore_newest(folder: Path, key: str) -> str:
     """Restore the newest backup into a scratch database, and examine it there."""
     files = sorted(folder.glob("garry-*.backup"))
     if not files:
-        raise CommandError(f"There is no backup to restore. Run {settings.PROGRAM} upkeep backup.")
+        raise CommandError(f"There is no backup to restore. Run {command('upkeep backup')}.")
     scratch = Path(tempfile.mkdtemp(prefix="restore-", dir=settings.DATA_DIR))
     try:
         said = _run_in(scratch, "restore", str(files[-1]), "--key", key)

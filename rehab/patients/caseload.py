@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.patients.visits import Visit
 from rehab.people.models import Patient, User
+from rehab.people.simulated import counted
 from rehab.sessions.formatting import clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 
@@ -120,12 +121,16 @@ def judge(
 def load_caseload(user: User, now: datetime) -> list[Case]:
     """Return the patients whose program goes on: by need (`ORDER`), then by their last session.
 
-    ``now`` is in the clinic's time zone. A simulated patient is none.
+    ``now`` is in the clinic's time zone.
     """
     today = now.date()
-    patients = Patient.objects.visible_to(user).filter(ended_at=None, simulated=False)
+    patients = Patient.objects.visible_to(user).filter(counted(), ended_at=None)
     sessions = TrainingSession.objects.visible_to(user).filter(
-        patient__in=patients, excluded=False, active_s__gt=0, created_at__gte=now - LOOKED_BACK
+        counted(),
+        patient__in=patients,
+        excluded=False,
+        active_s__gt=0,
+        created_at__gte=now - LOOKED_BACK,
     )
     walks: defaultdict[int, list[Walk]] = defaultdict(list)
     for one in sessions.select_related("measure", "clinic").defer("plan").order_by("-created_at"):

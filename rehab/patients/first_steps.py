@@ -11,6 +11,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 
 from rehab.people.models import Patient, User
+from rehab.people.simulated import counted
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
@@ -63,7 +64,7 @@ def _look_for_sensor(user: User, now: datetime) -> Found:
 
 
 def _look_for_patient(user: User, now: datetime) -> Found:
-    if not Patient.objects.visible_to(user).filter(simulated=False).exists():
+    if not Patient.objects.visible_to(user).filter(counted()).exists():
         return Found(False, _("No patient yet."))
     return Found(True, _("There are patients."))
 
@@ -83,8 +84,8 @@ def look_at_all(user: User, now: datetime) -> dict[str, Found]:
 
 def is_new(user: User) -> bool:
     """Return whether no patient of a person's clinic has walked yet, but simulated ones."""
-    walked = TrainingSession.objects.visible_to(user).filter(active_s__gt=0)
-    return not walked.filter(patient__simulated=False).exists()
+    walked = TrainingSession.objects.visible_to(user).filter(counted(), active_s__gt=0)
+    return not walked.exists()
 
 
 def _devices(user: User, kind: Device.Kind) -> list[Device]:

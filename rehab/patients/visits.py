@@ -14,6 +14,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.field_policy import deleted, personal_fields
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicModel, Scope
+from rehab.people.simulated import counted
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day.today import IS_OPEN, todays_sessions
@@ -120,7 +121,7 @@ def patients_today(user: User, now: datetime) -> list[PatientToday]:
     patients = patients.annotate(count=Count("sessions", distinct=True))
     visits = Visit.objects.visible_to(user).filter(day=now.date())
     expected = dict(visits.values_list("patient_id", "at"))
-    walked = models.Q(active_s__gt=0, simulated=False)
+    walked = counted() & models.Q(active_s__gt=0)
     sessions = todays_sessions(TrainingSession.objects.visible_to(user), now)
     by_patient: dict[int, list[TrainingSession]] = {}
     for session in sessions.filter(IS_OPEN | walked).order_by("created_at"):

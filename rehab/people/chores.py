@@ -1,11 +1,14 @@
-"""What a server does by itself each night, and how it went: monitoring reads it from these rows."""
+"""What a server does by itself, and how it went, for monitoring and `doctor`."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import ClassVar
 
 from django.db import models
+
+TASK = "task "  # begins the name of what a running server repeats
 
 
 class Chore(models.Model):
@@ -34,3 +37,12 @@ def record_chore(name: str, said: str, now: datetime, *, failed: bool) -> None:
     """Record how a chore went."""
     moment = {"failed_at": now} if failed else {"succeeded_at": now}
     Chore.objects.update_or_create(name=name, defaults=moment | {"said": said[-2000:]})
+
+
+def record_tasks(problems: Mapping[str, str], now: datetime) -> None:
+    """Record how a server's periodic tasks went: "" is well. What never failed has no row."""
+    well = [TASK + name for name, problem in problems.items() if not problem]
+    Chore.objects.filter(name__in=well).update(succeeded_at=now, said="")
+    for name, problem in problems.items():
+        if problem:
+            record_chore(TASK + name, problem, now, failed=True)

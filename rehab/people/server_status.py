@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import django
@@ -12,6 +11,7 @@ from django.db import connection
 from django.db.models import Count, Q
 from django.utils.translation import gettext
 
+from rehab.people.commands import command, garry_version
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import count_pending_migrations
@@ -35,7 +35,8 @@ def server_status(user: User) -> dict[str, Any]:
     ]
     if pending:
         alerts.append(
-            gettext("%(count)s migrations are due. Run manage.py migrate.") % {"count": pending}
+            gettext("%(count)s migrations are due. Run %(command)s.")
+            % {"count": pending, "command": command("migrate")}
         )
     if free is not None and free < LOW_DISK:
         alerts.append(gettext("The disk is nearly full. Make room before sessions run."))
@@ -45,7 +46,7 @@ def server_status(user: User) -> dict[str, Any]:
         "switched_off": accounts.filter(is_active=False).count(),
         "server_alerts": alerts,
         "server": {
-            gettext("GARRY"): _version(),
+            gettext("GARRY"): garry_version(),
             gettext("Django"): django.get_version(),
             gettext("Database"): connection.display_name,
             gettext("Migrations"): gettext("up to date")
@@ -57,10 +58,3 @@ def server_status(user: User) -> dict[str, Any]:
             else gettext("no"),
         },
     }
-
-
-def _version() -> str:
-    try:
-        return version("garry")
-    except PackageNotFoundError:
-        return gettext("not installed as a package")

@@ -17,6 +17,7 @@ urlpatterns = [
     path("account/hospital/", sign_on.link, name="sign-on-link"),
     path("sign-out/", sign_in.sign_out, name="sign-out"),
     path("help/", home.show_help, name="help"),
+    path("help/<slug:page>/", home.show_help, name="help-page"),
     path("account/", account.show_account, name="account"),
     path("account/sign-ins/", account.show_sign_ins, name="own-sign-ins"),
     path("account/sign-ins/end/", account.end_sign_ins, name="end-sign-ins"),

@@ -185,6 +185,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
             journal=journal,
             on_ack=on_ack,
             plugin=SOURCES.find_plugin(name),
+            simulated=source.simulated,
             notify=print_status,
         )
 

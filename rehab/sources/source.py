@@ -29,7 +29,11 @@ class Source(ABC):
     ------
     SourceError
         Or another ValueError, with the cure, before anything is sent.
+
+    ``simulated`` is whether nobody walks: what it sends is never counted as a person's walk.
     """
+
+    simulated: bool = False
 
     @classmethod
     @abstractmethod

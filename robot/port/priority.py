@@ -70,4 +70,4 @@ def explain_jitter(worst_s: float) -> str:
         means = "Each stop may come so much later"
     else:
         means = f"A gesture ends by itself after {1000 * ORDER_HOLDS_S:g} ms without an order"
-    return f"{means}. Close other programs, or give GARRY priority (docs/robot.md)."
+    return f"{means}. Close other programs, or give GARRY priority (/help/robot/)."

@@ -99,7 +99,7 @@ def check_port(
         yield Diagnosis(
             f"{getpass.getuser()} may not use {port}.",
             f"sudo usermod -aG dialout {getpass.getuser()}, then sign out and in again; or install "
-            f"the udev rule (docs/robot.md).",
+            f"the udev rule (/help/robot/).",
         )
     else:
         yield Diagnosis(f"{port} may be read and written.")

@@ -58,7 +58,7 @@ def read_object(text: str | None) -> dict[str, Any]:
     except BadFrame:
         raise
     except (ValueError, RecursionError):
-        raise BadFrame("A frame is one JSON object, as docs/protocol.md shows.") from None
+        raise BadFrame("A frame is one JSON object, as /help/protocol/ shows.") from None
     if not isinstance(message, dict) or not isinstance(message.get("type", ""), str):
         raise BadFrame('A frame is a JSON object with a "type".')
     return message

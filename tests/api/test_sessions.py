@@ -108,6 +108,8 @@ def test_the_papers_call_gives_a_users_sessions_in_non_ascending_score_order(wor
     scores = [("positive", 14), ("explicit", None), ("positive", 1402), ("binary", -3)]
     for day, (valence, score) in enumerate(scores, start=1):
         walked(rosa, valence, score, day)
+    simulated = walked(rosa, "positive", 5000, 5)  # which the paper has no word for
+    type(simulated).everywhere.filter(pk=simulated.pk).update(simulated=True)
     status, page = pt.get("/users/7/sessions")
     assert status == 200
     assert [row["score"] for row in page["items"]] == [1402, 14, -3, None]

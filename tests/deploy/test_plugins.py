@@ -32,6 +32,7 @@ class Environment:
         )
         (own / "repository.pth").write_text(f"{ROOT}\n{ours.stdout}")
         self.packages = own
+        self.pip("uninstall", "-y", "setuptools")  # the repository's is newer
 
     def _run(self, *command: str) -> subprocess.CompletedProcess[str]:
         rest = {name: value for name, value in os.environ.items() if not name.startswith("GARRY")}

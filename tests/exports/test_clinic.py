@@ -298,7 +298,7 @@ def test_another_key(world, file, tmp_path):
 
 def test_a_backup_is_no_clinic(world, file, key):
     call_command("backup", file, stdout=io.StringIO())
-    with pytest.raises(CommandError, match="read by manage.py restore"):
+    with pytest.raises(CommandError, match=r"read by `\S+ manage\.py restore`"):
         run("import", file, "--key", key)
 
 

@@ -330,3 +330,15 @@ def test_an_erased_patient_and_a_refusal_are_shown_and_not_repeated(world, endpo
     assert rows[first.pk].answer == "A correction took the session out."
     assert rows[second.pk].answer == "422 invalid Patient.identifier"  # without its words
     assert {row.state for row in rows.values()} == {"refused"}
+
+
+def test_what_nobody_walked_is_labeled_and_not_sent_of_a_person(world, endpoint):
+    session = walk(world.patient, "binary", [4.0] * 4)
+    type(session).everywhere.filter(pk=session.pk).update(simulated=True)
+    deliver_due(NOW + timedelta(hours=1), FhirServer())
+    (message,) = OutboxMessage.everywhere.filter(endpoint=endpoint)
+    assert (message.state, message.answer) == ("refused", "Nobody walked: it was simulated.")
+    figures = resources(read(world, f"Observation?encounter=session-{session.pk}"))
+    assert {one["meta"]["security"][0]["code"] for one in figures} == {"HTEST"}
+    (patient,) = resources(read(world, f"Patient?identifier=urn:garry:code|{world.patient.code}"))
+    assert "meta" not in patient

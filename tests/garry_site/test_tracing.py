@@ -108,4 +108,4 @@ def test_an_endpoint_without_the_package_is_told(monkeypatch, caplog):
     monkeypatch.setenv(tracing.ENDPOINTS[0], "http://127.0.0.1:1")
     monkeypatch.setitem(sys.modules, "opentelemetry", None)
     assert not tracing.start_tracing.__wrapped__()
-    assert "'.[tracing]'" in caplog.text
+    assert "'garry[tracing]'" in caplog.text

@@ -9,29 +9,68 @@ import pytest
 from django.core.exceptions import ValidationError
 from django.core.management import CommandError, call_command
 
+from rehab.boards.models import Leaderboard
+from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.management import demo_clinic
-from rehab.people.models import Patient
-from rehab.people.models.choices import DEMO_NAMES
+from rehab.patients.caseload import Flag, load_caseload
+from rehab.patients.first_steps import is_new, look_at_all
+from rehab.patients.visits import Progress, patients_today
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.day.dashboard import sessions_today
+from rehab.sessions.reports.insight import ANY_GOAL, compare, read_view
 from tests.support.clock import START as NOW
 from tests.support.marks import mark
-from tests.support.world import build_world, scoped_models
+from tests.support.world import build_world, scoped_models, signed_in
 
 pytestmark = pytest.mark.django_db
 
 
-def test_a_demonstration_has_weeks_of_history(monkeypatch):
-    monkeypatch.setattr(demo_clinic, "STRIDES", 60)
-    monkeypatch.setattr(demo_clinic, "WEEKS", 2)
+@pytest.fixture(scope="module")
+def few():
+    """Let the patients of a demonstration come thrice."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo_clinic, "VISITS", 3)
+        yield
+
+
+def test_a_demonstration_has_weeks_of_history(few):
     clinic = demo_clinic.fill_clinic("look-around", NOW)
     sessions = TrainingSession.everywhere.filter(clinic=clinic)
-    assert sessions.count() == 2 * 3 * len(DEMO_NAMES)
+    assert sessions.count() == 3 * len(demo_clinic.COURSES)
     assert {one.state for one in sessions} == {"finished"}
     assert max(one.ended_at for one in sessions) < NOW
     assert Step.everywhere.filter(session__in=sessions, hit=True).exists()
     assert SessionMetric.everywhere.filter(session__in=sessions, slug="score").exists()
     assert all(patient.simulated for patient in Patient.everywhere.filter(clinic=clinic))
+
+
+@pytest.mark.parametrize("is_demo", [True, False], ids=["demonstration", "clinic"])
+def test_what_is_simulated_counts_in_a_demonstration_and_nowhere_else(settings, few, is_demo):
+    clinic = demo_clinic.fill_clinic("look-around", NOW)
+    settings.DEMO = is_demo
+    user, now = User.everywhere.get(username="pt"), clinic_time(NOW, clinic)
+    cases = load_caseload(user, now)
+    assert {flag for case in cases for flag in case.flags} == (set(Flag) if is_demo else set())
+    view = read_view(user, {}, NOW)
+    assert bool(view.shown) == bool(compare(view.shown, view.by)) == is_demo
+    assert any(one.note for one in read_view(user, {"goal": ANY_GOAL}, NOW).shown) == is_demo
+    walked = {one.progress for one in patients_today(user, now)}
+    assert (Progress.DONE in walked) == is_demo
+    assert Progress.EXPECTED in walked  # a visit that was planned is one
+    assert is_new(user) != is_demo
+    assert look_at_all(user, NOW)["patient"].is_done == is_demo
+    today = sessions_today(user, clinic, NOW)
+    assert bool(today) == is_demo
+    boards = {
+        one.name: BoardViewer(one, NOW, staff=True).make_panel()
+        for one in Leaderboard.everywhere.all()
+    }
+    assert bool(boards["Steps at the goal"].rows) == is_demo
+    assert (boards["Minutes together"].total is not None) == is_demo
 
 
 @pytest.mark.parametrize(("name", "code"), [("Rosa Weber", "demo-9"), ("Amber", "K7-204")])
@@ -66,3 +105,19 @@ def test_a_report_of_a_problem_names_nobody(settings, tmp_path, monkeypatch):
         assert secret not in text
     for model in scoped_models():
         assert mark("amber", model) not in text
+
+
+def test_who_answers_for_the_server_has_the_report_from_its_pages(world):
+    lead, pt = signed_in(world.people[Role.LEAD]), world.pt
+    assert "Report a problem" in lead.get("/help/").content.decode()
+    assert "Report a problem" not in pt.get("/help/").content.decode()
+    answer = lead.get("/problem-report/")
+    assert "attachment" in answer.headers["Content-Disposition"]
+    text = answer.content.decode()
+    assert "rehab.patient: " in text
+    assert world.patient.code not in text
+    assert pt.get("/problem-report/").status_code == 403
+    Clinic.everywhere.create(name="Another clinic, whose rows would be counted, too")
+    assert lead.get("/problem-report/").status_code == 403
+    assert "Report a problem" not in lead.get("/help/").content.decode()
+    assert signed_in(world.people[Role.HOST]).get("/problem-report/").status_code == 200

@@ -67,7 +67,7 @@ def test_several_servers_have_no_address_in_common(monkeypatch, settings):
 
 def test_several_servers_begin_only_where_all_their_ports_are_free(monkeypatch):
     monkeypatch.setattr(command, "check_sharing", lambda _: None)
-    monkeypatch.setattr(command, "prepare_database", lambda: pytest.fail("begun"))
+    monkeypatch.setattr(command, "prepare_database", lambda *_: pytest.fail("begun"))
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

@@ -78,6 +78,12 @@ def test_a_session_and_a_fall_are_told_and_name_no_patient(world, endpoint):
     assert world.patient.pseudonym.encode() not in sent
 
 
+def test_what_nobody_walked_is_told_as_simulated(world, endpoint):
+    walk(world.patient, "binary", [4.0] * 4, simulated=True)
+    (message,) = messages(endpoint)
+    assert message.body["simulated"] is True
+
+
 def test_what_is_rolled_back_is_not_told(world, endpoint):
     with transaction.atomic():
         notify(world.clinic.pk, Topic.EXPORT, {}, NOW)

@@ -114,7 +114,8 @@ def test_a_trial_is_no_last_time(pt, world: World):
 
 
 def test_first_steps_stay_on_the_start_page_until_a_patient_walks_or_they_are_hidden(pt, world):
-    Patient.everywhere.filter(clinic=world.clinic).update(simulated=True)
+    for rows in (Patient, TrainingSession):
+        rows.everywhere.filter(clinic=world.clinic).update(simulated=True)
     steps = "First steps, one by one"
     assert steps in pt.get("/start/").content.decode()
     begin(pt)

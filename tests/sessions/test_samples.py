@@ -9,8 +9,9 @@ from django.urls import reverse
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.protocols import Protocol
-from rehab.sessions.setup.recordings import check_upload, is_sample, recordings_folder
+from rehab.sessions.setup.recordings import check_upload, recordings_folder
 from rehab.sources.recording import read_recording
+from rehab.sources.recording.samples import is_sample
 from rehab.stations.models import Station
 from tests.support import samples
 

@@ -65,6 +65,8 @@ class BoardPanel:
         Whether other patients are on it.
     summary
         How many patients are on it and why it looks as it does, for the form that edits it.
+    nothing
+        Why it has no rows, if that is known.
     """
 
     slug: str
@@ -76,6 +78,7 @@ class BoardPanel:
     kept: bool = False
     shared: bool = False
     summary: str = ""
+    nothing: str = ""
 
     @property
     def has_you(self) -> bool:

@@ -13,6 +13,7 @@ from django.utils.translation import gettext_noop, ngettext
 from rehab.boards.cache import read_lists, read_standings
 from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
 from rehab.boards.models import Leaderboard
+from rehab.boards.panels.emptiness import explain_nothing
 from rehab.boards.panels.formatting import (
     BoardPanel,
     Total,
@@ -109,6 +110,14 @@ class BoardViewer:
         why = _("Outside its first half, own sessions are shown.")
         return self._own_panel(_(OWN_SESSIONS_NOTE), f"{people} {why}")
 
+    def explain_nothing(self) -> str:
+        """Return why nobody is on a board of several patients: who agreed, and which settings."""
+        patients = eligible_patients(self.board)
+        if not patients.exists():
+            return _("Nobody has agreed to be on it yet.")
+        sessions = TrainingSession.everywhere.filter(patient__in=patients)
+        return explain_nothing(self.board, sessions, self.now)
+
     def find_typical(self) -> int | None:
         """Return the patient in the middle of the first half; None on a board of own sessions."""
         if self.board.is_own:
@@ -135,12 +144,13 @@ class BoardViewer:
         # A board of several patients shows own sessions as a board of neighbors does.
         neighbors = Leaderboard(among=Participants.SELF, display=DisplayMode.NEIGHBORS)
         period = period_of(board, self.now)
-        sessions = read_sessions(board, TrainingSession.everywhere.filter(patient=patient), period)
-        results = own_results(board, sessions, self.valence)
+        mine = TrainingSession.everywhere.filter(patient=patient)
+        sessions = read_sessions(board, mine, period)
+        results = own_results(board, sessions, self.valence, period)
         standings = Standings(results, board.ties)
         if board.aggregation == Aggregation.SUM:
-            mine = format_rows(board, find_visible_rows(neighbors, standings, None))
-            rows = [replace(row, title="", rank=None, you=True) for row in mine]
+            own = format_rows(board, find_visible_rows(neighbors, standings, None))
+            rows = [replace(row, title="", rank=None, you=True) for row in own]
             return self._panel(rows=rows, note=note, summary=summary)
         me = standings.find_session(self.session.pk) if self.session else None
         shown_as = board if board.is_own else neighbors
@@ -151,7 +161,8 @@ class BoardViewer:
         found = walked.in_bulk([row.session_id for row in rows])
         now = clinic_time(self.now, patient.clinic)
         dated = date_rows(rows, found, self.session, now)
-        return self._panel(rows=dated, note=note, summary=summary)
+        why = "" if rows else explain_nothing(board, mine, self.now)
+        return self._panel(rows=dated, note=note, summary=summary or why, nothing=why)
 
     def _panel(self, **content: Any) -> BoardPanel:
         """Return the board's panel with the fields of `BoardPanel` that are given."""

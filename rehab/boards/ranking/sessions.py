@@ -14,6 +14,7 @@ from rehab.boards.choices import CountedTypes
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.periods import Period
 from rehab.boards.validation import POINT_METRICS
+from rehab.people.simulated import counted
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
@@ -140,7 +141,7 @@ def _narrow(
     """Return the sessions that a board's settings admit."""
     sessions = sessions.filter(state=State.FINISHED.value, started_at__isnull=False, excluded=False)
     if not board.include_simulated:
-        sessions = sessions.filter(simulated=False)
+        sessions = sessions.filter(counted())
     if needs_one_valence(board):
         sessions = sessions.filter(changed_to="")
     if board.counted_valences:

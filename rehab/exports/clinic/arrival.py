@@ -16,7 +16,6 @@ from itertools import count, groupby
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from django.conf import settings
 from django.db import connection, transaction
 from django.db.models import DateField, DateTimeField, TimeField
 from pyrage.x25519 import Identity
@@ -44,6 +43,7 @@ from rehab.people.aliases import draw_alias
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.audit.moves import ClinicMove
+from rehab.people.commands import command
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.sign_in.tokens import draw_token, hash_token
 from rehab.sessions.live.database import clinic_owners
@@ -202,7 +202,7 @@ class Arrival:
         if wrong:
             raise CannotMove(
                 f"What was stored is not what the file says ({', '.join(wrong)}). Nothing was left "
-                f"here. Look for damage of disk and database ({settings.PROGRAM} doctor), then "
+                f"here. Look for damage of disk and database ({command('doctor')}), then "
                 "try again."
             )
 
@@ -217,7 +217,7 @@ class Arrival:
             self._compare(sorted(self._late()))
             ClinicMove.everywhere.filter(pk=self.move.pk).update(finished_at=self._now)
             ClinicOwner.everywhere.filter(pk=key).update(owner="")
-            about = f"manage.py clinic import, file {self.move.file}"
+            about = command(f"clinic import, file {self.move.file}")
             audit_log.record(Act.CLINIC_IN, None, clinic_id=key, about=about, now=self._now)
 
 

@@ -75,7 +75,7 @@ def remove_clinic(
             "digests_of_rows": rows.digests,
             "last_seals": last_seals(clinic.pk),
             "recordings": [path.name for path in _own_recordings(clinic)],
-            "not_in_here": "Backups from before hold it until they are deleted: docs/hosting.md.",
+            "not_in_here": "Backups from before hold it until they are deleted: /help/hosting/.",
         }
         store(_to_text(certificate))
     return finish_removal(clinic, certificate, now, store=store)

@@ -10,13 +10,13 @@ from typing import Any
 
 import msgspec
 from cryptography.fernet import InvalidToken
-from django.conf import settings
 from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
 from django.db.models import Model, Q, QuerySet
 
 from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables
 from rehab.people.audit.moves import ClinicMove, Translate, same_key
 from rehab.people.audit.sealing import with_floats
+from rehab.people.commands import command
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.server_keys import Purpose, decrypt_text, encrypt_text
@@ -46,8 +46,7 @@ def open_value(label: str, encrypted: str) -> str:
     except InvalidToken as problem:
         if label == "rehab.study":
             raise CannotMove(
-                "A study was sealed with another key of the server. Run "
-                f"{settings.PROGRAM} rotatekeys."
+                f"A study was sealed with another key of the server. Run {command('rotatekeys')}."
             ) from problem
         return ""  # an app whose codes are refused here, too
 

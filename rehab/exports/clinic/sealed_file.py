@@ -28,6 +28,7 @@ from rehab.exports.clinic.shared_rows import describe_shared
 from rehab.exports.clinic.tables import moving_tables
 from rehab.exports.encryption import CannotDecrypt, decrypt, encrypt
 from rehab.people.audit import seals
+from rehab.people.commands import command
 from rehab.people.models import Clinic
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.seals import seal_sessions
@@ -190,8 +191,8 @@ def read_parts(
 
 def _not_a_clinic() -> CannotMove:
     return CannotMove(
-        "It holds no clinic. Choose a file of manage.py clinic export; a backup of the whole "
-        "installation is read by manage.py restore."
+        f"It holds no clinic. Choose a file of `{command('clinic export')}`; a backup of the whole "
+        f"installation is read by `{command('restore')}`."
     )
 
 

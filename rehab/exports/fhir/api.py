@@ -19,7 +19,6 @@ from rehab.exports.fhir.resources import (
     SYSTEM,
     HospitalNames,
     Resource,
-    garry_version,
     make_device,
     session_resources,
 )
@@ -32,6 +31,7 @@ from rehab.exports.fhir.study_resources import (
 )
 from rehab.people.access import for_roles
 from rehab.people.audit.audit_log import Act, record
+from rehab.people.commands import garry_version
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
 from rehab.people.networks import client_address

@@ -42,6 +42,8 @@ def write_session(message: OutboxMessage, _now: datetime) -> Request:
         raise NothingToSend("The patient has not agreed to care.")
     if session.excluded:
         raise NothingToSend("A correction took the session out.")
+    if session.simulated and not session.patient.simulated:
+        raise NothingToSend("Nobody walked: it was simulated.")
     if is_in_running_study(session.patient):  # assessors may read the hospital's record
         raise NothingToSend(
             "A running study has the patient, and this would tell the arm. "

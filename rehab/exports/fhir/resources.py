@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 from uuid import NAMESPACE_OID, uuid5
 
 from django.conf import settings
 
 from rehab.exports.session_table import CONDITIONS, WALKED, SessionRow
+from rehab.people.commands import garry_version
 from rehab.people.models import Patient, User
 from rehab.sessions.assessments import assessments_with
 from rehab.sessions.log import PartEntry, SessionEvent, SessionMetric
@@ -38,8 +38,24 @@ UCUM_CODES = {
 }
 STATUS = {State.FINISHED: "finished", State.ABORTED: "cancelled"}
 
-
 Resource = dict[str, Any]
+# The label of what nobody walked: test health data (HL7 FHIR 4.0.1, security labels).
+TEST_DATA: Resource = {
+    "meta": {
+        "security": [
+            {
+                "system": "http://terminology.hl7.org/CodeSystem/v3-ActReason",
+                "code": "HTEST",
+                "display": "test health data",
+            }
+        ]
+    }
+}
+
+
+def label(is_simulated: bool) -> Resource:
+    """Return what a resource says of itself where no person stands behind it."""
+    return TEST_DATA if is_simulated else {}
 
 
 class Names(Protocol):
@@ -91,6 +107,7 @@ class HospitalNames:
             "resourceType": "Patient",
             "identifier": [{"system": system, "value": patient.code} for system in systems],
             "active": patient.ended_at is None,
+            **label(patient.simulated),
         }
 
 
@@ -107,14 +124,6 @@ def make_bundle(user: User, session: TrainingSession, names: Names) -> Resource:
     }
 
 
-def garry_version() -> str:
-    """Return the version of GARRY that is installed."""
-    try:
-        return version("garry")
-    except PackageNotFoundError:
-        return "unknown"
-
-
 def make_device(names: Names) -> tuple[str, Resource]:
     """Return address and resource of GARRY itself."""
     return names.address("Device", "garry"), {
@@ -129,14 +138,21 @@ def session_resources(
     user: User, session: TrainingSession, names: Names
 ) -> Iterator[tuple[str, Resource]]:
     """Yield the resources of a session that a user may see, each with its address."""
-    shift, began = names.shift, format_moment(session.began_at + names.shift)
-    ended = {} if session.ended_at is None else {"end": format_moment(session.ended_at + shift)}
     patient, about = names.patient(session.patient)
     device, garry = make_device(names)
-    encounter = names.address("Encounter", "session", session.pk)
-    of = {"subject": {"reference": patient}, "encounter": {"reference": encounter}}
     yield patient, about
     yield device, garry
+    for address, resource in _walk_resources(user, session, names, patient, device):
+        yield address, resource | label(session.simulated)
+
+
+def _walk_resources(
+    user: User, session: TrainingSession, names: Names, patient: str, device: str
+) -> Iterator[tuple[str, Resource]]:
+    shift, began = names.shift, format_moment(session.began_at + names.shift)
+    ended = {} if session.ended_at is None else {"end": format_moment(session.ended_at + shift)}
+    encounter = names.address("Encounter", "session", session.pk)
+    of = {"subject": {"reference": patient}, "encounter": {"reference": encounter}}
     yield (
         encounter,
         {
@@ -194,6 +210,7 @@ def set_goal(session: TrainingSession, names: Names) -> Iterator[tuple[str, Reso
             "subject": {"reference": names.patient(session.patient)[0]},
             "startDate": (session.began_at + names.shift).date().isoformat(),
             "target": [{"measure": {"coding": [code]}, "detailQuantity": reached}],
+            **label(session.simulated),
         },
     )
 

@@ -17,6 +17,7 @@ from rehab.management.files import new_file
 from rehab.outbox.models import Topic, notify
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
+from rehab.people.commands import command
 from rehab.people.models import Clinic
 from rehab.people.server_keys import close_keys_again
 
@@ -41,7 +42,7 @@ class Command(BaseCommand):
             raise
         for clinic in Clinic.everywhere.all():
             audit_log.record(
-                Act.BACKUP, None, clinic_id=clinic.pk, about="manage.py backup", now=now
+                Act.BACKUP, None, clinic_id=clinic.pk, about=command("backup"), now=now
             )
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(

@@ -30,6 +30,7 @@ from rehab.management.files import new_file, opened, read_key_file
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
 from rehab.people.audit.moves import ClinicMove
+from rehab.people.commands import command
 from rehab.people.models import Clinic
 from rehab.sessions import seals as session_seals
 
@@ -81,7 +82,7 @@ class Command(BaseCommand):
     ) -> None:
         one, now = _find(clinic), timezone.now()
         recipients = read_recipients(to or settings.BACKUP_KEYS)
-        about = f"manage.py clinic export, to {', '.join(to or settings.BACKUP_KEYS)}"
+        about = f"{command('clinic export')}, to {', '.join(to or settings.BACKUP_KEYS)}"
         audit_log.record(Act.EXPORT, None, clinic_id=one.pk, about=about, now=now)
         with new_file(file) as out:
             rows = write_clinic(one, out, recipients, now, with_tokens=tokens)

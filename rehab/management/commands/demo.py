@@ -57,7 +57,7 @@ class Command(BaseCommand):
         while ended is None:
             if folder.exists():
                 shutil.rmtree(folder)
-            self.stdout.write("Making the clinic with weeks of history: about a minute …")
+            self.stdout.write("Making the clinic with weeks of history: half a minute …")
             self.stdout.flush()  # at once, also into a file
             made = _run(environment, "demo", "--fill")
             made.communicate(f"{password}\n".encode())

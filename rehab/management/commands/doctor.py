@@ -7,7 +7,7 @@ import os
 import tempfile
 import time
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
 from statistics import median
@@ -26,6 +26,8 @@ from rehab.management.files import new_file
 from rehab.management.problem_report import write_report
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
+from rehab.people.chores import TASK, Chore
+from rehab.people.commands import command, reinstall
 from rehab.people.server_keys import ServerKey
 from rehab.people.sign_in.first_start import count_pending_migrations
 from rehab.sessions import seals as session_seals
@@ -80,8 +82,7 @@ class Command(BaseCommand):
     ) -> None:
         """Print the diagnoses. Exits with status 1 where something needs a cure."""
         last = (examine_session_logs, examine_all_steps) if deep else (examine_new_steps,)
-        examinations = (*EXAMINATIONS, *last)
-        diagnoses = [diagnosis for run in examinations for diagnosis in examine(run)]
+        diagnoses = diagnose(*last)
         for diagnosis in diagnoses:
             mark = "needs care" if diagnosis.cure else "well"
             self.stdout.write(f"{diagnosis.subject:<12} {mark:<11} {diagnosis.state}")
@@ -89,9 +90,7 @@ class Command(BaseCommand):
                 self.stdout.write(f"{'':<24} → {diagnosis.cure}")
         if report is not None:
             with new_file(report) as out:
-                states = [(one.subject, one.state, bool(one.cure)) for one in diagnoses]
-                plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
-                out.write(write_report(states, plugins, timezone.now()).encode())
+                out.write(report_of(diagnoses, timezone.now()).encode())
         if any(diagnosis.cure for diagnosis in diagnoses):
             raise SystemExit(1)
 
@@ -125,7 +124,7 @@ def examine_database() -> Iterator[Diagnosis]:
     kind = f"{connection.vendor}, {connection.settings_dict['NAME']}"
     if pending:
         yield Diagnosis(
-            "database", f"{kind}: {pending} migration(s) to do", f"Run {settings.PROGRAM} migrate."
+            "database", f"{kind}: {pending} migration(s) to do", f"Run {command('migrate')}."
         )
     else:
         yield Diagnosis("database", f"{kind}: up to date")
@@ -153,9 +152,9 @@ def examine_files() -> Iterator[Diagnosis]:
     missing = [name for name in ("css/shared/tokens.css", "img/mark.svg") if not finders.find(name)]
     missing += [name for name, folder in settings.BROWSER_LIBRARIES.items() if not folder.is_dir()]
     if missing:
-        yield Diagnosis("files", f"missing: {', '.join(missing)}", "Run make setup.")
+        yield Diagnosis("files", f"missing: {', '.join(missing)}", f"Run {reinstall()}.")
     elif settings.HOSTED and not (settings.STATIC_ROOT / "staticfiles.json").exists():
-        yield Diagnosis("files", "not collected", f"Run {settings.PROGRAM} collectstatic.")
+        yield Diagnosis("files", "not collected", f"Run {command('collectstatic')}.")
     else:
         yield Diagnosis("files", "all there")
 
@@ -232,6 +231,20 @@ def examine_children() -> Iterator[Diagnosis]:
         yield Diagnosis("children", state, f"Its last words: {last}" if failed else "")
 
 
+def examine_tasks() -> Iterator[Diagnosis]:
+    """Diagnose what the server does by itself, while it runs and at night."""
+    failed = [one for one in Chore.objects.all() if not one.is_well]
+    for one in failed:
+        cure = f"Mend that, then run {command(f'upkeep {one.name}')}."
+        if one.name.startswith(TASK):
+            cure = "Restart the server; where it fails again, its log says more: report that."
+        # What it said may name a patient, and states stand in a problem report.
+        state = f"{one.name} failed, {one.failed_at:%Y-%m-%d %H:%M} UTC"
+        yield Diagnosis("tasks", state, f"It said: {one.said.strip()} {cure}")
+    if not failed:
+        yield Diagnosis("tasks", "none failed when it was last done")
+
+
 def examine_tokens() -> Iterator[Diagnosis]:
     """Diagnose the tokens of devices."""
     devices = Device.everywhere.filter(revoked_at__isnull=True)
@@ -248,12 +261,10 @@ def examine_tokens() -> Iterator[Diagnosis]:
 def examine_seals() -> Iterator[Diagnosis]:
     """Diagnose the chains of the audit log and the history, and what keeps them append-only."""
     for name in guards.find_missing(connection.alias):
-        yield Diagnosis(
-            "logs", f"the trigger {name} is missing", f"Run {settings.PROGRAM} migrate."
-        )
+        yield Diagnosis("logs", f"the trigger {name} is missing", f"Run {command('migrate')}.")
     broken = list(seals.find_broken())
     for problem in broken[:10]:
-        cure = f"Compare with the copy of {settings.PROGRAM} shiplogs, and find out who was there."
+        cure = f"Compare with the copy of {command('shiplogs')}, and find out who was there."
         yield Diagnosis("logs", problem, cure)
     if not broken:
         late = seals.count_unsealed(timezone.now() - timedelta(days=1))
@@ -265,7 +276,7 @@ def examine_keys() -> Iterator[Diagnosis]:
     """Diagnose the server's own keys."""
     stored = list(ServerKey.objects.all())
     closed = ", ".join(str(one) for one in stored if one.open() is None)
-    cure = f"GARRY_SECRET_KEY is another one now: see {settings.PROGRAM} rotatekeys --help."
+    cure = f"GARRY_SECRET_KEY is another one now: see {command('rotatekeys --help')}."
     if closed:
         yield Diagnosis("keys", f"{closed}: not opened", cure)
     else:
@@ -301,7 +312,20 @@ EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (
     examine_sessions,
     examine_plugins,
     examine_children,
+    examine_tasks,
     examine_tokens,
     examine_seals,
     examine_keys,
 )
+
+
+def diagnose(*more: Callable[[], Iterator[Diagnosis]]) -> list[Diagnosis]:
+    """Return what the usual examinations find, and more of them."""
+    return [diagnosis for run in (*EXAMINATIONS, *more) for diagnosis in examine(run)]
+
+
+def report_of(diagnoses: Iterable[Diagnosis], now: datetime) -> str:
+    """Return what a problem is reported with."""
+    states = [(one.subject, one.state, bool(one.cure)) for one in diagnoses]
+    plugins = [plugin for registry in REGISTRIES for plugin in registry.plugins]
+    return write_report(states, plugins, now)

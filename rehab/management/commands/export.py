@@ -15,6 +15,7 @@ from rehab.exports.patient_data import patient_files, session_files
 from rehab.exports.research.package import Package
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
+from rehab.people.commands import command
 from rehab.people.models import Patient, User
 from rehab.studies.models import Study
 
@@ -67,7 +68,7 @@ class Command(BaseCommand):
             None,
             clinic_id=user.clinic_id,
             patient_id=patient_id,
-            about=f"manage.py export --as {username}",
+            about=command(f"export --as {username}"),
             now=now,
         )
         if package is not None:

@@ -11,6 +11,7 @@ from django.core.management import BaseCommand, CommandError, call_command
 from rehab.exports.backup import CannotRestore, restore_backup
 from rehab.exports.encryption import CannotDecrypt
 from rehab.management.files import opened, read_key_file
+from rehab.people.commands import command
 from rehab.people.server_keys import close_keys_again
 
 
@@ -27,7 +28,7 @@ class Command(BaseCommand):
             type=Path,
             required=True,
             metavar="KEYFILE",
-            help="the file with the secret key that `manage.py backupkey` printed",
+            help=f"the file with the secret key that `{command('backupkey')}` printed",
         )
 
     def handle(self, *args: Any, file: Path, key: Path, **options: Any) -> None:

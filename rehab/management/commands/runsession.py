@@ -26,8 +26,8 @@ from rehab.sessions.live.headless import (
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import describe_cue
 from rehab.sessions.services import SessionRequest, create_session
-from rehab.sessions.setup.recordings import is_sample
 from rehab.sources.recording import Recording, RecordingError, read_recording
+from rehab.sources.recording.samples import is_sample
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule

@@ -18,6 +18,7 @@ from django.db import connection
 from django.utils import timezone
 
 from rehab.management.processes import Processes
+from rehab.people.commands import command
 from rehab.people.sign_in.first_start import (
     FIRST_USERNAME,
     first_clinic,
@@ -102,7 +103,7 @@ class Command(BaseCommand):
         if robot != "none" and settings.HOSTED:
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
         check_port(host, port)
-        prepare_database()
+        prepare_database(self._say)
         if https or is_encrypting():
             prepare_https(make=https)
         lease = take_lease(host, port) if settings.HOSTED else None
@@ -122,11 +123,14 @@ class Command(BaseCommand):
             box = str(settings.DATA_DIR / "black_box")
             given = {"GARRY_ROBOT_TOKEN": token, "GARRY_ROBOT_BLACK_BOX": box}
             current().supervisor.start("robot", robot, given)
-        for number, command in enumerate(commands, start=1):
-            current().supervisor.start(f"child {number}", shlex.split(command))
-        self.stdout.write("Ready. Ctrl-C stops the server.")
-        self.stdout.flush()
+        for number, line in enumerate(commands, start=1):
+            current().supervisor.start(f"child {number}", shlex.split(line))
+        self._say("Ready. Ctrl-C stops the server.")
         notify("READY=1")
+
+    def _say(self, words: str) -> None:
+        self.stdout.write(words)
+        self.stdout.flush()  # at once, also into a file
 
     def _print_address(self, address: str) -> None:
         self.stdout.write(f"GARRY serves at {address}/")
@@ -145,7 +149,9 @@ def prepare_https(*, make: bool) -> None:
     from rehab.sessions.live.encryption import BadCertificate, make_context
 
     if settings.HOSTED:
-        raise CommandError("A hosted server's proxy encrypts (docs/hosting.md). Leave out --https.")
+        raise CommandError(
+            "A hosted server's proxy encrypts (its page /help/hosting/). Leave out --https."
+        )
     check_port("0.0.0.0", settings.HTTPS_PORT)  # noqa: S104
     if make and not is_encrypting():
         make_own(timezone.now())
@@ -218,5 +224,5 @@ def check_port(host: str, port: int) -> None:
             raise CommandError(
                 f"Cannot serve at {host}:{port} ({problem.strerror}). Stop the other program, or "
                 f"choose another port: GARRY_PORT={port + 1 if port < 65535 else 8000} "
-                f"{'garry serve' if settings.PROGRAM == 'garry' else 'make run'}."
+                f"{command('serve')}."
             ) from problem

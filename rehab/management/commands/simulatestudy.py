@@ -20,6 +20,7 @@ from rehab.exports.archive import save_zip
 from rehab.exports.research.package import Package
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
+from rehab.people.commands import command
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
@@ -104,7 +105,7 @@ class Command(BaseCommand):
         name = f"simulated-study-{study.clinic.pk}"
         given = {"role": Role.LEAD, "clinic": study.clinic, "password": make_password(None)}
         user, _is_new = User.everywhere.get_or_create(username=name, defaults=given)
-        about = "manage.py simulatestudy"
+        about = command("simulatestudy")
         audit_log.record(Act.EXPORT, None, clinic_id=study.clinic.pk, about=about, now=now)
         folder = file.with_name(file.name + ".parts")
         package = Package.create(folder, user, study, shift_dates=False, now=now)

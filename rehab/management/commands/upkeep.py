@@ -126,7 +126,7 @@ class Command(BaseCommand):
 
 def _setting(name: str, value: str) -> str:
     if not value:
-        raise CommandError(f"{name} is not set: docs/hosting.md.")
+        raise CommandError(f"{name} is not set: see the page /help/hosting/.")
     return value
 
 

@@ -18,10 +18,7 @@ from rehab.people.append_only import AppendOnlyModel
 from rehab.people.models import Clinic
 
 VENDORS = ("sqlite", "postgresql")
-WORDS = (
-    "These rows are append-only: add another one. Of logs manage.py retention deletes what is too "
-    "old."
-)
+WORDS = "These rows are append-only: add another one. Of logs `retention` deletes what is too old."
 
 
 def install(using: str, **_: Any) -> None:

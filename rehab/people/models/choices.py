@@ -64,4 +64,4 @@ class ErasureReason(models.TextChoices):
 
 
 # Nicknames in a demonstration, which takes no other ones.
-DEMO_NAMES = ("Amber", "Basil", "Clover", "Dill", "Elder", "Fern", "Demo")
+DEMO_NAMES = ("Amber", "Basil", "Clover", "Dill", "Elder", "Fern", "Ginger", "Hazel", "Demo")

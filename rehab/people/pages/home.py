@@ -1,6 +1,5 @@
 """The front page, the guide for therapists, and the catalog of the scripts' translations."""
 
-from django.conf import settings
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
 from django.utils import translation
@@ -8,10 +7,11 @@ from django.views.decorators.cache import cache_control
 from django.views.decorators.http import conditional_page, require_safe
 from django.views.i18n import JavaScriptCatalog
 
-from rehab.people.access import for_roles, public
+from rehab.people.access import for_roles, public, user_of
+from rehab.people.commands import command
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
-from rehab.people.web.help_pages import using_guide
+from rehab.people.web.help_pages import may_report, read_page
 from rehab.training.valences import VALENCES
 
 javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
@@ -24,18 +24,28 @@ def home(request: HttpRequest) -> HttpResponse:
     return render(
         request,
         "people/home.html",
-        {"hosted": settings.HOSTED, "valences": VALENCES.values()},
+        {
+            "valences": VALENCES.values(),
+            "runs": [
+                command("runsession --recording walk.csv --valence positive"),
+                command("runsession --synthetic 7 --valence binary"),
+            ],
+        },
     )
 
 
 @for_roles(*Role, patients=False)
 @require_safe
-def show_help(request: HttpRequest) -> HttpResponse:
-    """Show docs/using.md."""
-    guide = using_guide()
+def show_help(request: HttpRequest, page: str = "using") -> HttpResponse:
+    """Show a page of the documentation, the guide for therapists unless another one is named."""
+    guide = read_page(page, request.build_absolute_uri("/").rstrip("/"))
     if not guide:
         raise Http404
-    return render(request, "people/help.html", {"guide": guide})
+    return render(
+        request,
+        "people/help.html",
+        {"guide": guide, "is_using": page == "using", "may_report": may_report(user_of(request))},
+    )
 
 
 @public

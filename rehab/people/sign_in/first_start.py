@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from django.core.management import CommandError, call_command
 from django.db import DatabaseError, connection, transaction
 from django.db.migrations.executor import MigrationExecutor
 
+from rehab.people.commands import command
 from rehab.people.models import Clinic, User
 from rehab.people.random_codes import random_words
 from rehab.people.roles import Role
@@ -25,10 +27,11 @@ def count_pending_migrations() -> int:
     return len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
 
 
-def prepare_database() -> None:
+def prepare_database(say: Callable[[str], object] = str) -> None:
     """Apply pending migrations; on a hosted server, refuse to start while some are pending.
 
-    Raises CommandError, with the cure, where the database cannot be reached or is not up to date.
+    ``say`` is told what takes its time. Raises CommandError, with the cure, where the database
+    cannot be reached or is not up to date.
     """
     try:
         pending = count_pending_migrations()
@@ -41,8 +44,9 @@ def prepare_database() -> None:
     if settings.HOSTED:
         raise CommandError(
             f"The database lacks {pending} migration(s). Back it up, then run "
-            f"`{settings.PROGRAM} migrate`."
+            f"`{command('migrate')}`."
         )
+    say("Preparing the database, this once: some seconds …")
     call_command("migrate", verbosity=0, interactive=False)
 
 

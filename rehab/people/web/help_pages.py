@@ -1,4 +1,4 @@
-"""docs/using.md as a page, and which part of it helps on which page."""
+"""The documentation as pages, and which part of docs/using.md helps on which page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from pathlib import Path
 
 from django.conf import settings
 from django.templatetags.static import static
+from django.urls import reverse
 from markdown_it import MarkdownIt
+
+from rehab.people.commands import as_typed_here
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
 
 # The heading, as GitHub writes its anchor, and the pages that it helps on, by their addresses'
 # names; an admin's page has its model's.
@@ -47,15 +52,28 @@ def find_part(name: str) -> str:
     return PARTS.get(name, "")
 
 
-def using_guide() -> str:
-    """Return docs/using.md as HTML; "" on a server without it."""
-    file = Path(settings.FILES_DIR, "docs", "using.md")
-    return render_guide(file.read_text("utf-8")) if file.is_file() else ""
+def may_report(user: User) -> bool:
+    """Return whether a person may report a problem with the counts of all clinics' rows."""
+    is_only = user.role == Role.LEAD and Clinic.everywhere.count() == 1
+    return user.role == Role.HOST or is_only
+
+
+def read_page(name: str, address: str) -> str:
+    """Return a page of docs/ as HTML, as things are called at this server; "" where there is none.
+
+    ``name`` is a slug, ``address`` the one that the reader has of this server.
+    """
+    file = _file_of(name)
+    return render_page(as_typed_here(file.read_text("utf-8"), address)) if file.is_file() else ""
+
+
+def _file_of(name: str) -> Path:
+    return Path(settings.FILES_DIR, "docs", f"{name}.md")
 
 
 @cache
-def render_guide(text: str) -> str:
-    """Return a guide of ours as HTML: headings have GitHub's anchors, pictures our addresses."""
+def render_page(text: str) -> str:
+    """Return a page as HTML: headings have GitHub's anchors, pictures and pages our addresses."""
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     tokens = markdown.parse(text)
     for opened, inline in pairwise(tokens):
@@ -65,12 +83,20 @@ def render_guide(text: str) -> str:
     html = re.sub(
         r'src="images/([^"]+)"', lambda found: f'src="{static("docs/" + found[1])}"', html
     )
-    # Other pages of the documentation are not served here.
-    html = re.sub(r'<a href="(?!#|https?:)[^"]*">(.*?)</a>', r"\1", html, flags=re.DOTALL)
+    html = re.sub(r'href="([a-z-]+)\.md(#[^"]*)?"', _link, html)
+    # What is not of the package leads nowhere here.
+    html = re.sub(r'<a href="(?!#|https?:|/)[^"]*">(.*?)</a>', r"\1", html, flags=re.DOTALL)
     html = html.replace("<th></th>", "<td></td>")  # Markdown has no table without a head
     return html.replace("<table>", '<div class="wide"><table>').replace(
         "</table>", "</table></div>"
     )
+
+
+def _link(found: re.Match[str]) -> str:
+    """Return the link to another page; one that is not here is left as it is."""
+    if not _file_of(found[1]).is_file():
+        return found[0]
+    return f'href="{reverse("help-page", args=[found[1]])}{found[2] or ""}"'
 
 
 def anchor_of(heading: str) -> str:

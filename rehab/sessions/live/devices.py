@@ -12,6 +12,7 @@ class ConnectedDevice(Protocol):
     """A connected source or robot, with a session or without one."""
 
     outbox: Outbox
+    simulated: bool  # nobody walks, by what it said of itself
 
     @property
     def device_id(self) -> int | None:

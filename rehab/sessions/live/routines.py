@@ -14,6 +14,7 @@ from django.utils import timezone
 
 from rehab.outbox.delivery import deliver_due, is_due
 from rehab.people.audit.seals import seal_logs
+from rehab.people.chores import record_tasks
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
 from rehab.sessions.live.database import clinic_owners
@@ -53,6 +54,8 @@ class Routines:
         self._beat = 0
         self._part = 0
         self._trouble = Trouble.NONE  # as it was announced last
+        self._problems: dict[str, str] = {}  # of each task's last run; "" where there was none
+        self._recorded: dict[str, str] = {}
         self.tasks = [
             self._loop.create_task(self._repeat(beats, work), context=contextvars.Context())
             for beats, work in (
@@ -64,6 +67,7 @@ class Routines:
                 (CHECKPOINT, self._checkpoint_log),
                 (SEAL, self._seal_logs),
                 (OUTBOX, self._deliver),
+                (OUTBOX, self._record_problems),
             )
         ]
 
@@ -73,15 +77,18 @@ class Routines:
 
     async def _repeat(self, beats: float, work: Callable[[], Awaitable[None]]) -> None:
         """Call a function periodically; log and count its failures and go on."""
-        failures = TASK_FAILURES.labels(work.__name__.strip("_"))  # 0 until one fails
+        name = work.__name__.strip("_")
+        failures = TASK_FAILURES.labels(name)  # 0 until one fails
         while True:
             due_s = self._loop.time() + beats * ROBOT_HEARTBEAT_S
             await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
             LOOP_LATE_S.observe(self._loop.time() - due_s)
             try:
                 await work()
-            except Exception:
+                self._problems[name] = ""
+            except Exception as problem:
                 failures.inc()
+                self._problems[name] = repr(problem)
                 log.exception("A periodic task (every %.2f s) failed", beats * ROBOT_HEARTBEAT_S)
 
     async def _send_robot_heartbeats(self) -> None:
@@ -150,6 +157,13 @@ class Routines:
             return
         # In a thread apart: a receiver may take seconds to answer, and pages must not wait for it.
         await database_sync_to_async(deliver_due, thread_sensitive=False)(timezone.now())
+
+    async def _record_problems(self) -> None:
+        """Store which tasks fail, and which no longer do, where `doctor` finds it."""
+        changed = dict(self._problems.items() - self._recorded.items())
+        if changed:
+            await database_sync_to_async(record_tasks)(changed, timezone.now())
+            self._recorded |= changed
 
     async def check_sign_ins(self) -> None:
         """Extend sign-ins at a running session; close sockets that are no longer authorized.

@@ -20,6 +20,7 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
+from rehab.people.simulated import counted
 from rehab.sessions.conditions import CONDITIONS, load_conditions, name_assistance
 from rehab.sessions.corrections import CorrectedField, SessionCorrection
 from rehab.sessions.formatting import NBSP, clinic_time, format_number
@@ -249,7 +250,7 @@ def read_view(user: User, query: Mapping[str, str], now: datetime) -> View:
     by = query.get("by", "")
     weeks = query.get("weeks", "12")
     weeks = weeks if weeks in PERIODS else "12"
-    sessions = TrainingSession.objects.visible_to(user).filter(simulated=False)
+    sessions = TrainingSession.objects.visible_to(user).filter(counted())
     if weeks:
         sessions = sessions.filter(created_at__gte=now - timedelta(weeks=int(weeks)))
     walked = load_walked(user, sessions)

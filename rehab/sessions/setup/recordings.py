@@ -6,7 +6,6 @@ process of its own with bounds, so that a damaged file cannot take the server do
 
 from __future__ import annotations
 
-import filecmp
 import json
 import os
 import shutil
@@ -20,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from django.conf import settings
-from django.contrib.staticfiles import finders
 from django.db import close_old_connections
 from django.utils.text import slugify
 from django.utils.translation import gettext
 
+from rehab.sources.recording.samples import is_sample, mark_of
 from robot.plugins import find_names
 from robot.wire.limits import TIME_MAX_S
 
@@ -81,21 +80,6 @@ def recordings_folder() -> Path:
     """Return the folder of the recordings that the set-up offers."""
     folder: Path = settings.DATA_DIR / "recordings"
     return folder
-
-
-def is_sample(file: Path) -> bool:
-    """Return whether nobody walked a recording: it is GARRY's own sample, or made from it."""
-    if _mark(file).exists():
-        return True
-    samples = [finders.find(f"samples/{name}") for name in ("signals.csv", "strides.csv")]
-    return file.is_file() and any(
-        filecmp.cmp(file, sample, shallow=False) for sample in samples if sample
-    )
-
-
-def _mark(file: Path) -> Path:
-    """Return the empty file that stands beside a recording which was made from a sample."""
-    return file.with_name(f"{file.name}.simulated")
 
 
 def uploaded_file(person: int, ending: str, place: int = 0) -> Path:
@@ -197,9 +181,9 @@ def _check(
     except subprocess.TimeoutExpired:
         return Checked(None, [])
     if save and done.returncode in (0, 1):  # it is stored
-        _mark(save).unlink(missing_ok=True)
+        mark_of(save).unlink(missing_ok=True)
         if any(map(is_sample, files)):
-            _mark(save).touch()
+            mark_of(save).touch()
     said = [line for line in done.stderr.splitlines() if line.strip()]
     if done.returncode not in (0, 1, 2) or (said and said[0].startswith("Traceback")):
         return Checked(None, [])

@@ -44,6 +44,8 @@ class SourceClient:
         Called with session and number of each acknowledgment.
     plugin
         Of which package the source is a part; None for GARRY's own.
+    simulated
+        Whether nobody walks.
     notify
         Called with lines for the person who runs the source.
     sleep
@@ -61,13 +63,14 @@ class SourceClient:
         journal: Journal | None = None,
         on_ack: Callable[[int, int], None] = lambda _session, _number: None,
         plugin: Plugin | None = None,
+        simulated: bool = False,
         notify: Callable[[str], None] = lambda _text: None,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.run_id = run or secrets.token_hex(8)
         self._link = dial(greet=self._greet, on_lost=self._note_lost_link)
         self._wanted_session = session
-        self._stay, self._plugin = stay, plugin
+        self._stay, self._plugin, self._is_simulated = stay, plugin, simulated
         self._notify = notify
         self._sleep = sleep
         self._feed = feed
@@ -159,6 +162,8 @@ class SourceClient:
             hello["session"] = self._wanted_session
         if self._plugin is not None:
             hello["plugin"] = self._plugin.describe()
+        if self._is_simulated:
+            hello["simulated"] = True
         return hello
 
     def _note_lost_link(self, reason: str, pause_s: float) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from rehab.sources.client import Display, NextStride, write_step
 from rehab.sources.recording.layouts import LAYOUTS
 from rehab.sources.recording.reading import read_recording
+from rehab.sources.recording.samples import is_sample
 from rehab.sources.reporting import Notify, SourceError
 from rehab.sources.source import PlayedSource
 from rehab.training.steps import Measurement, Side
@@ -43,6 +44,7 @@ class RecordingSource(PlayedSource):
     def __init__(self, options: Namespace, notify: Notify) -> None:
         """Read the whole file. Raises RecordingError, GaitInputError or UnsendableStride."""
         self._notify = notify
+        self.simulated = is_sample(options.file)
         self._limit: int | None = options.strides
         wanted = Side(options.side) if options.side else None
         self._recorded_side: Side | None = None  # the only one there is

@@ -42,6 +42,7 @@ class SyntheticSource(PlayedSource):
     """A simulated patient. Every stride depends on the phase that the one before may have ended."""
 
     max_unacknowledged = 1
+    simulated = True
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:

@@ -60,4 +60,4 @@ def test_the_latest_pause_counts_and_says_what_it_means(late_s, means):
     worst_s = measure_jitter(lambda: now_s, sleep)
     assert worst_s == pytest.approx(late_s)
     assert means in explain_jitter(worst_s)
-    assert bool(means) == ("docs/robot.md" in explain_jitter(worst_s))
+    assert bool(means) == ("/help/robot/" in explain_jitter(worst_s))

@@ -8,7 +8,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from asgiref.sync import sync_to_async
 
+from rehab.management.commands.doctor import examine_tasks
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.routines import Routines
 from rehab.sessions.live.session.instruments import REGISTRY
@@ -41,7 +43,25 @@ async def test_each_failure_of_a_task_is_counted_and_it_goes_on():
     def count() -> float | None:
         return REGISTRY.get_sample_value("garry_task_failures_total", {"task": "break"})
 
-    routines: Any = SimpleNamespace(_loop=asyncio.get_running_loop())
+    routines: Any = SimpleNamespace(_loop=asyncio.get_running_loop(), _problems={})
     with suppress(asyncio.CancelledError):
         await Routines._repeat(routines, 0.01, _break)
     assert asked == [0, 1, 2]
+
+
+async def test_doctor_finds_a_task_that_fails_until_it_does_not(place, begun):
+    await begun(place)
+    routines = runtimes.current().routines
+
+    async def diagnose() -> list[str]:
+        await routines._record_problems()
+        found = await sync_to_async(lambda: list(examine_tasks()))()
+        return [f"{one.state}: {one.cure}" for one in found if one.cure]
+
+    assert await diagnose() == []
+    routines._problems["seal_logs"] = "OSError('No space left')"
+    (said,) = await diagnose()
+    assert said.startswith("task seal_logs failed, ")
+    assert "OSError('No space left') Restart the server" in said
+    routines._problems["seal_logs"] = ""
+    assert await diagnose() == []

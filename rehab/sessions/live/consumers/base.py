@@ -265,5 +265,5 @@ class NotFoundConsumer(Socket):
     async def on_connect(self) -> None:
         """Close with an error."""
         raise CloseSocket(
-            CloseCode.NO_SESSION, "no_address", "No socket has this address; see docs/protocol.md."
+            CloseCode.NO_SESSION, "no_address", "No socket has this address; see /help/protocol/."
         )

@@ -40,6 +40,7 @@ class DeviceSocket(Socket):
     device: Device | None = None
     hello_received = False
     plugin: PartOf | None = None  # that it is a part of
+    simulated = False
     rotates = False  # it can store another token, and none is being given
 
     @property

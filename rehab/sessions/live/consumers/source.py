@@ -72,7 +72,14 @@ class SourceConsumer(DeviceSocket):
         _check_worn(step, live)
         # What a source calls late is no measure of its clock, which may be another one by now.
         late = is_marked or self.clock.is_late(step.time_s, time.monotonic())
-        live.record_step(step, received_at, late=late)
+        plays = self.simulated or bool(live.source_state and live.source_state.plays)
+        if plays and not live.is_simulated and live.next_number > 1:
+            raise BadFrame(
+                "A person has walked in this session, and a simulated source cannot go on with it. "
+                "Begin another session for it.",
+                "simulated",
+            )
+        live.record_step(step, received_at, late=late, simulated=plays)
 
     async def on_message(self, message: Message, text: str) -> None:
         """Handle hello and steps."""
@@ -115,7 +122,7 @@ class SourceConsumer(DeviceSocket):
         live.announce_presence(timezone.now())
 
     async def _handle_hello(self, hello: Hello) -> None:
-        self.side, self.plugin = hello.side, hello.plugin
+        self.side, self.plugin, self.simulated = hello.side, hello.plugin, hello.simulated
         self.clock = SourceClock(
             hello.run,
             time.monotonic(),

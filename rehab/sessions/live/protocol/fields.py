@@ -78,4 +78,4 @@ def _describe(kind: inspect.Type) -> str:
             return f"an object with {', '.join(field.encode_name for field in fields)}"
         case inspect.TupleType(item_types=items):
             return f"a list of {len(items)}: {', '.join(map(_describe, items))}"
-    return f"no {type(kind).__name__.removesuffix('Type').lower()} that fits; see docs/protocol.md"
+    return f"no {type(kind).__name__.removesuffix('Type').lower()} that fits; see /help/protocol/"

@@ -71,6 +71,7 @@ class Hello(Struct, frozen=True):
     clock_pauses: bool = False  # its clock stands while the session is paused
     side: Side | None = None  # of a worn sensor: on the leg that is not trained it brings contacts
     plugin: PartOf | None = None
+    simulated: bool = False  # nobody walks
 
 
 class RobotHello(Struct, frozen=True):

@@ -198,6 +198,7 @@ class SessionAggregate:
             "started_at": self.session.started_at,
             "ended_at": self.session.ended_at,
             "changed_to": ",".join(self.fold.valences.changed_to),
+            "simulated": self.session.simulated,
         }
 
 

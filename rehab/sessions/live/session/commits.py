@@ -165,6 +165,7 @@ def _notify_receivers(events: Sequence[SessionEvent]) -> None:
         session = event.session
         about: dict[str, Any] = {"session": session.pk, "station": session.station_id}
         about |= {"how": event.kind} if alarm is None else {"reason": event.data.get("reason", "")}
+        about |= {"simulated": True} if session.simulated else {}
         try:
             with transaction.atomic():
                 notify(session.clinic_id, topic, about, event.at)

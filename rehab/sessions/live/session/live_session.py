@@ -22,7 +22,7 @@ from rehab.sessions.events.event import (
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live.database.trouble import WORDS, NotStored, classify_failure
 from rehab.sessions.live.devices import ConnectedDevice
-from rehab.sessions.live.protocol.messages import SensorState, SensorTrouble
+from rehab.sessions.live.protocol.messages import Played, SensorState, SensorTrouble
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.session.commits import Job
 from rehab.sessions.live.session.group_commit import Writer
@@ -123,18 +123,33 @@ class LiveSession:
         return self.aggregate.fold.state not in ENDED_STATES
 
     @property
+    def is_simulated(self) -> bool:
+        """Whether nobody walks in it."""
+        return self.aggregate.session.simulated
+
+    @property
     def is_watched(self) -> bool:
         """Whether a PT's page is open: a real robot begins no gesture while none is."""
         subscribers = self.feed.subscribers
         return any(one.audience is Audience.MONITOR and one.is_attentive for one in subscribers)
 
     def record_step(
-        self, measurement: Measurement, received_at: datetime, *, late: bool = False
+        self,
+        measurement: Measurement,
+        received_at: datetime,
+        *,
+        late: bool = False,
+        simulated: bool = False,
     ) -> None:
-        """Score a step and queue it for the log. Raises what ``SessionFold.step`` raises."""
+        """Score a step and queue it for the log. Raises what ``SessionFold.step`` raises.
+
+        ``simulated``: nobody walked it, and so the session counts as no person's.
+        """
         fold = self.aggregate.fold
+        is_first = simulated and not self.is_simulated
         before = Before.of(fold)
         row = self.aggregate.record_step(measurement, received_at, late=late)
+        self.aggregate.session.simulated |= simulated
         events = events_of_step(
             fold, before, row.step, self.feed.audiences, received_at, live=not late
         )
@@ -151,7 +166,7 @@ class LiveSession:
             rest = RULE_PAUSES[fold.pause_reason]
             rows.append(self.aggregate.log_event(rest, None, received_at, {}, fold.rest_s))
         summary = None
-        if before.has_moved(fold) or self.aggregate.is_checkpoint_due:
+        if is_first or before.has_moved(fold) or self.aggregate.is_checkpoint_due:
             summary = self.aggregate.summary(with_checkpoint=True)
         self._submit(rows, events, changed, summary, row=row)
 
@@ -354,7 +369,9 @@ def _trouble(device: ConnectedDevice | None, state: SensorState | None) -> str:
 
 def _plays(device: ConnectedDevice | None, state: SensorState | None) -> str:
     """Return what walks instead of a leg; empty where one does."""
-    return state.plays.value if device and state else ""
+    if device is None:
+        return ""
+    return Played.SIMULATED.value if device.simulated else state.plays.value if state else ""
 
 
 def _clock(device: ConnectedDevice | None, state: SensorState | None) -> list[float | None] | None:

@@ -13,6 +13,7 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, may_see_names, rights_of
+from rehab.people.simulated import counted
 from rehab.sessions.formatting import clinic_time, format_duration, format_rate, midnight_of
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day.stations import StationStatus, find_live_session, station_statuses
@@ -80,7 +81,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
         .select_related("patient", "station", "measure")
         .order_by("-created_at", "-pk")
     )
-    walked = rows.exclude(IS_OPEN).filter(active_s__gt=0, simulated=False)
+    walked = rows.exclude(IS_OPEN).filter(counted(), active_s__gt=0)
     listed = [*rows.filter(IS_OPEN), *walked[:MAX_ENDED]]
     listed.sort(key=lambda row: STATE_ORDER.index(State(row.state)))
     by_name = may_see_names(user.role)
