@@ -208,7 +208,7 @@ EXPLICIT = Valence(
     hue="graphite",
     hit_points=None,
     miss_points=None,
-    bands=(Band(0, phrases.MEASURED),),
+    bands=(Band(0, ""),),  # the page says the goal, and the value beside it
     cue=CueGestures(),
 )
 

@@ -28,7 +28,7 @@ CROSSING = """() => {
   const words = [...document.querySelectorAll(".words, .sub")]
     .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect().bottom);
   const bottom = Math.max(...words);
-  const floor = document.querySelector(".horizon").getBoundingClientRect().top;
+  const floor = document.querySelector(".ground").getBoundingClientRect().top;
   const slots = [".phrase", ".count", ".actions", ".part", "header .who", ".pause", ".robot"]
     .map((name) => document.querySelector(name))
     .filter((one) => one.checkVisibility({ visibilityProperty: true }))
