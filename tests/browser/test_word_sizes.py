@@ -58,6 +58,7 @@ MEASURE = """() => {
     emblem: shown(".emblem"), scene: shown(".thermometer"), chart: shown(".strides") };
 }"""
 
+
 @pytest.fixture(scope="module")
 def walking(browser: Browser, server: Server) -> Iterator[Any]:
     """Return a function that opens a page on which somebody walks, once for each language and type.

@@ -43,7 +43,7 @@ export function createFitting(body, scene) {
   const landscape = matchMedia("(orientation: landscape)");
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
-  let fitted = "";
+  let [fitted, widest] = ["", ""];
 
   const unit = () => parseFloat(getComputedStyle(body).getPropertyValue("--u"));
   const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
@@ -74,7 +74,9 @@ export function createFitting(body, scene) {
     if (was[2] !== undefined) key.dataset.lost = was[2];
     if (isTooLarge) return null;
 
-    const isWide = landscape.matches && !body.dataset.column;
+    const { column } = body.dataset;
+    const isWide = landscape.matches && !column;
+    const isRow = landscape.matches && (!column || column === "center"); // the badge is beside the total
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
     const stand = bottom - (width < NARROW ? total : 0);
@@ -84,7 +86,7 @@ export function createFitting(body, scene) {
     const top = Math.max(isWide ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
     const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
-    const ground = goal + reach + AIR + Math.max(badge, isWide ? total : badge + (stand === bottom ? total : 0));
+    const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
     return { width, height, isWide, top, zero, goal, reach, below: goal + reach + AIR - main.offsetTop / u };
   }
@@ -110,10 +112,12 @@ export function createFitting(body, scene) {
     return fits;
   }
 
-  // Choose the layout for all that this screen may say. `samples`: the longest phrases that may follow a step.
-  return function fit(screen, samples) {
+  // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
+  return function fit(screen, { phrases: samples, number: usual }) {
     const isFeedback = screen === "feedback";
-    const number = isFeedback ? key.textContent.replace(/−/, "").replace(/\d/g, "8").padStart(3, "8") : "";
+    const shown = key.textContent.replace("−", "").replace(/\d/g, "8");
+    widest = [usual, shown].reduce((a, b) => (b.length > a.length ? b : a), widest);
+    const number = isFeedback ? widest : "";
     const said = isFeedback ? samples : [phrase.textContent];
     const { text, column, side } = body.dataset;
     const degree = body.style.getPropertyValue("--degree");
@@ -125,7 +129,7 @@ export function createFitting(body, scene) {
     if (!isFeedback) {
       set(0, largest(0, holdsMessage));
       const foot = Math.max(...[...feet].map((one) => one.offsetHeight));
-      const below = (foot ? foot / unit() + 36 : 0) + EDGE + (foot ? 0 : 40);
+      const below = foot ? foot / unit() + 36 + EDGE : 64;
       body.style.setProperty("--floor", `${stage.clientHeight - below * unit()}px`);
       return;
     }

@@ -16,7 +16,7 @@ const BEFORE = { sign: "M0 40l20 -80h132v80z", room: BULB_RADIUS, rise: 43, turn
 export function createScene(svg) {
   const find = (selector) => svg.querySelector(selector);
   const thermometer = find(".thermometer");
-  const liquids = svg.querySelectorAll(".liquid");
+  const liquid = find(".liquid");
   const arrow = find(".way");
   const ticks = TICKS.map(() => append(find(".ticks"), "path"));
   const dots = createDots(svg);
@@ -38,7 +38,6 @@ export function createScene(svg) {
     for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
     find(".glass").setAttribute("transform", `translate(${x} 0)`);
     place(".hatched", 0, top, { height: zero - top });
-    place(".shined", 0, top, { height: zero - top - 8 });
     place(".bulb", 0, bottom);
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
@@ -50,10 +49,11 @@ export function createScene(svg) {
     for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);
     ticks.forEach((tick, i) => tick.setAttribute("d", `M${r - 3} ${y(TICKS[i])}h${TICKS[i] === 0.5 ? -32 : -20}`));
     const end = x - r - 50 - (isWide ? 0 : room + 90);
+    const swing = reach - 30; // of the middle of a dot
     dots.layOut({
       left: 60,
       right: end,
-      y: (performance) => Math.min(Math.max(y(performance), goal - reach), goal + reach),
+      y: (performance) => Math.min(Math.max(y(performance), goal - swing), goal + swing),
     });
     if (shown) show(shown);
   }
@@ -72,7 +72,7 @@ export function createScene(svg) {
     thermometer.toggleAttribute("data-cut", isCut);
     const level = y(performance ?? 0);
     const height = performance === null ? layout.zero + 60 : level;
-    for (const liquid of liquids) liquid.style.transform = `translateY(${height}px)`;
+    liquid.style.transform = `translateY(${height}px)`;
     ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));
     const goesOn = performance > 0 && !hit && !close && level - 20 > y(1) + 14;
     arrow.setAttribute("d", goesOn ? `M0 ${level - 20}V${y(1) + 14}` : "");

@@ -87,10 +87,11 @@ export function phraseOf(step) {
   return step.words || fill(_("The goal is %(goal)s."), { goal: number(step.goal, 2) });
 }
 
-// Return the longest words that may follow a step.
+// Return the longest phrases that may follow a step, and a number as wide as most.
 export function samplesOf(session) {
-  if (session?.words_shown === false) return [NOT_MEASURED];
-  return [NOT_MEASURED, phraseOf({ goal: 88.88 }), ...(session?.longest ?? [])];
+  const phrases = [NOT_MEASURED];
+  if (session?.words_shown !== false) phrases.push(phraseOf({ goal: 8.88 }), ...(session?.longest ?? []));
+  return { phrases, number: session?.has_points === false ? number(8.88, 2) : "888" };
 }
 
 // Return one line for screen readers: "Well above. Plus 2. 128 points."
