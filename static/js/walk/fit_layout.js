@@ -45,7 +45,7 @@ export function createFitting(body, scene) {
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
   let [fitted, widest] = ["", ""];
 
-  const unit = () => parseFloat(getComputedStyle(body).getPropertyValue("--u"));
+  const unit = () => parseFloat(getComputedStyle(main).right) / EDGE; // walk.css
   const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
 
   // Return whether a message fits between header and buttons. By its parts' lines: letters reach beyond theirs.
