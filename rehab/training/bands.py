@@ -58,7 +58,7 @@ _MISSED = (Band(0, phrases.FAR_BELOW), Band(0.75, phrases.BELOW))
 POSITIVE_BANDS = (Band(0, phrases.ONWARD), Band(0.75, phrases.NEAR), *_REWARDING)
 NEGATIVE_BANDS = (*_MISSED, Band(1, phrases.NOTHING_LOST))
 BINARY_BANDS = (*_MISSED, *_REWARDING)
-EXPLICIT_BANDS = (Band(0, phrases.MEASURED),)
+EXPLICIT_BANDS = (Band(0, ""),)  # the page says the goal, and the value beside it
 
 
 def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:

@@ -95,8 +95,8 @@ REACHED = join(
 )
 
 STRONG = join(
-    gettext_noop("Well above!"),
     gettext_noop("Above the goal!"),
+    gettext_noop("What a step!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
     gettext_noop("More than the goal!"),
@@ -118,7 +118,7 @@ STRONGEST = join(
     gettext_noop("Wonderful!"),
     gettext_noop("Far above the goal!"),
     gettext_noop("Brilliant!"),
-    gettext_noop("What a step!"),
+    gettext_noop("Well above!"),
     gettext_noop("Amazing!"),
     gettext_noop("Glorious!"),
     gettext_noop("That was strong!"),
@@ -167,19 +167,4 @@ NOTHING_LOST = join(
     gettext_noop("Score unchanged."),
     gettext_noop("Your points stay."),
     gettext_noop("As many points."),
-)
-
-MEASURED = join(
-    gettext_noop("Your step in numbers."),
-    gettext_noop("This step."),
-    gettext_noop("Here is your value."),
-    gettext_noop("Your value."),
-    gettext_noop("The value now."),
-    gettext_noop("This step’s value."),
-    gettext_noop("This step, measured."),
-    gettext_noop("Now measured."),
-    gettext_noop("The last value."),
-    gettext_noop("The last step."),
-    gettext_noop("Your last step."),
-    gettext_noop("Your last value."),
 )

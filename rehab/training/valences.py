@@ -26,6 +26,7 @@ from robot.wire.cue_limits import VARIED
 
 # Larger numbers mean nothing more to a patient, and overflow where points are stored.
 POINTS_MAX = 1000
+LONGEST = 8  # so many phrases of a type are tried when a page is laid out
 
 
 class Emblem(StrEnum):
@@ -138,14 +139,11 @@ class Valence:
     def longest_words(self) -> list[str]:
         """Return the phrases that need the most room: the longest, and that with the longest word.
 
-        A page finds by them which layout has room for all.
+        A page finds by them which layout has room for all; how lines break decides between several.
         """
         pool = [phrase for band in self.bands for phrase in band.phrases]
-        if not pool:
-            return []
-        long = max(pool, key=len)
-        wide = max(pool, key=lambda phrase: max(map(len, phrase.split()), default=0))
-        return [long] if long == wide else [long, wide]
+        wide = sorted(pool, key=lambda phrase: max(map(len, phrase.split()), default=0))[-1:]
+        return list(dict.fromkeys(sorted(pool, key=len)[-LONGEST:] + wide))
 
     def emblem(self, hit: bool) -> Emblem:
         """Return the drawing for a hit or a miss: it follows the points, not the performance."""

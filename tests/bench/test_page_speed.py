@@ -22,6 +22,7 @@ import pytest
 from playwright.sync_api import Request
 
 from tests.support.browsers import SIZES, chromium
+from tests.support.patient_page import start
 from tests.support.servers import ROOT, serve
 from tests.support.walk_seed import make_walks
 
@@ -89,7 +90,7 @@ def test_page_speed(tmp_path: Path, slower: int) -> None:
         browser.start_tracing(page=page, categories=[TASKS])
         page.goto(walk.path, wait_until="networkidle")
         page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": slower})
-        page.click("text=Start")
+        start(page, server, walk)
         log = tmp_path / "acks.jsonl"
         command = f"-m rehab.sources synthetic --seed 3 --speed {SPEED} --strides {strides}"
         place = ["--log", str(log), "--server", server.url, "--token", walk.source]

@@ -9,6 +9,7 @@ from playwright.sync_api import Browser, BrowserContext, Page
 
 from tests.support.axe import check, go_dark
 from tests.support.browsers import SIZES, signed_in
+from tests.support.patient_page import start
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -199,7 +200,7 @@ def test_a_walk_in_every_look(context: BrowserContext, server: Server, walks: li
             check(page, for_patients=True)
 
         look("ready")
-        page.click("text=Start")
+        start(page, server, walk)
         look("waiting")
         with feet_of(server, walk) as feet:
             look("begin")

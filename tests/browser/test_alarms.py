@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 from websockets.sync.client import connect
 
 from tests.support.browsers import Visit, picture, signed_in
+from tests.support.patient_page import start
 from tests.support.servers import Server
 from tests.support.walk_seed import Feet, Walk, feet_of, hear, make_walks, robot_of
 
@@ -354,12 +355,11 @@ def road() -> Road:
 
 
 @pytest.fixture
-def patient(visit: Visit, walk: Walk, road: Road) -> Page:
+def patient(server: Server, visit: Visit, walk: Walk, road: Road) -> Page:
     page = visit("about:blank", walk, reduced_motion="reduce")
     page.route_web_socket(re.compile("/patient/"), road.pass_on)
     page.goto(walk.path)
-    page.click("text=Start")
-    page.wait_for_selector("body:not([data-look=ready])")
+    start(page, server, walk)
     return page
 
 

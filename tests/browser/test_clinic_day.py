@@ -62,10 +62,14 @@ def test_from_today_to_walking_in_three_taps(server: Server, browser: Browser) -
         page.goto("/start/")
         page.tap(".today >> text=Amara")
         page.dblclick(".huge")  # a tap that trembles is one tap
-        page.tap("[data-change=start]")
-        page.wait_for_selector("body[data-look=waiting]")  # says so until the sensor is there
-        expect(page.locator(".words")).to_have_text("Waiting for the sensor.")
+        page.wait_for_selector("body[data-look=ready]")
+        expect(page.locator(".sub")).to_have_text("Waiting for the sensor.")
+        expect(page.locator("[data-change=start]")).to_be_hidden()  # until the sensor is there
         assert run(server, SESSIONS) == ["1"]
+        with page_with(browser, server, walk, "laptop") as pt:  # who may begin without one
+            pt.goto(f"{page.url}monitor/")
+            pt.click("[data-main]")
+            page.wait_for_selector("body[data-look=waiting]")
         # Going back asks; whoever walks may rest meanwhile.
         here = page.url
         page.go_back()

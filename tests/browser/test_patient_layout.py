@@ -28,7 +28,7 @@ CROSSING = """() => {
   const words = [...document.querySelectorAll(".words, .sub")]
     .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect().bottom);
   const bottom = Math.max(...words);
-  const floor = document.querySelector(".horizon").getBoundingClientRect().top;
+  const floor = document.querySelector(".ground").getBoundingClientRect().top;
   const slots = [".phrase", ".count", ".actions", ".part", "header .who", ".pause", ".robot"]
     .map((name) => document.querySelector(name))
     .filter((one) => one.checkVisibility({ visibilityProperty: true }))
@@ -42,6 +42,36 @@ CROSSING = """() => {
   return said;
 }"""
 
+
+# Where line, thermometer, sign, badge and total are in each layout, and what is wrong there.
+FRAMES = f"""async (texts) => {{
+  const drawn = {DRAWN};
+  const box = (name) => {{
+    const one = document.querySelector(name);
+    if (!one.checkVisibility()) return null;
+    const {{ left, top, right, bottom }} = one.getBoundingClientRect();
+    return [left, top, right, bottom].map(Math.round);
+  }};
+  const parts = [".ground", ".wall", ".pennant", ".emblem svg", ".label"];
+  const frames = {{}}, wrong = [];
+  for (const column of ["", "center", "right", "left"]) for (const text of texts) {{
+    document.body.dataset.text = text;
+    if (column) document.body.dataset.column = column;
+    else delete document.body.dataset.column;
+    await drawn();
+    const [line, , sign, badge] = frames[`${{column}} ${{text}}`] = parts.map(box);
+    const range = document.createRange();
+    range.selectNodeContents(document.querySelector(".key"));
+    const digits = range.getBoundingClientRect().right, bulb = box(".bulb");
+    const beside = box(".key")[1] < bulb?.[3];
+    if (beside && digits > bulb[0] - 24) wrong.push(`${{column}} ${{text}}: digits at the bulb`);
+    if (badge && badge[1] < line[1])
+      wrong.push(`${{column}} ${{text}}: the badge crosses the goal`);
+    if (sign && (sign[0] < 0 || sign[2] > innerWidth))
+      wrong.push(`${{column}} ${{text}}: the goal's sign leaves the screen`);
+  }}
+  return [frames, wrong];
+}}"""
 
 # The page with each size of words, then turned around with the largest: what is wrong, by how it
 # was set, and where the buttons of the header were.
@@ -113,3 +143,22 @@ def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
         assert tablet.locator(".actions button:visible").count() == 0
         page.click("[data-ask=end]")
         look_everywhere(page)
+
+
+def test_the_frame_stays_from_step_to_step(server: Server, visit: Visit) -> None:
+    """Only what a step came to changes: its level, words, badge and total."""
+    (walk,) = make_walks(server, {"valence": "binary", "words_vary": True})
+    page = visit(walk.path, walk, reduced_motion="reduce")
+    with feet_of(server, walk) as feet:
+        page.click("[data-change=start]")
+        page.wait_for_selector("body[data-look=begin]")
+        for screen in CORNERS:
+            set_screen(page, screen)
+            found = []
+            for performance in (1.12, 0.83, None, 1.56, 0.3):
+                feet.walk(performance)
+                page.wait_for_function("n => document.body.dataset.step == n", arg=feet.number)
+                frames, wrong = page.evaluate(FRAMES, TEXTS)
+                assert (screen, wrong) == (screen, [])
+                found.append(frames)
+            assert found == [found[0]] * len(found), screen

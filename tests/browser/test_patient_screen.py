@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from tests.support.browsers import signed_in
-from tests.support.patient_page import until_step
+from tests.support.patient_page import start, until_step
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -55,8 +55,7 @@ def page_of(
         page = context.new_page()
         page.add_init_script(f"({LISTEN})(); ({MOVES})();")
         page.goto(walk.path)
-        page.click("text=Start")
-        page.wait_for_selector("body:not([data-look=ready])")
+        start(page, server, walk)
         yield page
 
 

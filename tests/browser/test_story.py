@@ -130,7 +130,7 @@ def end(story: Story, server: Server) -> None:
     elif story.valence != "negative":  # which says what was kept
         expect(you.locator(".value")).to_have_text(f"{metric['value']:.0f}".replace("-", "−"))
     expect(page.locator(f".you[data-session='{story.session}'] >> visible=true")).to_have_count(1)
-    page.tap("text=Continue")
+    page.tap("text=Done")
     expect(page.locator(".primary.huge")).to_contain_text("Like last time")
 
 
@@ -159,8 +159,8 @@ def like_last_time_is_three_taps(page: Page, server: Server) -> None:
     page.goto("/start/")
     page.tap("text=Rosa 0")
     page.tap("text=Like last time")
-    page.tap("[data-change=start]")
-    page.wait_for_selector("body[data-look=waiting]")  # for the live sensor of a real patient
+    page.wait_for_selector("body[data-look=ready]")
+    expect(page.locator("[data-change=start]")).to_be_hidden()  # until a live sensor is there
     before, now = query(
         server,
         "SELECT valence, goal, target_of FROM (SELECT valence, goal, plan ->> 'target' AS "

@@ -80,8 +80,8 @@ def test_the_one_number_is_earned_and_shames_nobody(world, patient, valence, bef
         walk(patient, valence, before, days_ago=7)
     words = read(world, walk(patient, valence, walked))
     assert said in words
-    assert "Goodbye," in words
-    assert "−" not in words.split("Goodbye")[0]
+    assert "Thank you, " in words
+    assert "−" not in words.split("Thank you")[0]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from playwright.sync_api import Page, ViewportSize
 from websockets.sync.client import connect
 
 from tests.support.browsers import SIZES, chromium
+from tests.support.patient_page import start
 from tests.support.servers import ROOT, Server, serve
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -41,6 +42,10 @@ class Screens:
     def tap(self, button: str) -> None:
         """Tap a button on the first screen."""
         next(iter(self.pages.values())).click(button)
+
+    def start(self, server: Server, walk: Walk) -> None:
+        """Tap Start on the first screen, while a sensor is there."""
+        start(next(iter(self.pages.values())), server, walk)
 
     def tap_all(self, button: str) -> None:
         """Tap a button on every screen."""
@@ -98,8 +103,9 @@ def test_pictures_in_the_largest_words_of_two_languages(server: Server, stack: E
     for language, walk in zip(languages, walks, strict=True):
         screens.show(walk)
         screens.take(f"{language}-ready", "ready")
-        screens.tap("[data-change=start]")
         with feet_of(server, walk) as feet:
+            screens.tap("[data-change=start]")
+            feet.hear("start")
             feet.walk(*PAST, 0.83)
             screens.take(f"{language}-miss", "feedback")
         screens.take(f"{language}-lost", "lost")
@@ -131,7 +137,7 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
             screens.tap_all("button.out")
             screens.take("leave", "ready")
             screens.tap_all("text=Stay here")
-        screens.tap("text=Start")
+        screens.start(server, walk)
         if valence == "positive":
             screens.take("waiting", "waiting")
         with feet_of(server, walk) as feet:
@@ -157,16 +163,18 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
         screens.take("ask", "ask")
     for side, walk in {"left": left, "center": center, "largest": large}.items():
         screens.show(walk)
-        screens.tap("text=Start")
         with feet_of(server, walk) as feet:
+            screens.tap("text=Start")
+            feet.hear("start")
             feet.walk(*PAST, 1.12)
             screens.take(f"side-{side}", "feedback", BURST_MS)
     screens.show(calm)
-    screens.tap("text=Start")
     url = f"ws://127.0.0.1:{server.port}/ws/robot/"
     header = {"Authorization": f"Bearer {calm.robot}"}
     with feet_of(server, calm) as feet, connect(url, additional_headers=header) as robot:
         robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        screens.tap("text=Start")
+        feet.hear("start")
         feet.walk(*[1.0] * 12)
         screens.take("calm-with-robot", "calm")
         screens.tap("text=Stop robot")

@@ -10,7 +10,7 @@ from playwright.sync_api import TimeoutError as PlaywrightTimeout
 
 from tests.support.browsers import SIZES
 from tests.support.servers import Server
-from tests.support.walk_seed import Walk
+from tests.support.walk_seed import Walk, feet_of
 
 # What is on the page, in one word: the same after a reload, and on a second tablet.
 DIGEST = """() => ({
@@ -31,6 +31,13 @@ def open_page(context: BrowserContext, walk: Walk, size: str = "tablet-portrait"
     page.set_viewport_size({"width": width, "height": height})
     page.goto(walk.path)
     return page
+
+
+def start(page: Page, server: Server, walk: Walk) -> None:
+    """Tap Start, which is there while a sensor is; the sensor goes again."""
+    with feet_of(server, walk):
+        page.click("[data-change=start]")
+        page.wait_for_selector("body:not([data-look=ready])")
 
 
 def until_step(page: Page, number: int) -> None:

@@ -146,7 +146,7 @@ class BoardViewer:
         period = period_of(board, self.now)
         mine = TrainingSession.everywhere.filter(patient=patient)
         sessions = read_sessions(board, mine, period)
-        results = own_results(board, sessions, self.valence, period)
+        results = own_results(board, sessions, self.valence)
         standings = Standings(results, board.ties)
         if board.aggregation == Aggregation.SUM:
             own = format_rows(board, find_visible_rows(neighbors, standings, None))

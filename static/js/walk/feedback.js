@@ -3,7 +3,7 @@
 import { signed } from "garry/shared/format";
 import { _, fill, number as format } from "garry/shared/language";
 import { isStill } from "garry/walk/reduced_motion";
-import { describeStep, describeSummary, messageFor, phaseLeft, timeLeft } from "garry/walk/text";
+import { describeStep, describeSummary, messageFor, phaseLeft, phraseOf, timeLeft } from "garry/walk/text";
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
 const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };
@@ -41,11 +41,9 @@ export function createFeedback(body) {
 
   function drawStep(session) {
     const step = session.last;
-    const missing = step?.kind === "missing";
-    const text = missing ? _("Step not measured.") : (step?.words ?? "");
-    setPhrase(text);
-    emblem.dataset.emblem = missing ? "none" : (step?.emblem ?? "");
-    const sign = step?.points ? signed(step.points) : step?.points === 0 ? "0" : "";
+    setPhrase(phraseOf(step));
+    emblem.dataset.emblem = step?.kind === "missing" ? "none" : (step?.emblem ?? "");
+    const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
     if (step && step.number !== drawnNumber && !isStill())
@@ -60,6 +58,7 @@ export function createFeedback(body) {
     const text = has_points ? format(score) : typeof last?.shown === "number" ? format(last.shown, 2) : "—";
     const before = shownScore;
     shownScore = score;
+    key.toggleAttribute("data-lost", has_points && score < 0);
     if (set(key, text) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }

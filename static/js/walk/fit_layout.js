@@ -1,112 +1,148 @@
 // The words and the number keep the size that was promised: in degrees, as the patient sees them. What does not fit
-// beside them goes, in this order: the chart of strides, the emblem, the scene. Only where even words and number alone
-// are too large for the screen they become smaller; the page then says by how much (`data-short`). On a screen that
-// nobody measured no size is promised: the thermometer, which says most, stays there if that costs at most a quarter.
+// beside them goes, in this order: the chart of strides, the badge, the thermometer, each only if that makes the words
+// larger. On a screen that nobody measured no size is promised: the thermometer, which says most, stays there if that
+// costs at most a quarter. Where words are smaller than promised the page says by how much (`data-short`).
+//
+// One frame holds for all steps: it follows from the longest phrases and a number of as many digits, so that goal,
+// thermometer, badge and total stay where they are. Heights are in units, --u (walk.css).
 
 const CHART = 1;
-const EMBLEM = 2;
-const LEVELS = [0, CHART, EMBLEM, 3];
+const BADGE = 2;
+const LAST = 3;
 const WORTH = 0.75; // of the words' size: so much the thermometer may cost where no size is promised
+const ENOUGH = 0.99; // of the largest size that is possible
 const LEAST = 0.1; // of the promised size
-const HALVINGS = 9; // of the search for what fits
+const HALVINGS = 8; // of the search for what fits
+
+const EDGE = 24; // of the screen
+const AIR = 16; // between words and goal line, goal line and badge
+const CHART_REACH = 96; // of the strides above and below the goal line
+const BADGE_LEAST = 170;
+const BESIDE_CHART = 240; // the least badge: sooner the chart goes
+const NARROW = 600; // the total has no room beside the thermometer: it is below
+const SCALE_LEAST = 260; // of the thermometer
+const SCALE_TOP = 150; // from the screen's top, where words stand beside it
+const SPARKS = 76; // above the scale, where words stand over it
+const FOOT = 172; // below the scale: the bulb
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
 
+// Return how much goes, by the largest size of words at each level.
+export function chooseLevel(size, isMeasured, isColumn) {
+  const worth = (level) => (isMeasured || level < (isColumn ? CHART : BADGE) ? ENOUGH : WORTH);
+  let level = isColumn ? CHART : 0;
+  while (level < LAST && size(level) < 1 && size(level) < worth(level) * size(LAST)) level++;
+  return level;
+}
+
 export function createFitting(body, scene) {
   const find = (selector) => body.querySelector(selector);
-  const [stage, phrase, words, count, key] = [".stage", ".phrase", ".words", ".count", ".key"].map(find);
+  const [stage, main, phrase, words, count, key] = [".stage", "main", ".phrase", ".words", ".count", ".key"].map(find);
+  const feet = body.querySelectorAll(".part, .actions");
+  const landscape = matchMedia("(orientation: landscape)");
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
-  let fitted = "";
+  let [fitted, widest] = ["", ""];
 
-  // By its parts' lines: letters reach beyond theirs at any size.
-  function overflows(box) {
-    const parts = [...box.children].filter((part) => part.offsetHeight);
-    if (!parts.length) return false;
+  const unit = () => parseFloat(getComputedStyle(main).right) / EDGE; // walk.css
+  const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
+
+  // Return whether a message fits between header and buttons. By its parts' lines: letters reach beyond theirs.
+  function holdsMessage() {
+    const parts = [...phrase.children].filter((part) => part.offsetHeight);
     const [first, last] = [parts[0], parts.at(-1)];
-    const isHigh = last.offsetTop + last.offsetHeight - first.offsetTop > box.clientHeight + 1;
-    return isHigh || parts.some((part) => part.scrollWidth > box.clientWidth + 1);
+    const high = last ? last.offsetTop + last.offsetHeight - first.offsetTop : 0;
+    return high <= phrase.clientHeight + 1 && !parts.some(isTooWide);
   }
 
-  function tooLarge(samples, number) {
-    const [was, had] = [[...words.childNodes], key.textContent];
+  // Return the frame that holds each of the samples and the number; null if none does.
+  function frameOf(level, samples, number) {
+    const was = [words.firstChild, key.textContent, key.dataset.lost];
     key.textContent = number;
-    if (number) measureSky(samples);
-    const bottom = count.offsetTop + count.offsetHeight;
-    let isTooLarge = Boolean(number) && (overflows(count) || bottom > count.parentElement.clientHeight + 1);
-    for (const sample of samples) {
-      if (isTooLarge) break;
-      words.textContent = sample;
-      isTooLarge = overflows(phrase);
-    }
-    words.replaceChildren(...was);
-    key.textContent = had;
-    return isTooLarge;
-  }
-
-  // The phrase's row becomes as high as its longest sample, so that the scene gets all that is left. Return between
-  // which heights the horizon may lie, in shares of the stage.
-  function measureSky(samples) {
-    const was = [...words.childNodes];
-    let height = 0;
+    delete key.dataset.lost;
+    let [isTooLarge, high] = [isTooWide(key), 0];
     for (const sample of samples) {
       words.textContent = sample;
-      height = Math.max(height, words.offsetHeight);
+      isTooLarge ||= isTooWide(words);
+      high = Math.max(high, words.offsetHeight);
     }
-    words.replaceChildren(...was);
-    body.style.setProperty("--phrase", `${height}px`);
-    const { top, height: whole } = stage.getBoundingClientRect();
-    const label = [...count.children].find((part) => part.offsetHeight) ?? count;
-    const ends = [phrase.getBoundingClientRect().bottom, label.getBoundingClientRect().top];
-    return ends.map((end) => (end - top) / whole);
+    const u = unit();
+    const total = count.offsetHeight / u;
+    words.replaceChildren(...[was[0]].filter(Boolean));
+    key.textContent = was[1];
+    if (was[2] !== undefined) key.dataset.lost = was[2];
+    if (isTooLarge) return null;
+
+    const { column } = body.dataset;
+    const isWide = landscape.matches && !column;
+    const isRow = landscape.matches && (!column || column === "center"); // the badge is beside the total
+    const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
+    const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
+    const stand = bottom - (width < NARROW ? total : 0);
+    const zero = stand - FOOT;
+    const reach = level < CHART ? CHART_REACH : 0;
+    if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
+    const top = Math.max(isWide ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
+    const goal = zero - (2 / 3) * (zero - top);
+    const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
+    const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
+    if (zero - top < SCALE_LEAST || ground > stand) return null;
+    return { width, height, isWide, top, zero, goal, reach, below: goal + reach + AIR - main.offsetTop / u };
   }
 
-  function set(drop, short) {
-    body.style.removeProperty("--phrase");
-    body.dataset.drop = drop;
+  function set(level, short) {
+    body.dataset.drop = level;
     if (short < 1) body.dataset.short = short.toFixed(4);
     else delete body.dataset.short;
     body.style.setProperty("--short", short);
   }
 
-  // Choose the layout for all that this screen may say: of feedback its longest phrases, so that it stays as it is
-  // from step to step.
-  return function fit(screen, session) {
+  // Return the largest size of words, in shares of the promised one, at which a layout holds all.
+  function largest(level, holds) {
+    set(level, 1);
+    if (holds(level)) return 1;
+    let [fits, not] = [LEAST, 1];
+    for (let i = 0; i < HALVINGS; i++) {
+      const short = (fits + not) / 2;
+      set(level, short);
+      if (holds(level)) fits = short;
+      else not = short;
+    }
+    return fits;
+  }
+
+  // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
+  return function fit(screen, { phrases: samples, number: usual }) {
     const isFeedback = screen === "feedback";
-    const samples = isFeedback && session.words_shown !== false ? (session.longest ?? []) : [];
-    const number = isFeedback ? key.textContent.replace(/\d/g, "8").padStart(3, "8") : "";
-    const told = isFeedback ? "" : find(".phrase").textContent;
+    const shown = key.textContent.replace("−", "").replace(/\d/g, "8");
+    widest = [usual, shown].reduce((a, b) => (b.length > a.length ? b : a), widest);
+    const number = isFeedback ? widest : "";
+    const said = isFeedback ? samples : [phrase.textContent];
     const { text, column, side } = body.dataset;
     const degree = body.style.getPropertyValue("--degree");
-    const wanted = [screen, samples, number, told, text, column, side, innerWidth, innerHeight, degree].join("|");
+    const { status } = document.fonts;
+    const wanted = [screen, said, number, text, column, side, innerWidth, innerHeight, degree, status].join("|");
     if (wanted === fitted) return;
     fitted = wanted;
-    const shown = [...samples, words.textContent];
-    const levels = isFeedback ? LEVELS.slice(column === "center" ? CHART : 0) : [0, CHART];
-    let level;
-    let fits = LEAST;
-    for (level of levels) {
-      set(level, 1);
-      if (!tooLarge(shown, number)) break;
-      if (level !== EMBLEM && !(level && column)) continue;
-      if (body.dataset.pxPerMm) continue;
-      set(level, WORTH);
-      if (tooLarge(shown, number)) continue;
-      fits = WORTH;
-      break;
+
+    if (!isFeedback) {
+      set(0, largest(0, holdsMessage));
+      const foot = Math.max(...[...feet].map((one) => one.offsetHeight));
+      const below = foot ? foot / unit() + 36 + EDGE : 64;
+      body.style.setProperty("--floor", `${stage.clientHeight - below * unit()}px`);
+      return;
     }
-    set(level, 1);
-    if (tooLarge(shown, number)) {
-      let not = 1;
-      for (let i = 0; i < HALVINGS; i++) {
-        const short = (fits + not) / 2;
-        set(level, short);
-        if (tooLarge(shown, number)) not = short;
-        else fits = short;
-      }
-      set(level, fits);
-    }
-    scene.layOut(level, isFeedback && level ? measureSky(shown) : null);
+    const frame = (level) => frameOf(level, samples, number);
+    const sizes = [];
+    const size = (level) => (sizes[level] ??= largest(level, frame));
+    const level = chooseLevel(size, Boolean(body.dataset.pxPerMm), Boolean(column));
+    set(level, size(level));
+    const found = frame(level);
+    if (!found) return; // a screen so small that nothing fits
+    body.style.setProperty("--floor", `${found.goal * unit()}px`);
+    if (level === LAST) return;
+    body.style.setProperty("--above", `${found.below * unit()}px`);
+    scene.layOut({ ...found, isFlipped: side === "left" });
   };
 }

@@ -78,10 +78,26 @@ export function phaseLeft({ phase, phase_s, phase_strides }) {
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
 }
 
+const NOT_MEASURED = _("Step not measured.");
+
+// Return the words after a step; without points they are the goal, beside which the value stands.
+export function phraseOf(step) {
+  if (step?.kind === "missing") return NOT_MEASURED;
+  if (typeof step?.goal !== "number") return step?.words ?? "";
+  return step.words || fill(_("The goal is %(goal)s."), { goal: number(step.goal, 2) });
+}
+
+// Return the longest phrases that may follow a step, and a number as wide as most.
+export function samplesOf(session) {
+  const phrases = [NOT_MEASURED];
+  if (session?.words_shown !== false) phrases.push(phraseOf({ goal: 8.88 }), ...(session?.longest ?? []));
+  return { phrases, number: session?.has_points === false ? number(8.88, 2) : "888" };
+}
+
 // Return one line for screen readers: "Well above. Plus 2. 128 points."
 export function describeStep(step, session) {
-  if (step.kind === "missing") return _("Step not measured.");
-  const words = step.words && step.words.replace(/[!.]*$/, ".");
+  const words = phraseOf(step).replace(/[!.]*$/, ".");
+  if (step.kind === "missing") return words;
   if (step.points === null)
     return [words, step.shown !== null && `${number(step.shown, 2)} ${session.unit}.`].filter(Boolean).join(" ");
   const change =

@@ -10,6 +10,7 @@ import { connect } from "garry/shared/session_socket";
 import { createScene } from "garry/walk/scene";
 import { applyEvent, fromSnapshot, screenOf } from "garry/walk/state";
 import { createSounds } from "garry/walk/sounds";
+import { samplesOf } from "garry/walk/text";
 
 const WATCH_MS = 250; // silence sends no event
 const STILL_MS = 4_000; // after so long without a step the last one is no longer shown as current
@@ -90,7 +91,7 @@ function draw() {
   drawFeedback(screen, session, page);
   if (session) showRobot(session);
   if (hasChanged) keepFocus();
-  fit(screen, session);
+  fit(screen, samplesOf(session));
   if (screen === "feedback") {
     const { last, steps } = session;
     scene.show({
@@ -121,6 +122,7 @@ function watchServer() {
 setInterval(watchServer, WATCH_MS);
 
 addEventListener("resize", redraw); // words fit another place
+document.fonts.ready.then(redraw);
 redraw();
 if (!isMirror) {
   keepAwake();
