@@ -72,13 +72,19 @@ class Case:
     @property
     def goals(self) -> str:
         """How the goal went over the newest sessions of the present measure, as text."""
-        goals = [walk.goal for walk in same_measure(self.walks) if walk.goal is not None]
-        if not goals:
-            return ""
-        shown = [format_number(goal) for goal in reversed(goals)]
+        shown = [format_number(goal) for goal in reversed(self._compared)]
         kept = [goal for place, goal in enumerate(shown) if not place or shown[place - 1] != goal]
-        way = ("", " ↑", " ↓")[(goals[0] > goals[-1]) - (goals[0] < goals[-1])]
-        return f"{' → '.join(kept)} {self.walks[0].unit}{way}"
+        return f"{' → '.join(kept)} {self.walks[0].unit}" if kept else ""
+
+    @property
+    def way(self) -> str:
+        """Whether the goal rose or fell over them, as a sign."""
+        newest, *_others, oldest = self._compared * 2 or (0, 0)
+        return ("", "▲", "▼")[(newest > oldest) - (newest < oldest)]
+
+    @property
+    def _compared(self) -> list[float]:
+        return [walk.goal for walk in same_measure(self.walks) if walk.goal is not None]
 
 
 def same_measure(walks: Sequence[Walk]) -> list[Walk]:
@@ -157,7 +163,7 @@ def load_caseload(user: User, now: datetime) -> list[Case]:
 
 def _to_case(patient: Patient, walks: Sequence[Walk], visits: Sequence[Visit], today: date) -> Case:
     last = walks[0].day if walks else date.min
-    coming = next((visit for visit in visits if visit.day >= today), None)
+    coming = next((v for v in visits if v.day >= today and v.day > last), None)
     missed = next((v.day for v in reversed(visits) if last < v.day < today), None)
     return Case(
         patient,

@@ -124,7 +124,7 @@ class Course:
         return text
 
     @property
-    def spark(self) -> str:
+    def spark(self) -> list[str]:
         """The points of its line in a drawing of the size `SPARK`, better results higher."""
         values = [one.value for one in self.results]
         low, high = min(values, default=0.0), max(values, default=0.0)
@@ -136,7 +136,7 @@ class Course:
             share = share if self.test.higher_is_better else 1 - share
             x = 4 + place * (width - 8) / max(1, len(values) - 1)
             points.append(f"{x:.1f},{4 + (1 - share) * (height - 8):.1f}")
-        return " ".join(points)
+        return points
 
 
 def format_result(test: ClinicalTest, value: float) -> str:

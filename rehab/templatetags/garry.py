@@ -34,6 +34,17 @@ def icon(name: str) -> SafeString:
 
 
 @register.simple_tag
+def back(view: str, *args: object) -> SafeString:
+    """Return the button, first in a page's heading, that leads to the page above it."""
+    return format_html(
+        '<a class="btn" href="{}" aria-label="{}">{}</a>',
+        reverse(view, args=args),
+        _("Back"),
+        icon("back"),
+    )
+
+
+@register.simple_tag
 def wire_limits() -> SafeString:
     """Return what a page's scripts have to know of the wire, as the JSON element ``wire``."""
     limits = {

@@ -59,6 +59,7 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
         feet.walk(0.9, 1.1, 1.0, 0.8, 1.2, 1.0, None, 1.3)
         page.click("[data-goal='1']")
         page.click("[data-remark=pain]")
+        page.click("dialog[open] button[value='3']")
         feet.walk(1.1)
         expect(page.locator("[data-show=number]")).to_contain_text("9")
         yield page
@@ -137,6 +138,9 @@ def test_nothing_is_cut_or_too_small(monitor: Page, screen: str) -> None:
     if screen in LAPTOPS:
         assert cut(monitor, ".panels, .controls, .side") == []
         assert complaints(monitor, ".panels .card", 44) == []
+        monitor.click(".controls summary")
+        assert cut(monitor, ".controls, .controls .card") == []
+        monitor.click(".controls summary")
         monitor.evaluate("document.querySelector('.coach').hidden = false")
         assert complaints(monitor, ".panels .card, .remarks button", 44) == []
     if screen != "phone":

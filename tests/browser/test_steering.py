@@ -60,6 +60,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
     with pages(browser, server, walk, where) as (tablet, monitor), feet_of(server, walk) as feet:
         words, emblem = tablet.locator(".words"), tablet.locator(".emblem svg")
         monitor.locator("[data-main]").click()
+        monitor.locator(".controls summary").click()
         feet.hear("start")
         feet.walk(1.0)
         at_step(tablet, 1)

@@ -6,8 +6,9 @@ from datetime import date, timedelta
 
 import pytest
 
-from rehab.patients.caseload import Walk, judge, load_caseload
+from rehab.patients.caseload import Case, Walk, judge, load_caseload
 from rehab.patients.visits import Visit, plan_visit
+from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
@@ -44,6 +45,20 @@ def walks(*goals, days_ago=1, higher=True, measure=1):
 )
 def test_flags(newest_first, next_day, missed, flags):
     assert list(judge(newest_first, next_day, missed, TODAY)) == flags
+
+
+@pytest.mark.parametrize(
+    ("newest_first", "told"),
+    [
+        ([], ("", "")),
+        ([2.5, 2.0, 2.0], ("2.00 → 2.50 W/kg", "▲")),
+        ([2.0, 2.0], ("2.00 W/kg", "")),
+        ([1.5, 2.0], ("2.00 → 1.50 W/kg", "▼")),
+    ],
+)
+def test_how_the_goal_went(newest_first, told):
+    case = Case(Patient(), walks(*newest_first), 0, None, None, ())
+    assert (case.goals, case.way) == told
 
 
 @pytest.mark.django_db

@@ -7,6 +7,7 @@ from datetime import UTC, datetime, time, timedelta
 import pytest
 from django.utils import timezone
 
+from rehab.patients.caseload import load_caseload
 from rehab.patients.visits import Progress, Visit, patients_today, plan_visit, suggested_time
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
@@ -48,6 +49,20 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
         ("Cleo", time(9, 0), Progress.DONE),
     ]
     assert listed[-1].walked_s == pytest.approx(130, abs=3)
+
+
+def test_who_was_here_today_is_next_expected_another_day(world, pt):
+    cleo = world.add_patient("Cleo")
+    plan_visit(cleo, HERE.date(), time(9, 0))
+    page = f"/patients/{cleo.pk}/"
+    assert "Start training" in (before := pt.get(page).content.decode())
+    assert "Remove the visit of" in before
+    walk(cleo, "positive", [HIT] * 130)
+    later = plan_visit(cleo, HERE.date() + timedelta(7), time(9, 0))
+    assert "Train again today" in (after := pt.get(page).content.decode())
+    assert after.count("Remove the visit of") == 1
+    (case,) = [one for one in load_caseload(world.people[Role.PT], HERE) if one.patient == cleo]
+    assert case.next_visit == later
 
 
 def test_a_day_is_the_clinics_own(world):

@@ -44,7 +44,9 @@ def seen(client: Client, name: str = "alarms", **query: Any) -> str:
 def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, world, session):
     note(session, "fall")
     pt = client_of(world)
-    assert "Iris fell." in seen(pt)
+    told = seen(pt)
+    assert "Iris fell." in told
+    assert "Finished" in told
     assert "Iris" not in seen(pt, but=session.pk)
     assert "Iris" not in seen(pt, station=world.session.station_id or 0)  # it was at none
     assert "Iris" not in seen(client_of(build_world("oak")))

@@ -71,7 +71,7 @@ def test_a_course_leaves_out_what_was_struck_out(world):
     client.post(f"/patients/{world.patient.pk}/tests/strike-out/", {"result": wrong.pk})
     (course,) = [c for c in load_courses(world.people[Role.PT], world.patient) if c.results]
     assert (course.summary, course.verdict) == ("28.0 s, at first 31.0 s", 1)
-    assert course.spark == "4.0,28.0 116.0,4.0"
+    assert course.spark == ["4.0,28.0", "116.0,4.0"]
     wrong.refresh_from_db()
     assert wrong.struck_at is not None
     for address, said in (("sessions", "28.0 s, at first 31.0 s"), ("tests", "at first 31.0 s")):

@@ -76,7 +76,7 @@ def test_the_change_stands_in_the_registered_document_on_paper_and_as_data(world
     [change] = data["outcome_changes"]
     assert (change["version"], change["looks_before"]) == (2, 1)
     page = client.get(reverse("study", args=[study.pk])).content.decode()
-    assert "primary outcome: Change in washout" in " ".join(page.split())
+    assert "<dt>Primary outcome</dt> <dd>Change in washout</dd>" in " ".join(page.split())
     assert "after 3 participants and 1 look" in page
 
 

@@ -322,7 +322,7 @@ def test_groups_are_told_once_the_study_is_closed(world):
     study = running_study(world)
     enrolled(study, new_patient(world))
     lead, url = client_of(world, Role.LEAD), reverse("study", args=[study.pk])
-    row = rf"<td>\s*{study.enrollments.get().allocation.group}\s*</td>"
+    row = rf"<td[^>]*>\s*{study.enrollments.get().allocation.group}\s*</td>"
     assert not re.search(row, text_of(lead.get(url)))
     close(study, None, NOW)
     assert re.search(row, text_of(lead.get(url)))

@@ -114,11 +114,17 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     lists = start_context(user)
     today = lists["now"].date()
     visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
+    was_here = any(
+        row.patient == patient and row.progress is Progress.DONE for row in lists["today"]
+    )
+    if was_here:
+        visits = visits.exclude(day=today)
     context = lists | begin_context(user, patient)
     context |= {
         "patient": patient,
         "open_here": open_sessions(user).filter(patient=patient),
         "visits": visits,
+        "was_here": was_here,
         "soon": [
             (days, today + timedelta(days=days))
             for days in QUICK_VISIT_DAYS

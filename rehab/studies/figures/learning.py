@@ -11,7 +11,7 @@ from rehab.studies.analysis.curves import Point
 from rehab.studies.figures.canvas import COLORS, LEFT, MUTED, QUIET, RIGHT, Canvas
 
 WIDTH, PANEL = 1000.0, 160.0  # a panel for each arm, its name above it
-HEAD, NAME, BOTTOM, BETWEEN = 30.0, 34.0, 54.0, 18.0
+HEAD, NAME, BOTTOM, BETWEEN = 78.0, 34.0, 36.0, 18.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ def draw_curves(
     seen = [value for point in everything for value in (point.mean, point.low, point.high) if value]
     levels = round_steps(min(*seen, 95.0), max(*seen, 105.0))
     places = _lay_out(everything, words)
-    _name_ground(canvas, places, phases, height - BOTTOM + 18)
+    _name_ground(canvas, places, phases)
     canvas.words(WIDTH - RIGHT, HEAD + NAME - 10, words.y_axis, size=14, anchor="end", color=MUTED)
     canvas.words(WIDTH - RIGHT, height - 10, words.x_axis, size=14, anchor="end", color=MUTED)
     for arm, (code, points) in enumerate(curves.items()):
@@ -121,16 +121,18 @@ def _draw_ground(canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], 
             canvas.rect(x, top, bins * places.step, PANEL, fill=QUIET)
 
 
-def _name_ground(
-    canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], foot: float
-) -> None:
-    """Name visits above all panels, and below them the phases that are wide enough."""
+def _name_ground(canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel]) -> None:
+    """Name visits above all panels, and their phases on as many lines as keep them apart."""
+    ends = [0.0, 0.0, 0.0]  # of the last name on each line
     for (visit, phase), (x, bins) in places.starts.items():
-        name, wide = phases[phase].name, bins * places.step
-        if wide > 7.6 * len(name):
-            canvas.words(x + wide / 2, foot, name, size=13, anchor="middle", color=MUTED)
+        name, middle = phases[phase].name, x + bins * places.step / 2
+        half = 3.8 * len(name)
+        line = next((line for line, end in enumerate(ends) if end < middle - half), 2)
+        ends[line] = middle + half
+        foot = HEAD - 42 + 14 * line
+        canvas.words(middle, foot, name, size=13, anchor="middle", color=MUTED)
         if phase == 0 and len(places.visits) > 1:
-            canvas.words(x, HEAD - 8, places.visits[visit], weight="700")
+            canvas.words(x, HEAD - 60, places.visits[visit], weight="700")
 
 
 def _runs(points: Sequence[Point]) -> list[list[Point]]:

@@ -115,7 +115,10 @@ def _describe(results: Results, slug: str) -> dict[str, Any]:
                 "difference": _format_interval(one.difference, unit),
                 "effect": _format_interval(one.effect, ""),
                 "p": _format_p(one.p),
-                "p_holm": _format_p(results.adjusted_p.get((slug, one.group, one.reference))),
+                "p_holm": _format_p(
+                    adjusted := results.adjusted_p.get((slug, one.group, one.reference))
+                ),
+                "is_found": bool(adjusted is not None and adjusted < (results.level or 0)),
                 "per_protocol": _of_protocol(found, one, unit),
                 "missing": one.missing and sum(one.missing.visits),
                 "tipping_point": _tipping_point(results.tipping_point(slug, one), unit),

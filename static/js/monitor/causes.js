@@ -7,7 +7,7 @@
 //   isCalm                    no alarm: it is told, and makes no sound
 
 import { _, fill } from "garry/shared/language";
-import { clock } from "garry/shared/format";
+import { clock, minutesAgo } from "garry/shared/format";
 import { doubtCure, reasonName, wornCure } from "garry/shared/labels";
 import { SILENT_S, hasStarted } from "garry/monitor/state";
 import { describeReason } from "garry/monitor/robot_text";
@@ -41,9 +41,16 @@ function describeServer({ number }, { socket }) {
   return `${fill(text, values)} ${_("To stop the robot, use its own switch.")}`;
 }
 
-function describeFall(session) {
+function describeFall(session, { robot }) {
   const alarm = alarmOf(session, "fall");
-  return alarm ? fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) }) : "";
+  if (!alarm) return "";
+  const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
+  const facts = [
+    minutesAgo(alarm.at),
+    session.state === "paused" && _("Paused"),
+    robot.isStopped && _("Robot stopped"),
+  ];
+  return `${fell}\n${facts.filter(Boolean).join(" · ")}`;
 }
 
 function describeOwnStop(session, { robot }) {

@@ -1,16 +1,11 @@
 // How well sensor, tablet and robot are heard, in text and a sign before it: ✓ well, ! needs a look, – not there.
 
 import { _, fill } from "garry/shared/language";
+import { ago } from "garry/shared/format";
 import { SILENT_S } from "garry/monitor/state";
 
 const ENOUGH = 0.8; // valid strides among the last 20; fewer and the goal is met by chance
 const LAST = 20;
-
-function ago(seconds) {
-  if (seconds < 1.5) return _("now");
-  if (seconds < 90) return fill(_("%(count)s s ago"), { count: Math.round(seconds) });
-  return fill(_("%(count)s min ago"), { count: Math.round(seconds / 60) });
-}
 
 const describeSilence = (silent_s) => ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];
 

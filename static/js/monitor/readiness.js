@@ -34,8 +34,8 @@ export function createReadiness(robot) {
       list.dataset.of = written;
       const items = checks.map(([sign, text, cure]) => {
         const item = document.createElement("li");
-        item.className = "row wrap";
-        item.classList.toggle("low", sign === "!");
+        item.className = "badge";
+        item.classList.toggle("warn", sign === "!");
         item.append(cure ? openBeside(cure, `${sign} ${text}`) : `${sign} ${text}`);
         return item;
       });

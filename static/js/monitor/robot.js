@@ -47,7 +47,7 @@ export class RobotPanel {
   #root;
   #trail = [];
   #isConnected = false;
-  #isStopped = false;
+  isStopped = false;
   #status = null;
   #decision = null;
   #breakReason = ""; // why the gesture after that decision did not end as it should
@@ -71,7 +71,7 @@ export class RobotPanel {
     this.#status = robot?.status ?? null;
     this.#decision = robot?.decision ?? null;
     this.#breakReason = "";
-    this.#isStopped = stopped ?? false;
+    this.isStopped = stopped ?? false;
     this.#isConnected = presence?.robot ?? false;
     this.#orderFailure = "";
     this.#settleOrder();
@@ -80,7 +80,7 @@ export class RobotPanel {
 
   handleEvent(event) {
     if (event.kind === "robot_stopped") {
-      this.#isStopped = event.stopped;
+      this.isStopped = event.stopped;
       this.#orderFailure = "";
       this.#settleOrder();
     }
@@ -145,7 +145,7 @@ export class RobotPanel {
   }
 
   #settleOrder() {
-    if (this.#pendingOrder && this.#isStopped === (this.#pendingOrder === "stop")) this.#forgetOrder();
+    if (this.#pendingOrder && this.isStopped === (this.#pendingOrder === "stop")) this.#forgetOrder();
   }
 
   #forgetOrder() {
@@ -161,8 +161,8 @@ export class RobotPanel {
   draw() {
     const { show } = this.#page;
     show("robot-state", this.#describeState());
-    show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
-    this.#button("stop").classList.toggle("done", this.#isStopped);
+    show("robot-stop", this.isStopped ? _("Robot stopped") : _("Stop robot"));
+    this.#button("stop").classList.toggle("done", this.isStopped);
     this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
     show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
     if (!this.#placing.isHeld) this.#drawWords(); // a button that is held stays under its finger
@@ -198,7 +198,7 @@ export class RobotPanel {
   // Whether a person may drive it to its mark: a real one that may move, while nobody walks.
   get #isPlaceable() {
     const { simulated, state } = this.#status ?? {};
-    const isFree = this.#isConnected && simulated === false && !this.#isStopped;
+    const isFree = this.#isConnected && simulated === false && !this.isStopped;
     const isReady = isFree && (state === "away" || !this.#isHeld);
     return isReady && this.#page.state.session?.state !== "running";
   }
@@ -206,18 +206,18 @@ export class RobotPanel {
   // Whether it drove home by its tag, and waits for a person to look.
   get #isBack() {
     const { homing, state } = this.#status ?? {};
-    return this.#isConnected && !this.#isStopped && homing === "there" && state === "disarmed";
+    return this.#isConnected && !this.isStopped && homing === "there" && state === "disarmed";
   }
 
   // Whether it is simulated and stopped itself: it is put back by itself in a moment.
   get #isRecovering() {
     const { state, reason, simulated } = this.#status ?? {};
-    return !this.#isStopped && simulated === true && state === "stopped" && !BY_PERSON.has(reason);
+    return !this.isStopped && simulated === true && state === "stopped" && !BY_PERSON.has(reason);
   }
 
   // Whether a person has to arm it before it moves.
   get #isHeld() {
-    if (this.#isStopped) return this.#isConnected || this.#page.state.hadRobot;
+    if (this.isStopped) return this.#isConnected || this.#page.state.hadRobot;
     if (this.#isRecovering) return false;
     const { state, reason } = this.#status ?? {};
     return this.#isConnected && (WAITING_STATES.has(state) || reason === "place_unknown");
@@ -225,7 +225,7 @@ export class RobotPanel {
 
   #describeState() {
     if (!this.#isConnected) return _("not connected");
-    if (this.#isStopped) return _("stopped");
+    if (this.isStopped) return _("stopped");
     if (!this.#status) return "";
     const { gesture, state } = this.#status;
     return gesture ? `${describeGesture(gesture)}…` : describeState(state);
@@ -256,7 +256,7 @@ export class RobotPanel {
   // Return why it stands although somebody walks, with the cure; "" where it does not.
   get alarm() {
     if (!this.#isConnected || this.#isRecovering) return "";
-    if (!this.#isStopped && this.#status?.state !== "stopped") return "";
+    if (!this.isStopped && this.#status?.state !== "stopped") return "";
     const why = fill(_("The robot is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
     return [why, this.#cureOf(this.#stopReason)].filter(Boolean).join(" ");
   }
@@ -273,7 +273,7 @@ export class RobotPanel {
 
   // The server remembers why the robot stopped by itself, also where its program was restarted since.
   get #stopReason() {
-    const known = this.#isStopped && this.#page.state.session?.stop_reason;
+    const known = this.isStopped && this.#page.state.session?.stop_reason;
     return known || this.#status?.reason || "stopped";
   }
 

@@ -1,5 +1,7 @@
 // Alarms of other sessions on every page of a therapist: asked for while the page is seen, and acknowledged there.
 
+import { minutesAgo } from "garry/shared/format";
+
 const EVERY_MS = 2_500;
 const place = document.querySelector("[data-alarms]");
 let shown = "";
@@ -13,6 +15,10 @@ async function look() {
       // The token in the forms is another each time.
       const [now, before] = [found, shown].map((text) => text.replace(/<input[^>]*>/g, ""));
       if (answer.ok && now !== before) place.innerHTML = shown = found;
+      for (const since of place.querySelectorAll("[data-since]")) {
+        const text = `(${minutesAgo(since.dataset.since)})`;
+        if (since.textContent !== text) since.textContent = text;
+      }
     } catch {
       // asked again
     }
@@ -27,8 +33,8 @@ place.addEventListener("submit", async (event) => {
   button.disabled = true;
   try {
     const answer = await fetch(form.action, { method: "POST", body: new FormData(form) });
-    // A page that shows the fall itself shows what is now.
-    if (answer.ok) document.querySelector(".open.fell") ? location.reload() : form.remove();
+    // A page that marks who fell shows what is now.
+    if (answer.ok) document.querySelector(".fell") ? location.reload() : form.remove();
   } catch {
     // it stays, and may be tapped again
   }
