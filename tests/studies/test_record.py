@@ -13,7 +13,8 @@ from django.urls import reverse
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
-from rehab.studies.agreements import agree, agreed_version, agreement_rows
+from rehab.studies.agreements import StudyConsent, agree, agreed_version, agreement_rows
+from rehab.studies.enrolling import withdraw_everywhere
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
@@ -22,11 +23,13 @@ from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.lifecycle import close, register, revise
+from rehab.studies.results.harms_and_deviations import OUTSIDE
 from rehab.studies.results.results import read_results
 from rehab.studies.unblinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import draft_study, enrolled, new_patient, running_study
+from tests.support.trials import walk_visit
 from tests.support.world import NOW, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -52,6 +55,9 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     assert rows["WHO", "19"]["answer"] in rows["SPIRIT 2025", "16"]["answer"]
     assert "pocock" in rows["SPIRIT 2025", "28b"]["answer"]
     assert rows["SPIRIT 2025", "30"]["still asked"] == str(ASKED["ethics"])
+    # The sponsor's name, and what it does in the study, are two items (2013: 5b and 5c).
+    assert rows["SPIRIT 2025", "3b"]["still asked"] == str(ASKED["sponsor"])
+    assert str(ASKED["sponsor_role"]) in rows["SPIRIT 2025", "3c"]["still asked"]
     assert rows["CONSORT 2025", "30"]["still asked"] == BY_HAND
     asked = {slug for items in ITEMS.values() for line in items.splitlines() for slug in ASKED
              if slug in line.rpartition("|")[2].split()}  # fmt: skip
@@ -197,6 +203,52 @@ def test_margin_and_looks_stay_as_they_were_once_the_study_runs(world):
             setattr(changed, name, value)
         with pytest.raises(InvalidSetting, match="stay as they were"):
             revise(changed, "A better one.", None, NOW)
+
+
+def test_nobody_is_enrolled_without_a_consent_to_this_very_study(world):
+    study, patient = running_study(world), new_patient(world)
+    for consent in (None, StudyConsent(" ", NOW.date())):
+        with pytest.raises(InvalidSetting, match="consent to this very study"):
+            enrolled(study, patient, consent=consent)
+    with pytest.raises(InvalidSetting, match="later than today"):
+        enrolled(study, patient, consent=StudyConsent("1", NOW.date() + timedelta(days=1)))
+    pt, url = client_of(world, Role.PT), reverse("enroll", args=[study.pk])
+    sent = {"patient": patient.pk, "keep_data": "yes", "takes_part": "yes"}
+    assert "consent to this very study" in pt.post(url, sent).content.decode()
+    assert not study.enrollments.exists()
+    day = NOW.date() - timedelta(days=3)
+    pt.post(url, sent | {"consent_version": "1.2", "consented_on": day.isoformat()})
+    one = study.enrollments.get()
+    assert (one.consent_version, one.consented_on) == ("1.2", day)
+    page = " ".join(pt.get(reverse("participant", args=[one.pk])).content.decode().split())
+    assert f"(text 1.2; noted by {world.people[Role.PT]})" in page
+
+
+def test_who_takes_the_consent_back_leaves_and_the_record_says_so(world):
+    study = running_study(world)
+    back, left, research = (enrolled(study, new_patient(world, n)) for n in range(3))
+    pt = client_of(world, Role.PT)
+    pt.post(reverse("leave-study", args=[back.pk]), {"consent": "back", "reason": "tired"})
+    pt.post(reverse("leave-study", args=[left.pk]), {"reason": "moves"})
+    withdraw_everywhere(research.patient, None, NOW)
+    assert not study.enrollments.filter(withdrawn_at=None).exists()
+    rows = list(agreement_rows(study))
+    taken = [row["study_consent_withdrawn_on"] for row in rows]
+    assert [one is not None for one in taken] == [True, False, True]
+    assert rows[0]["study_consent_version"] == "1.0"
+    with pytest.raises(InvalidSetting, match="has withdrawn"):
+        start_session(back, Place(), None, NOW)
+
+
+@pytest.mark.parametrize(("window", "expected"), [(2, [3]), (3, []), (None, [])])
+def test_a_visit_outside_the_studys_window_is_a_deviation(world, window, expected):
+    study = running_study(world, window_days=window)
+    one = enrolled(study, new_patient(world))
+    walk_visit(one)
+    one.visits.filter(number=1).update(day=NOW.date() - timedelta(days=3))
+    close(study, None, NOW)
+    found = read_results(study, NOW).occurrences
+    assert [row.value for row in found if row.what == OUTSIDE] == expected
 
 
 def test_who_has_not_agreed_to_a_version_that_asks_for_it_does_not_walk(world):

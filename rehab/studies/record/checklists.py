@@ -33,7 +33,7 @@ ITEMS = {
         2 | version and date | version
         3a | who wrote it | contributors
         3b | sponsor, contact | sponsor
-        3c | part of sponsor and funders | sponsor funding
+        3c | part of sponsor and funders | sponsor_role
         3d | committees | committees
         4 | registration | registry
         5 | where protocol and analysis plan are | version plan
@@ -87,7 +87,7 @@ ITEMS = {
         2 | registration | registry
         3 | protocol and analysis plan | version plan
         4 | sharing | exportable sharing
-        5a | funding | funding
+        5a | funding, part of funders | funding sponsor_role
         5b | conflicts of interest | conflicts
         6 | background | background
         7 | objectives | question

@@ -35,7 +35,7 @@ FIRST_A2 = Measure(
     goal_max=15.0,
     first_goal=3.9,
 )
-ANALYSIS = ("margin", "spending", "planned_sd")
+ANALYSIS = ("margin", "spending", "planned_sd", "assumed")
 USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
 
 
@@ -67,6 +67,8 @@ def describe(study: Study) -> dict[str, Any]:
         document["visits"]["days_to_follow_up"] = plan.follow_up_days
         for arm in study.arms.all():
             arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    if study.window_days is not None:
+        document["visits"]["window_days"] = study.window_days
     planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
     document |= {"analysis": planned} if planned else {}
     document |= {"facts": study.facts} if study.facts else {}

@@ -182,6 +182,7 @@ def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Days between visits"), visits["days_between"]),
         (gettext("Days between periods"), visits["days_between_periods"] if crossed else None),
         (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
+        (Study._meta.get_field("window_days").verbose_name, visits.get("window_days")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
         (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
         (gettext("Secondary outcomes (others are exploratory)"), secondary),
