@@ -17,7 +17,6 @@ from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.registration.lifecycle import note
 from rehab.training.measures import InvalidSetting
 
-
 WITHDRAWN = "consent withdrawn"  # of an event: not only left, but took the consent back
 
 

@@ -63,8 +63,8 @@ def enroll(
     ------
     InvalidSetting
         For a patient who is not eligible, has not consented to research and to this study, is in
-        another study or has an open session; for a study that is not running, is full, or has run out of its list; and
-        where ``by`` is an assessor of the study.
+        another study or has an open session; for a study that is not running, is full, or has run
+        out of its list; and where ``by`` is an assessor of the study.
     """
     with transaction.atomic():
         lock(study)  # of two enrolled at once, the second is allocated after the first

@@ -95,6 +95,8 @@ def enroll_and_start(page: Page, study: str) -> str:
     page.goto(study)
     page.click("text=Enroll a patient")
     page.select_option("#id_patient", label="Rosa (R1)")
+    page.fill("#id_consent_version", "1.0")
+    page.fill("#id_consented_on", "2026-11-20")
     page.check("[name=keep_data][value=yes]")
     page.click("button:has-text('Enroll')")
     expect(page.locator("h1")).to_have_text("VAL-001 Rosa")
