@@ -3302,6 +3302,8 @@ class Migration(migrations.Migration):
                             ("steadiness", "Variation about the trend"),
                             ("lag_1", "Memory from stride to stride (lag 1)"),
                             ("invalid_strides", "Invalid strides"),
+                            ("sus", "System usability (SUS)"),
+                            ("tlx", "Workload (NASA-TLX)"),
                             ("10mwt_after", "10-meter walk, comfortable, after training"),
                             ("10mwt_follow_up", "10-meter walk, comfortable, at the follow-up"),
                             ("10mwt_fast_after", "10-meter walk, fast, after training"),

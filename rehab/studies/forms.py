@@ -21,6 +21,7 @@ from rehab.studies.allocation.crossover import crossover_groups
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
 from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
+from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.analysis.sample_size import size_of
 from rehab.studies.arm_forms import save_arms
 from rehab.studies.arms import EARLY_MONTHS
@@ -82,11 +83,11 @@ SECTIONS = (
          "participants"),
     ),
     Section(_("Who may take part"), ("months_since_stroke", "inclusion", "exclusion")),
-    Section(_("Secondary outcomes"), ("secondary_outcomes",), _("none")),
+    Section(_("Secondary outcomes"), ("secondary_outcomes",), _("all others are exploratory")),
     Section(
         _("Days and goal"),
         ("days_between", "window_days", "washout_days", "goal_percent"),
-        _("visits a day apart, goal at 100 % of the baseline"),
+        _("visits a day apart, goal as high as the baseline"),
     ),
     Section(
         _("Allocation"),
@@ -300,17 +301,19 @@ class StudyForm(ClinicForm, AssumedForm):
 
 OF_VISIT, SEVERAL = _("Of each visit’s strides"), _("From visit to visit")
 TESTS = _("Tests by an assessor, after training")
+QUESTIONS = _("Questionnaires, after each visit")
 AT_FOLLOW_UP = _("At the follow-up, once its day is planned")
 
 
 def outcome_choices() -> list[tuple[Promise, list[tuple[str, Any]]]]:
     """Return the outcomes in groups, by what they need."""
     found: dict[Promise, list[tuple[str, Any]]] = {
-        group: [] for group in (OF_VISIT, SEVERAL, TESTS, AT_FOLLOW_UP)
+        group: [] for group in (OF_VISIT, SEVERAL, QUESTIONS, TESTS, AT_FOLLOW_UP)
     }
     for slug, label in OUTCOMES:
         is_test, is_several = slug in CLINICAL_OUTCOMES, slug in SEVERAL_VISITS
         group = TESTS if is_test else SEVERAL if is_several else OF_VISIT
+        group = QUESTIONS if slug in OF_QUESTIONS else group
         found[AT_FOLLOW_UP if needs_follow_up(slug) else group].append((slug, label))
     return list(found.items())
 

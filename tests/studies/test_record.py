@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from datetime import timedelta
 from typing import Any
 
@@ -19,6 +20,7 @@ from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
+from rehab.studies.record.found import find
 from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.facts import ASKED
@@ -63,6 +65,7 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
              if slug in line.rpartition("|")[2].split()}  # fmt: skip
     assert asked == set(ASKED)  # nothing is asked in vain
     study.facts = dict.fromkeys(ASKED, "Zq")
+    study.inclusion = "Hemiparesis after stroke"
     lacking = [row for row in checklist_rows(study, None) if row["still asked"]]
     assert {row["still asked"] for row in lacking} == {BY_HAND}
     rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
@@ -115,6 +118,24 @@ def test_who_is_blinded_is_one_truth_whatever_was_typed(world):
     assert not told()[0]["still asked"]
 
 
+def test_what_a_reviewer_would_still_ask_is_asked(world):
+    study = draft_study(world, planned_sd=10.0, assumed={"difference": 5.0, "dropout": 0.1})
+    study.facts = dict.fromkeys(ASKED, "Zq") | {"blinding": "Assessors, until the study is closed"}
+
+    def asked():
+        found = {(r["list"], r["item"]): r for r in checklist_rows(study, None)}
+        items = (("SPIRIT 2025", "14a"), ("SPIRIT 2025", "19"), ("SPIRIT 2025", "24a"))
+        return [found[item]["still asked"] for item in items]
+
+    who, size, blinded = asked()
+    assert "no criteria are registered" in who
+    assert "20 are planned where the formula asks for 144" in size
+    assert "is not so, no assessor is marked" in blinded
+    study.inclusion, study.participants = "Hemiparesis after stroke", 144
+    study.facts["blinding"] = "Nobody; assessors know the arm, and are not kept from it"
+    assert asked() == ["", "", ""]
+
+
 def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     study = running_study(world)
     enrollment = enrolled(study, new_patient(world))
@@ -126,7 +147,8 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     assert "1 allocated" in consort["22a"]
     assert "fall: A 0 events in 0 of 0 participants (0 visits), B" in consort["27"]
     assert "walked no visit (1 of 1) adds nothing" in consort["21b"]
-    assert "B: 1 never began, 0 left later, 0 removed; 2 visits missed" in consort["22b"]
+    assert "B: 1 never began, 0 left later, 0 removed, 0 took" in consort["22b"]
+    assert "the consent back; 2 visits missed" in consort["22b"]
     assert "Deviations: arm revealed A 0 in 0, B 1 in 1." in consort["24a"]
     assert "with 1 of 20 participants" in consort["23b"]
     assert "last enrollment 2026" in consort["23a"]
@@ -235,6 +257,10 @@ def test_who_takes_the_consent_back_leaves_and_the_record_says_so(world):
     rows = list(agreement_rows(study))
     taken = [row["study_consent_withdrawn_on"] for row in rows]
     assert [one is not None for one in taken] == [True, False, True]
+    close(study, None, NOW)
+    told = find(study, read_results(study, NOW))["losses"]
+    counts = [int(n) for n in re.findall(r"(\d+) took the consent back", told)]
+    assert sum(counts) == 2
     assert rows[0]["study_consent_version"] == "1.0"
     with pytest.raises(InvalidSetting, match="has withdrawn"):
         start_session(back, Place(), None, NOW)

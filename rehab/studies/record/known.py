@@ -118,8 +118,8 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "exportable": EXPORTABLE,
         "confidentiality": "Pseudonyms; exports by roles, logged; erasure on demand.",
         "consents": "Nobody is enrolled without a signed consent to the study, whose version, day "
-        "and recorder are stored; a new version of the study may require another one before the next "
-        "visit; whoever takes it back leaves the study.",
+        "and recorder are stored; a new version of the study may require another one before the "
+        "next visit; whoever takes it back leaves the study.",
     }
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from django.utils.translation import gettext
 
 from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES, FOLLOW_UP
+from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.models import Study
 from rehab.studies.models.protocol import OUTCOMES
 from rehab.training.measures import InvalidSetting
@@ -67,6 +68,12 @@ def _reasons(study: Study, slug: str) -> Iterator[str]:
     visits += slug == "baseline_change" and study.follow_up_days is not None
     if slug in SEVERAL_VISITS and visits < 2:
         yield gettext("needs two visits: plan more of them, or choose another outcome.")
+    without = [a.code for a in arms if a.protocol and slug not in a.protocol.questionnaires]
+    if slug in OF_QUESTIONS and without:
+        yield gettext(
+            "is asked after sessions, and the protocol of arm %(arms)s does not ask it: choose it "
+            "there (Admin › Protocols), or another outcome."
+        ) % {"arms": ", ".join(without)}
     phases = {arm.code: arm.phases() for arm in arms}
     kind = PHASES.get(slug, "")
     without = [code for code, of in phases.items() if all(one.kind != kind for one in of)]

@@ -28,35 +28,43 @@ def assumed_of(study: Study) -> Assumed | None:
     return make_assumed(study.planned_sd, study.margin, study.assumed)
 
 
-def tell_size(study: Study) -> str:
-    """Return how many participants a study's plan needs, and why; "" where that was not said."""
+def size_of_study(study: Study) -> Size | None:
+    """Return how many participants a study's plan needs; None where nothing says so."""
     try:
         assumed, groups = assumed_of(study), study.groups()
     except InvalidSetting:
+        return None
+    return _size(assumed, [(group.weight, len(group.arms)) for group in groups])
+
+
+def tell_size(study: Study) -> str:
+    """Return the same in words, and why; "" where nothing says so."""
+    size = size_of_study(study)
+    assumed = None if size is None else assumed_of(study)
+    if size is None or assumed is None:
         return ""
-    return _tell(assumed, [(group.weight, len(group.arms)) for group in groups])
+    return size_words(assumed, size, walked=len(study.groups()[0].arms))
 
 
 def size_of_document(document: dict[str, Any]) -> str:
-    """Return the same of a registered document."""
+    """Return the words of a registered document."""
     plan = document.get("analysis", {})
-    if "assumed" not in plan:
+    assumed = make_assumed(plan.get("planned_sd"), plan.get("margin"), plan.get("assumed", {}))
+    groups = [(one["weight"], len(one["arms"])) for one in document["allocation"]["groups"]]
+    size = _size(assumed, groups)
+    if size is None or assumed is None or "assumed" not in plan:
         return ""
-    assumed = make_assumed(plan.get("planned_sd"), plan.get("margin"), plan["assumed"])
-    groups = document["allocation"]["groups"]
-    return _tell(assumed, [(group["weight"], len(group["arms"])) for group in groups])
+    return size_words(assumed, size, walked=groups[0][1])
 
 
-def _tell(assumed: Assumed | None, groups: list[tuple[int, int]]) -> str:
-    """Return the words; ``groups``: the part of the ratio of each, and how many arms it walks."""
+def _size(assumed: Assumed | None, groups: list[tuple[int, int]]) -> Size | None:
+    """Return the size; ``groups``: the part of the ratio of each, and how many arms it walks."""
     if assumed is None:
-        return ""
-    walked = groups[0][1]
+        return None
     try:
-        size = size_of(assumed, [weight for weight, _arms in groups], walked=walked)
+        return size_of(assumed, [weight for weight, _arms in groups], walked=groups[0][1])
     except InvalidSetting:
-        return ""
-    return size_words(assumed, size, walked=walked)
+        return None
 
 
 def size_words(assumed: Assumed, size: Size, *, walked: int) -> str:

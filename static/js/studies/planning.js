@@ -2,7 +2,9 @@
 const form = document.querySelector("form[data-size]");
 const answer = form.querySelector("output");
 const take = answer.parentElement.querySelector("button");
+const PAUSE_MS = 250; // in typing
 let latest = 0;
+let waiting = 0;
 
 async function tellSize() {
   const mine = ++latest;
@@ -26,10 +28,12 @@ function offerOutcomes() {
 
 function follow() {
   offerOutcomes();
-  tellSize().catch(() => {}); // the server is away for a moment: the form is sent all the same
+  clearTimeout(waiting);
+  // Where the server is away for a moment, the form can be sent all the same.
+  waiting = setTimeout(() => tellSize().catch(() => {}), PAUSE_MS);
 }
 
-form.addEventListener("change", follow);
+form.addEventListener("input", follow);
 take.addEventListener("click", () => {
   form.participants.value = take.value;
   follow();
