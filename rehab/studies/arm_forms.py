@@ -16,6 +16,7 @@ from rehab.studies.models import SCHEDULE_FIELDS, Arm, Study
 from rehab.training.measures import A2
 
 ARMS_OFFERED = 4  # rows on the page of a new study
+CODES = dict(zip("0123", "ABCD", strict=True))  # of a new arm, by its row
 
 
 class ArmForm(forms.ModelForm):
@@ -43,7 +44,8 @@ class ArmForm(forms.ModelForm):
             self.initial["measure"] = usual and usual.pk
             walks = fields["protocol"].queryset.filter(clinic=None, name=WITH_BASELINE).first()
             self.initial["protocol"] = walks and walks.pk
-            self.initial["code"] = "ABCDEFGH"[int(self.prefix.rpartition("-")[2])]
+            row = str(self.prefix).rpartition("-")[2]
+            self.initial["code"] = CODES.get(row, "")
         for name in ("code", "weight"):
             fields[name].disabled = is_fixed
         for name in SCHEDULE_FIELDS:
@@ -72,8 +74,8 @@ class ArmForm(forms.ModelForm):
     def unusual(self) -> set[str]:
         """The fields that a new arm would not have so."""
         names = ("gain", *SCHEDULE_FIELDS, "robot_intensity", "weight")
-        arm = self.instance
-        return {n for n in names if getattr(arm, n) != Arm._meta.get_field(n).get_default()}
+        usual = Arm()
+        return {name for name in names if getattr(self.instance, name) != getattr(usual, name)}
 
     def clean(self) -> Any:
         """Return the answers, with defaults for fields of the schedule that were left empty."""

@@ -224,7 +224,7 @@ class StudyForm(ClinicForm, AssumedForm):
                 self.initial[name] = f"{of * study.assumed[key]:.10g}"
             elif not study.is_draft:  # what was not registered is not added unasked
                 self.initial[name] = None
-        if study.pk is None:
+        if not self.instance.pk:
             self.initial["months_since_stroke"] = EARLY_MONTHS
         if study.is_draft:
             del self.fields["reason"], self.fields["needs_consent"]
@@ -321,9 +321,7 @@ def outcome_choices() -> list[tuple[Promise, list[tuple[str, Any]]]]:
 def _is_usual(field: Any) -> bool:
     """Return whether a field holds what a new study has."""
     value = field.value()
-    usual = field.field.initial
-    if usual is None and field.name in {one.name for one in Study._meta.fields}:
-        usual = Study._meta.get_field(field.name).get_default()
+    usual = getattr(Study(), field.name, field.field.initial)
     if isinstance(usual, int | float):
         with contextlib.suppress(TypeError, ValueError):
             return float(value) == usual

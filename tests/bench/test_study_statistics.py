@@ -219,7 +219,7 @@ def of_planned(draw: Random) -> Iterator[Event]:
                     found.append(Observation(f"{row}", arm, period + 1, value, period=period))
             event = f"{name}, {finish} people by the formula: power at {power:.0%}"
             hit = is_found(one(found, crossover=walked > 1))
-            yield Event(event, hit, (power - 0.01, power + 0.04))  # whole blocks: rather more
+            yield Event(event, hit, (power - 0.01, power + 0.05))  # whole blocks: rather more
 
 
 def studied(seed: int) -> list[Event]:

@@ -87,7 +87,7 @@ def test_a_studys_own_assumptions_are_told_with_their_source(world):
 def test_the_plan_answers_while_it_is_typed(world):
     lead, url = client_of(world, Role.LEAD), reverse("study-size")
     sent = {"difference": "5,0", "planned_sd": "10", "power_percent": "80", "dropout_percent": "10"}
-    sent |= {"correlation": "0.5", "arm-TOTAL_FORMS": 4, "arm-0-name": "x", "arm-1-name": "y"}
+    sent |= {"correlation": "0.5", "arm-0-name": "x", "arm-1-name": "y"}
     answer = lead.post(url, sent).json()
     assert answer["participants"] == 144
     assert "128 participants" in answer["words"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from statistics import fmean
 from typing import NamedTuple
 
@@ -71,7 +71,10 @@ def simulate_from(
     began = time.monotonic()
     for seed in seeds:
         batch[seed] = [
-            SimulatedDifference(one.group, one.reference, *astuple(one.difference), one.sd)
+            SimulatedDifference(
+                *(one.group, one.reference),
+                *(one.difference.estimate, one.difference.low, one.difference.high, one.sd),
+            )
             for one in differences(trial, simulate(trial, seed))
         ]
         if time.monotonic() - began >= every_s:
