@@ -14,15 +14,12 @@ from django.db import transaction
 from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.ranges import NumberField
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
-from rehab.studies.allocation.crossover import crossover_groups
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
 from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
 from rehab.studies.analysis.outcomes import OF_QUESTIONS
-from rehab.studies.analysis.sample_size import size_of
 from rehab.studies.arm_forms import save_arms
 from rehab.studies.arms import EARLY_MONTHS
 from rehab.studies.models import OUTCOMES, Study
@@ -34,7 +31,8 @@ from rehab.studies.registration.measurable import (
     needs_follow_up,
 )
 from rehab.studies.registration.sealing import seal, unseal
-from rehab.studies.registration.size import make_assumed, size_words
+from rehab.studies.registration.size import read_assumed
+from rehab.studies.size_form import STORED, AssumedForm
 from rehab.training.measures import InvalidSetting
 
 SEED_BYTES = 16  # of a study's seed: too many to try them all
@@ -48,16 +46,6 @@ ALLOCATION_FIELDS = (
     "factors_text",
     "allocation_list",
 )
-
-
-CROSSED = "correlation"
-# What a study stores of its assumptions: the field, and how many of its unit are 1.
-STORED = {
-    "difference": ("difference", 1),
-    "power": ("power_percent", 100),
-    "dropout": ("dropout_percent", 100),
-    CROSSED: ("correlation", 1),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,62 +88,6 @@ SECTIONS = (
         _("which arm is better; no look"),
     ),
 )  # fmt: skip
-
-
-class AssumedForm(forms.Form):
-    """What the number of participants rests on; planned SD, margin and crossover are the study's.
-
-    All is in the outcome's unit, or in percent.
-    """
-
-    difference = NumberField(
-        label=_("difference that matters"),
-        required=False,
-        help_text=_("Between arms, of the primary outcome, in its unit."),
-    )
-    power_percent = NumberField(label=_("power (%)"), initial=80, required=False)
-    dropout_percent = NumberField(label=_("leave before the end (%)"), initial=10, required=False)
-    correlation = NumberField(
-        label=_("correlation within people"),
-        initial=0.5,
-        required=False,
-        help_text=_("Of a person’s outcomes in two arms, from 0 to 1."),
-    )
-
-    @property
-    def is_crossover(self) -> bool:
-        """Whether everybody walks every arm."""
-        return bool(self.cleaned_data.get("crossover"))
-
-    @property
-    def assumed(self) -> dict[str, float]:
-        """What a study stores of it."""
-        data = self.cleaned_data
-        names = {key: one for key, one in STORED.items() if self.is_crossover or key != CROSSED}
-        given = {key: (data.get(name), of) for key, (name, of) in names.items()}
-        return {key: value / of for key, (value, of) in given.items() if value is not None}
-
-    def tell(self, weights: list[int]) -> tuple[str, int | None]:
-        """Return how many participants are needed, in words and as a number, of these arms.
-
-        Nothing is said while something is missing. Raises InvalidSetting for what has no size.
-        """
-        data = self.cleaned_data
-        found = make_assumed(data.get("planned_sd"), data.get("margin"), self.assumed)
-        if found is None:
-            return "", None
-        walked = len(weights) if self.is_crossover else 1
-        groups = [group.weight for group in crossover_groups("ABCDEFGH"[:walked])]
-        size = size_of(found, groups if walked > 1 else weights, walked=walked)
-        return size_words(found, size, walked=walked), size.enrolled
-
-
-class SizeForm(AssumedForm):
-    """All of a plan that its size rests on, as it is being typed."""
-
-    planned_sd = NumberField(required=False)
-    margin = NumberField(required=False)
-    crossover = forms.BooleanField(required=False)
 
 
 class StudyForm(ClinicForm, AssumedForm):
@@ -254,7 +186,7 @@ class StudyForm(ClinicForm, AssumedForm):
         """Return the answers. Refuses assumptions from which no size follows."""
         data: Any = super().clean()
         try:
-            make_assumed(data.get("planned_sd"), data.get("margin"), self.assumed)
+            read_assumed(self.plan)
         except InvalidSetting as problem:
             raise ValidationError(format_refusal(problem)) from problem
         self.instance.assumed = self.assumed

@@ -8,10 +8,12 @@ from scipy import stats
 
 from rehab.people.roles import Role
 from rehab.studies.analysis.sample_size import Assumed, power_of, size_of
-from rehab.studies.registration.size import assumed_of, tell_size
+from rehab.studies.registration.lifecycle import register
+from rehab.studies.registration.protocol_pdf import write_pdf
+from rehab.studies.registration.size import size_of_document, size_of_study
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import draft_study
-from tests.support.world import client_of
+from tests.support.world import NOW, client_of
 
 
 def half(**changes: float) -> Assumed:
@@ -72,15 +74,17 @@ def test_what_has_no_size_is_refused_with_the_cure(changes, words):
 @pytest.mark.django_db
 def test_a_studys_own_assumptions_are_told_with_their_source(world):
     study = draft_study(world, planned_sd=10.0, assumed={"difference": 5.0, "dropout": 0.1})
-    told = tell_size(study)
-    assert "128 participants" in told
-    assert "144" in told
-    assert "Julious 2004" in told
-    assert "SD of 10" in told
+    size, told = size_of_study(study)
+    assert (size.finish, size.enrolled) == (128, 144)
+    for words in ("128 participants", "144", "Julious 2004", "SD of 10 "):
+        assert words in told
+    register(study, None, NOW)
+    assert size_of_document(study.versions.get().document) == told
+    assert b"128 participants" in write_pdf(study)
     study.margin = 8.0  # which is then what has to be found
-    assert assumed_of(study).difference == 8.0
+    assert size_of_study(study)[0].enrolled < 80
     study.planned_sd = None
-    assert tell_size(study) == ""
+    assert size_of_study(study) is None
 
 
 @pytest.mark.django_db

@@ -30,7 +30,7 @@ from rehab.people.web.refusals import format_refusal
 from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.arm_forms import build_arm_forms, save_arms
 from rehab.studies.arms import MAX_ARMS
-from rehab.studies.forms import SizeForm, StudyForm, save_draft
+from rehab.studies.forms import StudyForm, save_draft
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
@@ -42,6 +42,7 @@ from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import plan_rows, write_pdf
 from rehab.studies.results.reading import UNREAD
 from rehab.studies.results.results import may_look
+from rehab.studies.size_form import SizeForm
 from rehab.studies.unblinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
 from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit

@@ -22,7 +22,7 @@ from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
 from rehab.studies.pages.refusals import refuse
 from rehab.studies.power_runs import SIMULATIONS_MAX, PowerRun, plan_run, usual_settings
-from rehab.studies.registration.size import tell_size
+from rehab.studies.registration.size import size_of_study
 from rehab.studies.results.drawing import outcome_label, outcome_unit
 from rehab.training.measures import InvalidSetting
 
@@ -89,7 +89,7 @@ def show_power(request: HttpRequest, study_id: int) -> HttpResponse:
     context = {
         "study": study,
         "form": form,
-        "size": tell_size(study),
+        "size": (size_of_study(study) or ("", ""))[1],
         "runs": [{"run": run, "works": run.is_working(now), "power": run.power} for run in runs],
         "outcome": outcome_label(study.primary_outcome),
         "unit": outcome_unit(study.primary_outcome),

@@ -215,10 +215,10 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
 
 def _further(study: Study) -> dict[str, str]:
     """Return what a plan leaves open though it could be registered, by the slug of its answer."""
-    size, found = size_of_study(study), {}
-    if size is not None and size.enrolled > study.participants:
-        words = TOO_FEW.format(planned=study.participants, needed=size.enrolled)
-        found["participants"] = words
+    found = {}
+    sized = size_of_study(study)
+    if sized is not None and (needed := sized[0].enrolled) > study.participants:
+        found["participants"] = TOO_FEW.format(planned=study.participants, needed=needed)
     if not study.criteria:
         found["eligibility"] = NO_CRITERIA
     return found

@@ -15,7 +15,7 @@ from rehab.feedback.models import FeedbackType
 from rehab.questionnaires.instrument import Instrument
 from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.models import Arm, Study
-from rehab.studies.registration.size import assumed_of
+from rehab.studies.registration.size import read_assumed
 from rehab.training.goals import GoalRule
 from rehab.training.measures import Measure
 from rehab.training.phases import Phase
@@ -71,7 +71,7 @@ def describe(study: Study) -> dict[str, Any]:
     if study.window_days is not None:
         document["visits"]["window_days"] = study.window_days
     planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
-    if assumed_of(study) is None:
+    if read_assumed(planned) is None:
         planned.pop("assumed", None)
     document |= {"analysis": planned} if planned else {}
     document |= {"facts": study.facts} if study.facts else {}

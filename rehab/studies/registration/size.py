@@ -1,7 +1,11 @@
-"""How many participants a plan needs by formula, in words."""
+"""How many participants a plan needs by formula, in words.
+
+A plan is a mapping: ``planned_sd``, ``margin`` and ``assumed``, as documents and studies have them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from django.utils.formats import number_format
@@ -11,72 +15,52 @@ from rehab.studies.analysis.sample_size import Assumed, Size, size_of
 from rehab.studies.models import Study
 from rehab.training.measures import InvalidSetting
 
+Groups = Sequence[tuple[int, int]]  # of each: its part of the ratio, how many arms it walks
 
-def make_assumed(sd: float | None, margin: float | None, assumed: dict[str, Any]) -> Assumed | None:
-    """Return what a size rests on; None without an SD, or without a difference or a margin.
+
+def read_assumed(plan: Mapping[str, Any]) -> Assumed | None:
+    """Return what a plan's size rests on; None without an SD, or a difference or a margin.
 
     Raises InvalidSetting for values out of bounds.
     """
-    difference = margin or assumed.get("difference")
+    assumed, sd = plan.get("assumed") or {}, plan.get("planned_sd")
+    difference = plan.get("margin") or assumed.get("difference")
     if not (sd and difference):
         return None
     return Assumed(**assumed | {"difference": difference, "sd": sd})
 
 
-def assumed_of(study: Study) -> Assumed | None:
-    """Return what a study's size rests on; None where that was not said."""
-    return make_assumed(study.planned_sd, study.margin, study.assumed)
+def find_size(plan: Mapping[str, Any], groups: Groups) -> tuple[Size, str] | None:
+    """Return how many participants a plan needs, and in words why; None where it says too little.
 
-
-def size_of_study(study: Study) -> Size | None:
-    """Return how many participants a study's plan needs; None where nothing says so."""
-    try:
-        assumed, groups = assumed_of(study), study.groups()
-    except InvalidSetting:
-        return None
-    return _size(assumed, [(group.weight, len(group.arms)) for group in groups])
-
-
-def tell_size(study: Study) -> str:
-    """Return the same in words, and why; "" where nothing says so."""
-    size = size_of_study(study)
-    assumed = None if size is None else assumed_of(study)
-    if size is None or assumed is None:
-        return ""
-    return size_words(assumed, size, walked=len(study.groups()[0].arms))
-
-
-def size_of_document(document: dict[str, Any]) -> str:
-    """Return the words of a registered document."""
-    plan = document.get("analysis", {})
-    assumed = make_assumed(plan.get("planned_sd"), plan.get("margin"), plan.get("assumed", {}))
-    groups = [(one["weight"], len(one["arms"])) for one in document["allocation"]["groups"]]
-    size = _size(assumed, groups)
-    if size is None or assumed is None or "assumed" not in plan:
-        return ""
-    return size_words(assumed, size, walked=groups[0][1])
-
-
-def _size(assumed: Assumed | None, groups: list[tuple[int, int]]) -> Size | None:
-    """Return the size; ``groups``: the part of the ratio of each, and how many arms it walks."""
+    Raises InvalidSetting for what has no size.
+    """
+    assumed, walked = read_assumed(plan), groups[0][1]
     if assumed is None:
         return None
+    size = size_of(assumed, [weight for weight, _arms in groups], walked=walked)
+    return size, _words(assumed, size, walked=walked)
+
+
+def size_of_study(study: Study) -> tuple[Size, str] | None:
+    """Return the same of a study; None, too, where it has none."""
+    plan = {name: getattr(study, name) for name in ("planned_sd", "margin", "assumed")}
     try:
-        return size_of(assumed, [weight for weight, _arms in groups], walked=groups[0][1])
+        return find_size(plan, [(group.weight, len(group.arms)) for group in study.groups()])
     except InvalidSetting:
         return None
 
 
-def size_words(assumed: Assumed, size: Size, *, walked: int) -> str:
-    """Return a size, what it rests on, and the source of the formula.
+def size_of_document(document: Mapping[str, Any]) -> str:
+    """Return the words of a registered document; "" of one that does not say what it assumed."""
+    plan, groups = document.get("analysis", {}), document["allocation"]["groups"]
+    if "assumed" not in plan:
+        return ""
+    found = find_size(plan, [(group["weight"], len(group["arms"])) for group in groups])
+    return found[1] if found else ""
 
-    Parameters
-    ----------
-    assumed, size
-        As `size_of` took and gave them.
-    walked
-        How many arms everybody walks.
-    """
+
+def _words(assumed: Assumed, size: Size, *, walked: int) -> str:
     numbers: dict[str, object] = {
         "finish": size.finish,
         "enrolled": size.enrolled,
@@ -87,8 +71,8 @@ def size_words(assumed: Assumed, size: Size, *, walked: int) -> str:
         "dropout": f"{100 * assumed.dropout:g}",
     }
     found = gettext(
-        "%(finish)d participants with the outcome find a difference of %(difference)s in "
-        "%(power)s %% of studies, at an SD of %(sd)s between people and a two-sided alpha of "
+        "%(finish)d participants with the outcome give a power of %(power)s %% for a difference or "
+        "margin of %(difference)s, at an SD of %(sd)s between people and a two-sided alpha of "
         "%(alpha)s %%. Where %(dropout)s %% leave, that takes %(enrolled)d."
     )
     kind = gettext("Formula: t test of two groups, Julious 2004 (Stat Med 23:1921).")

@@ -72,10 +72,10 @@ def simulate_from(
     for seed in seeds:
         batch[seed] = [
             SimulatedDifference(
-                *(one.group, one.reference),
-                *(one.difference.estimate, one.difference.low, one.difference.high, one.sd),
+                one.group, one.reference, found.estimate, found.low, found.high, one.sd
             )
             for one in differences(trial, simulate(trial, seed))
+            for found in [one.difference]
         ]
         if time.monotonic() - began >= every_s:
             yield batch
