@@ -168,6 +168,8 @@ def list_studies(user: User, patient: Patient) -> list[dict[str, Any]]:
             "enrolled_at": row.enrolled_at,
             "withdrawn_at": row.withdrawn_at,
             "data_kept_after_withdrawal": row.keep_data,
+            "consent_version": row.consent_version,
+            "consented_on": row.consented_on,
             "group": row.allocation.group if row.study.closed_at else None,
             "visits": [
                 {"day": visit.day, "number": visit.number, "session": visit.session_id}

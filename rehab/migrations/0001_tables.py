@@ -842,6 +842,13 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
+                    "consent_version",
+                    models.CharField(
+                        blank=True, max_length=40, verbose_name="version of the consent"
+                    ),
+                ),
+                ("consented_on", models.DateField(null=True, verbose_name="consented on")),
+                (
                     "enrolled_at",
                     models.DateTimeField(
                         default=django.utils.timezone.now, verbose_name="enrolled"
@@ -3239,6 +3246,19 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
+                    "window_days",
+                    models.PositiveSmallIntegerField(
+                        blank=True,
+                        help_text="Before or after the planned day. Further off is a deviation. Empty: any day will do.",
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(0),
+                            django.core.validators.MaxValueValidator(30),
+                        ],
+                        verbose_name="days that a visit may be off",
+                    ),
+                ),
+                (
                     "goal_percent",
                     models.FloatField(
                         default=100,
@@ -3282,6 +3302,8 @@ class Migration(migrations.Migration):
                             ("steadiness", "Variation about the trend"),
                             ("lag_1", "Memory from stride to stride (lag 1)"),
                             ("invalid_strides", "Invalid strides"),
+                            ("sus", "System usability (SUS)"),
+                            ("tlx", "Workload (NASA-TLX)"),
                             ("10mwt_after", "10-meter walk, comfortable, after training"),
                             ("10mwt_follow_up", "10-meter walk, comfortable, at the follow-up"),
                             ("10mwt_fast_after", "10-meter walk, fast, after training"),
@@ -3335,15 +3357,16 @@ class Migration(migrations.Migration):
                     "planned_sd",
                     models.FloatField(
                         blank=True,
-                        help_text="Between people, of the primary outcome. A look then says how many participants the spread of all together needs.",
+                        help_text="Of the primary outcome, from earlier studies.",
                         null=True,
                         validators=[
                             django.core.validators.MinValueValidator(0.001),
                             django.core.validators.MaxValueValidator(1000),
                         ],
-                        verbose_name="SD that the size rests on",
+                        verbose_name="SD between people",
                     ),
                 ),
+                ("assumed", models.JSONField(default=dict, editable=False)),
                 ("facts", models.JSONField(default=dict, editable=False)),
                 (
                     "created_at",

@@ -13,6 +13,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents
 from rehab.people.models import Patient, User
 from rehab.sessions.formatting import clinic_time
+from rehab.studies.agreements import WITHDRAWN, StudyConsent, check_consent
 from rehab.studies.allocation.groups import Allocated
 from rehab.studies.models import Study, StudyState
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
@@ -37,6 +38,7 @@ def enroll(
     by: User | None,
     now: datetime,
     met: Collection[str] = (),
+    consent: StudyConsent | None = None,
 ) -> Enrollment:
     """Enroll a patient in a running study: allocate, plan the visits, blind.
 
@@ -54,19 +56,22 @@ def enroll(
         The time of the enrollment.
     met
         Those of ``study.criteria`` that ``by`` confirms.
+    consent
+        The patient's to this study; None for a simulated one.
 
     Raises
     ------
     InvalidSetting
-        For a patient who is not eligible, has not consented to research, is in another study or has
-        an open session; for a study that is not running, is full, or has run out of its list; and
-        where ``by`` is an assessor of the study.
+        For a patient who is not eligible, has not consented to research and to this study, is in
+        another study or has an open session; for a study that is not running, is full, or has run
+        out of its list; and where ``by`` is an assessor of the study.
     """
     with transaction.atomic():
         lock(study)  # of two enrolled at once, the second is allocated after the first
         patient.lock()
         check_open(study, by)
         _check_may_enter(study, patient)
+        check_consent(study, patient, consent, now)
         if unmet := find_unmet(study, patient, met, now):
             raise InvalidSetting(
                 gettext("%(patient)s is not eligible: %(criteria)s.")
@@ -87,6 +92,8 @@ def enroll(
             code=f"{study.code}-{len(earlier) + 1:03}",
             levels=list(levels),
             keep_data=keep_data,
+            consent_version=consent.version.strip() if consent else "",
+            consented_on=consent.day if consent else None,
             enrolled_at=now,
             enrolled_by=by,
         )
@@ -138,7 +145,14 @@ def _plan_visits(enrollment: Enrollment, periods: int, now: datetime) -> None:
             plan_visit(enrollment.patient, planned.day, None)
 
 
-def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str = "") -> None:
+def withdraw(
+    enrollment: Enrollment,
+    by: User | None,
+    now: datetime,
+    reason: str = "",
+    *,
+    takes_consent_back: bool = False,
+) -> None:
     """Record that a participant leaves the study; sessions count as was agreed at enrollment.
 
     An open session goes on, as a session of care, until the therapist ends it.
@@ -151,6 +165,8 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
         Who records it (None for a program), and when.
     reason
         Why, as typed; may be empty.
+    takes_consent_back
+        Whether the consent to the study is withdrawn, and not only its visits ended.
     """
     with transaction.atomic():
         lock(enrollment.study)
@@ -166,6 +182,7 @@ def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str
             now,
             enrollment=enrollment,
             reason=reason,
+            about=WITHDRAWN if takes_consent_back else "",
         )
         set_blinded(enrollment.patient)
 
@@ -182,4 +199,4 @@ def withdraw_everywhere(patient: Patient, by: User | None, now: datetime) -> Non
     """
     running = patient.enrollments.filter(withdrawn_at=None, study__state=StudyState.RUNNING)
     for enrollment in running.select_related("study", "patient"):
-        withdraw(enrollment, by, now)
+        withdraw(enrollment, by, now, takes_consent_back=True)

@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from django import forms
 from django.core.exceptions import ValidationError
 from django.db import transaction
+from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.models import User
-from rehab.people.ranges import NumberField, say_ranges
+from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
-from rehab.sessions.setup.options import OPTIONS
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
-from rehab.studies.models import OUTCOMES, SCHEDULE_FIELDS, Arm, Study
+from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
+from rehab.studies.analysis.outcomes import OF_QUESTIONS
+from rehab.studies.arm_forms import save_arms
+from rehab.studies.arms import EARLY_MONTHS
+from rehab.studies.models import OUTCOMES, Study
 from rehab.studies.registration.document import describe
 from rehab.studies.registration.lifecycle import check_secret
+from rehab.studies.registration.measurable import (
+    SEVERAL_VISITS,
+    check_outcomes,
+    needs_follow_up,
+)
 from rehab.studies.registration.sealing import seal, unseal
-from rehab.training.measures import A2
+from rehab.studies.registration.size import read_assumed
+from rehab.studies.size_form import STORED, AssumedForm
+from rehab.training.measures import InvalidSetting
 
 SEED_BYTES = 16  # of a study's seed: too many to try them all
 LIST_LETTERS_MAX = 500_000
-ARMS_OFFERED = 4  # rows on the page of a new study
 # What allocates is fixed by the registration.
 ALLOCATION_FIELDS = (
     "code",
@@ -37,7 +48,49 @@ ALLOCATION_FIELDS = (
 )
 
 
-class StudyForm(ClinicForm):
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the page: what is asked in it; folded where its usual answers do for most."""
+
+    title: str | Promise
+    names: tuple[str, ...]
+    usual: str | Promise = ""  # of a folded one: what holds unless it is opened
+
+    @property
+    def is_sized(self) -> bool:
+        """Whether it says how many participants are needed."""
+        return "participants" in self.names
+
+
+SECTIONS = (
+    Section(_("Question"), ("reason", "needs_consent", "code", "title", "question")),
+    Section(_("Outcome"), ("primary_outcome", "visits", "follow_up_days")),
+    Section(
+        _("How many take part"),
+        ("difference", "planned_sd", "correlation", "power_percent", "dropout_percent",
+         "participants"),
+    ),
+    Section(_("Who may take part"), ("months_since_stroke", "inclusion", "exclusion")),
+    Section(_("Secondary outcomes"), ("secondary_outcomes",), _("all others are exploratory")),
+    Section(
+        _("Days and goal"),
+        ("days_between", "window_days", "washout_days", "goal_percent"),
+        _("visits a day apart, goal as high as the baseline"),
+    ),
+    Section(
+        _("Allocation"),
+        ("method", "block_sizes", "factors_text", "allocation_list"),
+        _("blocks of 4 or 6 at random, no strata"),
+    ),
+    Section(
+        _("Non-inferiority, and looks before the end"),
+        ("margin", "spending"),
+        _("which arm is better; no look"),
+    ),
+)  # fmt: skip
+
+
+class StudyForm(ClinicForm, AssumedForm):
     """The plan of a study. Of a registered one, the allocation is fixed; changes need a reason."""
 
     block_sizes = forms.CharField(
@@ -67,7 +120,6 @@ class StudyForm(ClinicForm):
     )
     secondary_outcomes = forms.MultipleChoiceField(
         label=_("secondary outcomes"),
-        choices=OUTCOMES,
         required=False,
         widget=forms.CheckboxSelectMultiple,
     )
@@ -82,20 +134,30 @@ class StudyForm(ClinicForm):
         model = Study
         fields = (
             *("code", "title", "question", "participants", "months_since_stroke"),
-            *("inclusion", "exclusion", "crossover"),
-            *("visits", "days_between", "washout_days", "follow_up_days", "goal_percent"),
+            *("inclusion", "exclusion", "crossover", "visits", "days_between", "window_days"),
+            *("washout_days", "follow_up_days", "goal_percent"),
             *("primary_outcome", "secondary_outcomes", "margin", "spending", "planned_sd"),
             "method",
         )
         widgets = {
-            "question": forms.Textarea(attrs={"rows": 4}),
-            "inclusion": forms.Textarea(attrs={"rows": 3}),
-            "exclusion": forms.Textarea(attrs={"rows": 3}),
+            "question": forms.Textarea(attrs={"rows": 2}),
+            "inclusion": forms.Textarea(attrs={"rows": 2}),
+            "exclusion": forms.Textarea(attrs={"rows": 2}),
         }
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         study: Study = self.instance
+        fields: dict[str, Any] = self.fields
+        fields["primary_outcome"].choices = [("", _("Choose")), *outcome_choices()]
+        fields["secondary_outcomes"].choices = outcome_choices()
+        for key, (name, of) in STORED.items():
+            if key in study.assumed:
+                self.initial[name] = f"{of * study.assumed[key]:.10g}"
+            elif not study.is_draft:  # what was not registered is not added unasked
+                self.initial[name] = None
+        if not self.instance.pk:
+            self.initial["months_since_stroke"] = EARLY_MONTHS
         if study.is_draft:
             del self.fields["reason"], self.fields["needs_consent"]
             lines = (f"{name}: {', '.join(levels)}" for name, levels in study.factors)
@@ -106,6 +168,29 @@ class StudyForm(ClinicForm):
         else:
             for name in ALLOCATION_FIELDS:
                 del self.fields[name]
+
+    @property
+    def is_crossover(self) -> bool:
+        """Whether it is one: what is registered cannot be changed."""
+        is_fixed = "crossover" not in self.fields
+        return self.instance.crossover if is_fixed else super().is_crossover
+
+    def sections(self) -> Iterator[dict[str, Any]]:
+        """Yield the parts of the page, each with its fields, and whether it stands open."""
+        for section in SECTIONS:
+            own = [self[name] for name in section.names if name in self.fields]
+            told = [one for one in own if one.errors or not _is_usual(one)]
+            yield {"about": section, "fields": own, "is_open": bool(told)}
+
+    def clean(self) -> Any:
+        """Return the answers. Refuses assumptions from which no size follows."""
+        data: Any = super().clean()
+        try:
+            read_assumed(self.plan)
+        except InvalidSetting as problem:
+            raise ValidationError(format_refusal(problem)) from problem
+        self.instance.assumed = self.assumed
+        return data
 
     def clean_block_sizes(self) -> tuple[int, ...]:
         """Return the sizes, as whole numbers."""
@@ -146,66 +231,33 @@ class StudyForm(ClinicForm):
         check_secret(study)
 
 
-class ArmForm(forms.ModelForm):
-    """One arm of a study. Empty rows are left out."""
-
-    gain = NumberField(label=_("gain"), initial=1.0)
-
-    class Meta:
-        model = Arm
-        fields = (
-            *("code", "name", "valence", "gain", *SCHEDULE_FIELDS, "robot_intensity"),
-            *("measure", "protocol", "weight"),
-        )
-
-    def __init__(self, *args: Any, by: User, is_fixed: bool, **options: Any) -> None:
-        super().__init__(*args, **options)
-        say_ranges(self)
-        fields: dict[str, Any] = self.fields
-        fields["measure"].queryset = MeasureDefinition.objects.visible_to(by)
-        fields["protocol"].queryset = Protocol.objects.visible_to(by)
-        if self.instance.pk is None:
-            usual = fields["measure"].queryset.filter(clinic=None, slug=A2.slug).first()
-            self.initial["measure"] = usual and usual.pk
-        for name in ("code", "weight"):
-            fields[name].disabled = is_fixed
-        for name in SCHEDULE_FIELDS:
-            fields[name].required = False
-
-    def clean(self) -> Any:
-        """Return the answers, with defaults for fields of the schedule that were left empty."""
-        data: Any = super().clean()
-        empty = [name for name in SCHEDULE_FIELDS if data.get(name) in (None, "")]
-        return data | {name: OPTIONS[name].default for name in empty if name not in self.errors}
+OF_VISIT, SEVERAL = _("Of each visit’s strides"), _("From visit to visit")
+TESTS = _("Tests by an assessor, after training")
+QUESTIONS = _("Questionnaires, after each visit")
+AT_FOLLOW_UP = _("At the follow-up, once its day is planned")
 
 
-def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:
-    """Return the formset of a study's arms; that of a draft has empty rows to fill in.
-
-    It offers the protocols and measures of the account ``by``; ``data``: what was sent, or None.
-    """
-    is_fixed = not study.is_draft
-    stored = study.arms.count() if study.pk else 0
-    factory: Any = forms.inlineformset_factory(
-        Study,
-        Arm,
-        form=ArmForm,
-        extra=0 if is_fixed else max(ARMS_OFFERED - stored, 1),
-        can_delete=not is_fixed,
-    )
-    return factory(data, instance=study, form_kwargs={"by": by, "is_fixed": is_fixed}, prefix="arm")
+def outcome_choices() -> list[tuple[Promise, list[tuple[str, Any]]]]:
+    """Return the outcomes in groups, by what they need."""
+    found: dict[Promise, list[tuple[str, Any]]] = {
+        group: [] for group in (OF_VISIT, SEVERAL, QUESTIONS, TESTS, AT_FOLLOW_UP)
+    }
+    for slug, label in OUTCOMES:
+        is_test, is_several = slug in CLINICAL_OUTCOMES, slug in SEVERAL_VISITS
+        group = TESTS if is_test else SEVERAL if is_several else OF_VISIT
+        group = QUESTIONS if slug in OF_QUESTIONS else group
+        found[AT_FOLLOW_UP if needs_follow_up(slug) else group].append((slug, label))
+    return list(found.items())
 
 
-def save_arms(arms: Any, study: Study) -> None:
-    """Store the arms of a valid formset ``arms`` in a study, in the order of the rows."""
-    arms.instance = study
-    arms.save(commit=False)
-    for row in arms.deleted_objects:
-        row.delete()
-    filled = [f for f in arms.forms if f.instance.code and f not in arms.deleted_forms]
-    for position, form in enumerate(filled):
-        form.instance.study, form.instance.position = study, position
-        form.instance.save()
+def _is_usual(field: Any) -> bool:
+    """Return whether a field holds what a new study has."""
+    value = field.value()
+    usual = getattr(Study(), field.name, field.field.initial)
+    if isinstance(usual, int | float):
+        with contextlib.suppress(TypeError, ValueError):
+            return float(value) == usual
+    return not value or str(value) == str(usual)
 
 
 def save_draft(form: StudyForm, arms: Any) -> Study:
@@ -219,4 +271,5 @@ def save_draft(form: StudyForm, arms: Any) -> Study:
         form.seal_allocation()
         study.save()
         describe(study)
+        check_outcomes(study)
     return study

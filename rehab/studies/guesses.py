@@ -22,6 +22,7 @@ from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.registration.lifecycle import lock, note
 from rehab.studies.visits import next_visit
+from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
 
 Kind = StudyEvent.Kind
@@ -51,8 +52,8 @@ def group_labels(study: Study) -> dict[str, str]:
 def may_guess(enrollment: Enrollment, by: User) -> Guesser | None:
     """Return whose guess an account may note of a participant now; None for nobody's.
 
-    The participant's once the own visits are over; the assessor's own once everybody's are: before,
-    the question itself would name the arms to who still assesses.
+    The participant's once the own visits are over; the assessor's own once everybody's who was
+    enrolled are. The question names the arms, as the protocol does, and never whose they are.
     """
     study = enrollment.study
     is_assessor = has_mark(study, by, StudyMark.Task.ASSESSOR)
@@ -65,8 +66,9 @@ def may_guess(enrollment: Enrollment, by: User) -> Guesser | None:
 
 
 def _has_visits(enrollment: Enrollment) -> bool:
-    """Return whether a participant has a visit to come."""
-    return enrollment.withdrawn_at is None and next_visit(enrollment) is not None
+    """Return whether a participant has a visit to come, or walks the last one now."""
+    walks = enrollment.visits.filter(session__state__in=[state.value for state in OPEN_STATES])
+    return walks.exists() or (enrollment.withdrawn_at is None and bool(next_visit(enrollment)))
 
 
 def record_guess(enrollment: Enrollment, group: str, by: User, now: datetime) -> None:

@@ -18,6 +18,7 @@ from rehab.sessions.setup.option import Group, OptionForm
 from rehab.sessions.setup.options import build_parts, options_of
 from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.stations.models import Station
+from rehab.studies.agreements import StudyConsent
 from rehab.studies.models import Study
 from rehab.studies.visits import Place
 from rehab.training.measures import InvalidSetting
@@ -33,6 +34,17 @@ class EnrollmentForm(forms.Form):
         coerce=lambda answer: answer == "yes",
         initial="yes",
         widget=forms.RadioSelect,
+    )
+    consent_version = forms.CharField(
+        label=_("Consent to this study: version of the text that was signed"),
+        max_length=40,
+        required=False,
+        help_text=_("As it is printed on it, such as 1.2."),
+    )
+    consented_on = forms.DateField(
+        label=_("Signed on"),
+        required=False,
+        widget=forms.DateInput(attrs={"type": "date"}, format="%Y-%m-%d"),
     )
     keep_data = forms.TypedChoiceField(
         label=_("If the patient leaves the study, its sessions"),
@@ -59,6 +71,12 @@ class EnrollmentForm(forms.Form):
             fields[f"level_{number}"] = forms.ChoiceField(
                 label=name, choices=[(level, level) for level in levels], widget=forms.RadioSelect
             )
+
+    @property
+    def consent(self) -> StudyConsent | None:
+        """The consent to the study; None where version or day is missing."""
+        version, day = (self.cleaned_data[name] for name in ("consent_version", "consented_on"))
+        return StudyConsent(version, day) if version and day else None
 
     @property
     def met(self) -> list[str]:

@@ -57,6 +57,9 @@ class Enrollment(ClinicModel):
         _("data may be kept after a withdrawal"),
         help_text=_("As the patient agreed. Else sessions are left out of the study's results."),
     )
+    # To this study, on paper; of simulated people there is none.
+    consent_version = models.CharField(_("version of the consent"), max_length=40, blank=True)
+    consented_on = models.DateField(_("consented on"), null=True)
     enrolled_at = models.DateTimeField(_("enrolled"), default=timezone.now)
     enrolled_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
     withdrawn_at = models.DateTimeField(_("withdrawn"), null=True)
@@ -65,7 +68,9 @@ class Enrollment(ClinicModel):
         {
             "code": erased_by(replace_codes, shown=True, research=True),
             "study patient version levels enrolled_at withdrawn_at": OF_STUDY,
-            "keep_data": retained("what was agreed to", shown=True, research=False),
+            "keep_data consent_version consented_on": retained(
+                "what was agreed to", shown=True, research=False
+            ),
             "clinic enrolled_by": retained("place and staff", shown=False, research=False),
         }
     )

@@ -8,13 +8,14 @@ from typing import Any, ClassVar
 
 from django.db import models
 from django.utils import timezone
+from django.utils.formats import number_format
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.people.scope import Scope, ScopedModel
 from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
-from rehab.studies.analysis.outcomes import LOWER_IS_BETTER
+from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, OF_QUESTIONS
 from rehab.studies.models import Study
 from rehab.studies.simulation.power import PairPower, SimulatedDifference, simulate_from, summarize
 from rehab.studies.simulation.trial import Trial, walkable
@@ -25,7 +26,7 @@ from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import find_valence
 
-SIMULATIONS_MAX = 5000
+SIMULATIONS, SIMULATIONS_MAX = 100, 5000
 STORED_EVERY_S = 3.0  # so much work is lost at most
 STALLED_AFTER = timedelta(seconds=60)  # without a write to the run
 
@@ -64,12 +65,18 @@ class PowerRun(ScopedModel):
         """From which seeds it simulates, and what it assumes, in words."""
         names = ("sd_percent", "kept_percent", "dropout_percent")
         numbers = {name: f"{self.settings[name]:g}" for name in names}
-        words = gettext(
+        seeds = gettext(
             "Seeds 0 to %(last)d; people differ by %(sd_percent)s %%, washout keeps "
             "%(kept_percent)s %%, %(dropout_percent)s %% leave before each visit. Pairs are not "
             "corrected for their number."
         )
-        return words % (numbers | {"last": self.simulations - 1})
+        told = seeds % (numbers | {"last": self.simulations - 1})
+        spreads = [one.sd for one in self.power if one.sd is not None]
+        if spreads and self.study.planned_sd:
+            had = gettext("In the outcome they differed by an SD of %(had)s; planned were %(sd)s.")
+            shown = {"had": max(spreads), "sd": self.study.planned_sd}
+            told += " " + had % {n: number_format(f"{sd:.3g}") for n, sd in shown.items()}
+        return told
 
     @property
     def is_done(self) -> bool:
@@ -92,6 +99,41 @@ class PowerRun(ScopedModel):
         )
 
 
+# Outcomes in percent of the baseline that an arm changes by what it adds to training, or by what is
+# kept of that without feedback.
+OF_TRAINING = {"training_change", "early_change", "late_change", "improvement_over_baseline"}
+KEPT = {"catch_change", "washout_change", "after_effect"}
+
+
+def usual_settings(study: Study) -> dict[str, Any]:
+    """Return what a new run assumes: what the latest one did, else what the plan says.
+
+    A difference and an SD of an outcome without feedback are more than that in training, of which a
+    part is kept. Of other outcomes the plan's figures tell nothing of training.
+    """
+    if (last := study.power_runs.first()) is not None:
+        return dict(last.settings) | {"simulations": last.simulations}
+    usual = Population()
+    share = {**dict.fromkeys(OF_TRAINING, 1.0), **dict.fromkeys(KEPT, usual.retained)}
+    of_outcome = share.get(study.primary_outcome)
+    codes = list(study.arms.values_list("code", flat=True))
+    found = study.assumed.get("difference") if of_outcome else None
+    sd = study.planned_sd if of_outcome else None
+    return {
+        "participants": study.participants,
+        "sd_percent": min(sd / of_outcome, 100.0) if sd and of_outcome else usual.sd_percent,
+        "kept_percent": 100 * usual.retained,
+        "dropout_percent": 100 * study.assumed.get("dropout", 0.0) / _visits_of(study),
+        "effects": {codes[-1]: found / of_outcome} if found and of_outcome and codes else {},
+        "simulations": SIMULATIONS,
+    }
+
+
+def _visits_of(study: Study) -> int:
+    """Return how many visits a participant may leave before."""
+    return study.visits * (study.arms.count() if study.crossover else 1)
+
+
 def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
     """Return a study as it is simulated.
 
@@ -111,11 +153,11 @@ def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
     InvalidSetting
         For a study without an effect, or one that cannot be simulated.
     """
-    if study.primary_outcome in CLINICAL_OUTCOMES:
+    if study.primary_outcome in {*CLINICAL_OUTCOMES, *OF_QUESTIONS}:
         raise InvalidSetting(
             gettext(
-                "Simulated people take no clinical tests. Choose a primary outcome of the strides "
-                "to simulate; plan this one by its SD between people."
+                "Simulated people take no clinical tests and answer no questions. Choose a primary "
+                "outcome of the strides to simulate; plan this one by its SD between people."
             )
         )
     arms = list(study.arms.select_related("protocol", "measure"))

@@ -7,6 +7,7 @@ from rehab.studies.pages import participants, planning, power, record, results
 urlpatterns = [
     path("studies/", planning.list_studies, name="studies"),
     path("studies/new/", planning.plan_study, name="new-study"),
+    path("studies/size/", planning.show_size, name="study-size"),
     path("studies/<int:study_id>/", planning.show_study, name="study"),
     path("studies/<int:study_id>/plan/", planning.plan_study, name="plan-study"),
     path("studies/<int:study_id>/state/", planning.change_state, name="study-state"),

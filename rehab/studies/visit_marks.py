@@ -42,6 +42,7 @@ def describe_visits(
         if (session := visit.session) is not None:
             day = clinic_time(session.created_at, study.clinic).date()
             walked[session] = visit, (day - planned).days
+    window = study.window_days or 0
     unwalked, changed = _unwalked(walked), {} if blind else _changed(walked)
     return {
         visit.pk: [
@@ -50,7 +51,11 @@ def describe_visits(
             *([label_of(UNWALKED)] if session.pk in unwalked else ()),
             *([label_of(EXCLUDED)] if session.excluded else ()),
             *changed.get(session.pk, ()),
-            *([gettext("outside the planned days (%(days)+d)") % {"days": late}] if late else ()),
+            *(
+                [gettext("outside the planned days (%(days)+d)") % {"days": late}]
+                if abs(late) > window
+                else ()
+            ),
         ]
         for session, (visit, late) in walked.items()
     }

@@ -17,6 +17,7 @@ from scipy import stats
 
 from rehab.studies.analysis.comparison import Difference, carry_over, compare, holm
 from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.sample_size import Assumed, size_of
 from rehab.studies.analysis.sequential import blinded_size, levels
 
 SEEDS = range(1000)
@@ -203,6 +204,24 @@ def of_carry_over(draw: Random) -> Iterator[Event]:
         yield Event(f"carry-over of {carried:g} found", is_found(found), expected)
 
 
+def of_planned(draw: Random) -> Iterator[Event]:
+    """Yield the power of as many people as the formula asks for, by the model of the results."""
+    for power in (0.8, 0.9):
+        assumed = Assumed(difference=8.0, sd=10.0, power=power, correlation=0.5)
+        for name, walked in (("parallel", 1), ("crossover", 2)):
+            finish = size_of(assumed, (1, 1), walked=walked).finish
+            found = []
+            for row in range(finish):
+                person = draw.normal(0, 10 * 0.5**0.5)
+                for period in range(walked):
+                    arm = "AB"[(row + period) % 2]
+                    value = person + draw.normal(0, 10 * 0.5**0.5) + 8 * (arm == "B")
+                    found.append(Observation(f"{row}", arm, period + 1, value, period=period))
+            event = f"{name}, {finish} people by the formula: power at {power:.0%}"
+            hit = is_found(one(found, crossover=walked > 1))
+            yield Event(event, hit, (power - 0.01, power + 0.05))  # whole blocks: rather more
+
+
 def studied(seed: int) -> list[Event]:
     """Return what happened in the studies of a seed."""
     draw = np.random.default_rng([38, seed])
@@ -216,6 +235,7 @@ def studied(seed: int) -> list[Event]:
         of_size,
         of_missing,
         of_carry_over,
+        of_planned,
     )
     return [event for part in parts for event in part(draw)]
 

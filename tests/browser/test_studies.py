@@ -58,7 +58,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield running
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def people(server: Server) -> dict[str, Any]:
     made: dict[str, Any] = run_inside(server, PEOPLE)
     return made
@@ -71,6 +71,8 @@ def plan_by_clicks(page: Page) -> None:
     page.fill("#id_title", "Two ways to answer a step")
     page.fill("#id_question", "Which way keeps more of the push-off?")
     page.fill("#id_participants", "12")
+    page.fill("#id_months_since_stroke", "")
+    page.click("summary:has-text('Allocation')")
     page.fill("#id_block_sizes", "2, 4")
     page.select_option("#id_primary_outcome", "washout_change")
     for row, (code, name, valence) in enumerate(
@@ -95,6 +97,8 @@ def enroll_and_start(page: Page, study: str) -> str:
     page.goto(study)
     page.click("text=Enroll a patient")
     page.select_option("#id_patient", label="Rosa (R1)")
+    page.fill("#id_consent_version", "1.0")
+    page.fill("#id_consented_on", "2026-11-20")
     page.check("[name=keep_data][value=yes]")
     page.click("button:has-text('Enroll')")
     expect(page.locator("h1")).to_have_text("VAL-001 Rosa")
@@ -199,6 +203,55 @@ def test_a_study_is_planned_walked_blind_and_an_arm_is_revealed(server, browser,
         expect(told).to_contain_text("Revealing the arm was refused (asha)")
         lead.goto("/admin/rehab/auditentry/")
         expect(lead.locator("main, #content").last).to_contain_text("Revealed a study's arm")
+
+
+def test_a_plan_is_short_answers_at_once_and_keeps_what_was_typed(server, browser, people):
+    with page_of(browser, server, people["lena"]) as page:
+        page.goto("/studies/new/")
+        assert page.evaluate("document.documentElement.scrollHeight") < 2200
+        fields = page.locator(":is(input, select, textarea):visible")
+        assert fields.count() <= 24
+        size = page.locator(".size")
+        expect(size).to_be_hidden()
+        page.fill("#id_difference", "5")
+        page.fill("#id_planned_sd", "10")
+        expect(size).to_contain_text("128 participants")
+        page.click("text=Plan 144")
+        expect(page.locator("#id_participants")).to_have_value("144")
+        test = page.locator("#id_primary_outcome option[value='10mwt_follow_up']")
+        expect(test).to_be_disabled()
+        page.fill("#id_follow_up_days", "28")
+        page.locator("#id_follow_up_days").blur()
+        expect(test).to_be_enabled()
+
+        page.fill("#id_code", "KEPT")
+        page.fill("#id_title", "Two ways")
+        page.fill("#id_question", "Which?")
+        page.select_option("#id_primary_outcome", "10mwt_follow_up")
+        for row, valence in enumerate(("positive", "explicit")):
+            page.fill(f"#id_arm-{row}-name", valence)
+            page.select_option(f"#id_arm-{row}-valence", valence)
+        page.click("summary:has-text('Days and goal')")
+        page.fill("#id_days_between", "")
+        page.click("summary:has-text('Days and goal')")
+        page.click("button:has-text('Save')")  # what is wrong in a fold opens it
+        expect(page.locator("#id_days_between")).to_be_visible()
+        page.fill("#id_days_between", "2")
+        page.fill("#id_follow_up_days", "")
+        page.click("summary:has-text('Allocation')")
+        page.fill("#id_block_sizes", "3")
+        page.click("button:has-text('Save')")
+        expect(page.locator(".errorlist").first).to_be_visible()
+        expect(page.locator("#id_block_sizes")).to_have_value("3")
+        for name, value in (("code", "KEPT"), ("days_between", "2"), ("difference", "5")):
+            expect(page.locator(f"#id_{name}")).to_have_value(value)
+        page.fill("#id_block_sizes", "2, 4")
+        page.click("button:has-text('Save')")
+        expect(page.locator(".errorlist")).to_contain_text("give the days to it")
+        page.fill("#id_follow_up_days", "28")
+        page.click("button:has-text('Save')")
+        expect(page.locator("h1")).to_have_text("KEPT Draft")
+        expect(page.locator("main")).to_contain_text("128 participants")
 
 
 LISTEN = """path => new Promise(done => {

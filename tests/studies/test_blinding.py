@@ -30,7 +30,7 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.archives import words_of
-from tests.support.studies import enrolled, new_patient, running_study
+from tests.support.studies import CONSENT, enrolled, new_patient, running_study
 from tests.support.tenancy import walk_patterns
 from tests.support.world import NOW, World, build_world, signed_in
 
@@ -124,7 +124,7 @@ def test_who_cannot_take_part_is_not_enrolled_and_nothing_is_stored(world, case)
     }
     before = Enrollment.everywhere.count()
     with pytest.raises(InvalidSetting, match=words[case]):
-        enroll(study, patient, levels, keep_data=True, by=None, now=NOW)
+        enroll(study, patient, levels, keep_data=True, by=None, now=NOW, consent=CONSENT)
     assert Enrollment.everywhere.count() == before == Allocation.everywhere.count()
 
 

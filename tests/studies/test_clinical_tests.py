@@ -11,6 +11,8 @@ from django.urls import reverse
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment
+from rehab.sessions.questionnaires import QuestionnaireResponse, ask
+from rehab.sessions.setup.protocols import Protocol
 from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, define_outcomes
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Study
@@ -130,9 +132,22 @@ def test_unit_direction_and_window_are_registered(world):
     assert b"10-meter walk, comfortable, after training" in page.content
 
 
+def test_a_questionnaire_that_the_protocol_asks_is_an_outcome(world):
+    Protocol.everywhere.filter(clinic=None).update(questionnaires=["sus"])
+    study = running_study(world, secondary_outcomes=["sus"])
+    one, other = (enrolled(study, new_patient(world, number)) for number in (1, 2))
+    for each in (one, other):
+        ask(walk_visit(each), ["sus"], NOW)
+    asked = QuestionnaireResponse.everywhere.get(session__patient=one.patient)
+    assert values_of(study, "sus") == {}
+    asked.answers, asked.finished_at = [5, 1] * 5, NOW
+    asked.save()
+    assert values_of(study, "sus") == {one.code: 100.0}  # read anew, though no session changed
+
+
 def test_power_says_that_simulated_people_take_no_tests(world):
     study = running_study(world, **PLAN)
-    with pytest.raises(InvalidSetting, match="take no clinical tests"):
+    with pytest.raises(InvalidSetting, match="take no clinical tests and answer no questions"):
         build_trial(study, {"effects": {"B": 10.0}})
 
 

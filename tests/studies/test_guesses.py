@@ -10,9 +10,10 @@ from rehab.people.roles import Role
 from rehab.studies.analysis.blinding_index import bang_index, james_index
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.enrolling import withdraw
-from rehab.studies.guesses import UNKNOWN, guess_rows, record_guess
+from rehab.studies.guesses import UNKNOWN, Guesser, guess_rows, may_guess, record_guess
 from rehab.studies.participants import StudyEvent
 from rehab.studies.registration.lifecycle import close
+from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.world import NOW, signed_in
@@ -97,6 +98,19 @@ def test_guesses_are_noted_once_and_shown_once_the_study_is_closed(trial, world)
     assert "James 0.00 (0.00 … 0.00)" in page
     file = world.pt.get(reverse("study-results-file", args=[study.pk]) + "?file=guesses.csv")
     assert file.content.decode().splitlines()[1].startswith("participant,A,2,0,0,Bang,1")
+
+
+def test_nobody_is_asked_while_the_last_visit_is_still_walked(world):
+    study = running_study(world, visits=1)
+    assessor = User.everywhere.create_user("zz", role=Role.PT, clinic=world.clinic)
+    give_mark(study, assessor, Task.ASSESSOR, None, NOW)
+    one = enrolled(study, new_patient(world))
+    session = start_session(one, Place(), world.people[Role.PT], NOW)
+    for by in (assessor, world.people[Role.PT]):
+        assert may_guess(one, by) is None
+    session.state = "finished"
+    session.save()
+    assert may_guess(one, assessor) == Guesser.ASSESSOR
 
 
 def test_an_assessor_is_asked_once_all_visits_are_over_and_sees_no_arms_before(trial, world):

@@ -28,6 +28,12 @@ from tests.support.studies import SEED, draft_study, enrolled, new_patient, runn
 from tests.support.world import NOW, World, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
+SIGNED = {
+    "keep_data": "yes",
+    "takes_part": "yes",
+    "consent_version": "1.0",
+    "consented_on": NOW.date().isoformat(),
+}
 
 
 def plan(*valences: str, **changes: Any) -> dict[str, Any]:
@@ -237,7 +243,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     pt = client_of(world)
     url = reverse("enroll", args=[study.pk])
     assert "required" in text_of(pt.post(url, {"patient": patient.pk}))
-    sent = pt.post(url, {"patient": patient.pk, "keep_data": "yes", "takes_part": "yes"})
+    sent = pt.post(url, SIGNED | {"patient": patient.pk})
     enrollment = Enrollment.everywhere.get(patient=patient)
     assert sent["Location"] == reverse("participant", args=[enrollment.pk])
     page = text_of(pt.get(sent["Location"]))
@@ -248,7 +254,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, c
     assert start_visit(pt, enrollment).url == reverse("monitor", args=[session.get().pk])
     assert session.get().to_plan().heart_rate_limit == 130
     assert "One study a patient" in text_of(
-        pt.post(url, {"patient": patient.pk, "keep_data": "no", "takes_part": "yes"})
+        pt.post(url, SIGNED | {"patient": patient.pk, "keep_data": "no"})
     )
     assert refusals(caplog) == [f"Refused to account {world.people[Role.PT].pk}: {url}"]
 

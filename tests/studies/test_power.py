@@ -15,7 +15,7 @@ from rehab.management.commands import studypower
 from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import Protocol
 from rehab.studies.models import Arm
-from rehab.studies.power_runs import PowerRun, plan_run, work
+from rehab.studies.power_runs import PowerRun, plan_run, usual_settings, work
 from rehab.studies.simulation.power import SimulatedDifference, summarize, wilson
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
@@ -177,3 +177,39 @@ def test_with_a_margin_power_is_to_find_that_nothing_is_worse_by_it(better, expe
     found = [SimulatedDifference("B", "A", (low + high) / 2, low, high) for low, high in ends]
     [pair] = summarize(found, 2.0, higher_is_better=better)
     assert pair.power == pytest.approx(expected)
+
+
+def test_the_form_begins_with_the_plan_and_keeps_what_was_typed(world):
+    study = short_study(world, planned_sd=8.0, assumed={"difference": 5.0, "dropout": 0.1})
+    lead, url = client_of(world, Role.LEAD), reverse("study-power", args=[study.pk])
+    page = lead.get(url)
+    assert "Julious 2004" in page.content.decode()
+    form = page.context["form"]
+    assert form["sd_percent"].value() == 8.0
+    assert form["effect_B"].value() == 5.0
+    assert form["effect_A"].value() == 0.0
+    assert form["dropout_percent"].value() == 10.0
+    sent = {"participants": 8, "sd_percent": 6, "kept_percent": 30, "dropout_percent": 0}
+    lead.post(url, sent | {"simulations": 3, "effect_A": 1, "effect_B": 20})
+    form = lead.get(url).context["form"]
+    typed = {**sent, "simulations": 3, "effect_A": 1, "effect_B": 20}
+    assert {name: form[name].value() for name in typed} == typed
+
+
+def test_an_outcome_without_feedback_keeps_a_part_of_what_training_adds(world):
+    study = draft_study(world, planned_sd=5.0, assumed={"difference": 2.0})
+    assumed = usual_settings(study)  # change in washout, of which a quarter is kept
+    assert (assumed["sd_percent"], assumed["effects"]) == (20.0, {"B": 8.0})
+    study.primary_outcome = "hit_rate"
+    assumed = usual_settings(study)
+    assert (assumed["sd_percent"], assumed["effects"]) == (10.0, {})
+
+
+def test_a_run_says_how_people_differed_in_it(world):
+    study = short_study(world, planned_sd=5.0)
+    run = plan_run(study, SETTINGS, 4, None, NOW)
+    for _stored in work(run):
+        pass
+    [pair] = PowerRun.everywhere.get(pk=run.pk).power
+    assert pair.sd == pytest.approx(5, rel=0.4)  # of 12 people, and what strides scatter besides
+    assert f"SD of {pair.sd:.3g}; planned were 5" in run.assumptions

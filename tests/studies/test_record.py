@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from datetime import timedelta
 from typing import Any
 
@@ -13,20 +14,24 @@ from django.urls import reverse
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
-from rehab.studies.agreements import agree, agreed_version, agreement_rows
+from rehab.studies.agreements import StudyConsent, agree, agreed_version, agreement_rows
 from rehab.studies.blinding import ASKED_FOR, Task, find_request, give_mark, reveal_arms
+from rehab.studies.enrolling import withdraw_everywhere
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, listing_rows, propose, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
+from rehab.studies.record.found import find
 from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.lifecycle import close, register, revise
+from rehab.studies.results.harms_and_deviations import OUTSIDE
 from rehab.studies.results.results import read_results
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import draft_study, enrolled, new_patient, running_study
+from tests.support.trials import walk_visit
 from tests.support.world import NOW, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -52,11 +57,15 @@ def test_what_is_known_is_filled_in_and_the_rest_is_asked(world):
     assert rows["WHO", "19"]["answer"] in rows["SPIRIT 2025", "16"]["answer"]
     assert "pocock" in rows["SPIRIT 2025", "28b"]["answer"]
     assert rows["SPIRIT 2025", "30"]["still asked"] == str(ASKED["ethics"])
+    # The sponsor's name, and what it does in the study, are two items (2013: 5b and 5c).
+    assert rows["SPIRIT 2025", "3b"]["still asked"] == str(ASKED["sponsor"])
+    assert str(ASKED["sponsor_role"]) in rows["SPIRIT 2025", "3c"]["still asked"]
     assert rows["CONSORT 2025", "30"]["still asked"] == BY_HAND
     asked = {slug for items in ITEMS.values() for line in items.splitlines() for slug in ASKED
              if slug in line.rpartition("|")[2].split()}  # fmt: skip
     assert asked == set(ASKED)  # nothing is asked in vain
     study.facts = dict.fromkeys(ASKED, "Zq")
+    study.inclusion = "Hemiparesis after stroke"
     lacking = [row for row in checklist_rows(study, None) if row["still asked"]]
     assert {row["still asked"] for row in lacking} == {BY_HAND}
     rows = {(row["list"], row["item"]): row for row in checklist_rows(study, None)}
@@ -109,6 +118,24 @@ def test_who_is_blinded_is_one_truth_whatever_was_typed(world):
     assert not told()[0]["still asked"]
 
 
+def test_what_a_reviewer_would_still_ask_is_asked(world):
+    study = draft_study(world, planned_sd=10.0, assumed={"difference": 5.0, "dropout": 0.1})
+    study.facts = dict.fromkeys(ASKED, "Zq") | {"blinding": "Assessors, until the study is closed"}
+
+    def asked():
+        found = {(r["list"], r["item"]): r for r in checklist_rows(study, None)}
+        items = (("SPIRIT 2025", "14a"), ("SPIRIT 2025", "19"), ("SPIRIT 2025", "24a"))
+        return [found[item]["still asked"] for item in items]
+
+    who, size, blinded = asked()
+    assert "no criteria are registered" in who
+    assert "20 are planned where the formula asks for 144" in size
+    assert "is not so, no assessor is marked" in blinded
+    study.inclusion, study.participants = "Hemiparesis after stroke", 144
+    study.facts["blinding"] = "Nobody; assessors know the arm, and are not kept from it"
+    assert asked() == ["", "", ""]
+
+
 def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     study = running_study(world)
     enrollment = enrolled(study, new_patient(world))
@@ -120,7 +147,8 @@ def test_a_closed_study_reports_flow_harms_and_who_revealed_alone(world):
     assert "1 allocated" in consort["22a"]
     assert "fall: A 0 events in 0 of 0 participants (0 visits), B" in consort["27"]
     assert "walked no visit (1 of 1) adds nothing" in consort["21b"]
-    assert "B: 1 never began, 0 left later, 0 removed; 2 visits missed" in consort["22b"]
+    assert "B: 1 never began, 0 left later, 0 removed, 0 took" in consort["22b"]
+    assert "the consent back; 2 visits missed" in consort["22b"]
     assert "Deviations: arm revealed A 0 in 0, B 1 in 1." in consort["24a"]
     assert "with 1 of 20 participants" in consort["23b"]
     assert "last enrollment 2026" in consort["23a"]
@@ -197,6 +225,56 @@ def test_margin_and_looks_stay_as_they_were_once_the_study_runs(world):
             setattr(changed, name, value)
         with pytest.raises(InvalidSetting, match="stay as they were"):
             revise(changed, "A better one.", None, NOW)
+
+
+def test_nobody_is_enrolled_without_a_consent_to_this_very_study(world):
+    study, patient = running_study(world), new_patient(world)
+    for consent in (None, StudyConsent(" ", NOW.date())):
+        with pytest.raises(InvalidSetting, match="consent to this very study"):
+            enrolled(study, patient, consent=consent)
+    with pytest.raises(InvalidSetting, match="later than today"):
+        enrolled(study, patient, consent=StudyConsent("1", NOW.date() + timedelta(days=1)))
+    pt, url = client_of(world, Role.PT), reverse("enroll", args=[study.pk])
+    sent = {"patient": patient.pk, "keep_data": "yes", "takes_part": "yes"}
+    assert "consent to this very study" in pt.post(url, sent).content.decode()
+    assert not study.enrollments.exists()
+    day = NOW.date() - timedelta(days=3)
+    pt.post(url, sent | {"consent_version": "1.2", "consented_on": day.isoformat()})
+    one = study.enrollments.get()
+    assert (one.consent_version, one.consented_on) == ("1.2", day)
+    page = " ".join(pt.get(reverse("participant", args=[one.pk])).content.decode().split())
+    assert f"(text 1.2; noted by {world.people[Role.PT]})" in page
+
+
+def test_who_takes_the_consent_back_leaves_and_the_record_says_so(world):
+    study = running_study(world)
+    back, left, research = (enrolled(study, new_patient(world, n)) for n in range(3))
+    pt = client_of(world, Role.PT)
+    pt.post(reverse("leave-study", args=[back.pk]), {"consent": "back", "reason": "tired"})
+    pt.post(reverse("leave-study", args=[left.pk]), {"reason": "moves"})
+    withdraw_everywhere(research.patient, None, NOW)
+    assert not study.enrollments.filter(withdrawn_at=None).exists()
+    rows = list(agreement_rows(study))
+    taken = [row["study_consent_withdrawn_on"] for row in rows]
+    assert [one is not None for one in taken] == [True, False, True]
+    close(study, None, NOW)
+    told = find(study, read_results(study, NOW))["losses"]
+    counts = [int(n) for n in re.findall(r"(\d+) took the consent back", told)]
+    assert sum(counts) == 2
+    assert rows[0]["study_consent_version"] == "1.0"
+    with pytest.raises(InvalidSetting, match="has withdrawn"):
+        start_session(back, Place(), None, NOW)
+
+
+@pytest.mark.parametrize(("window", "expected"), [(2, [3]), (3, []), (None, [])])
+def test_a_visit_outside_the_studys_window_is_a_deviation(world, window, expected):
+    study = running_study(world, window_days=window)
+    one = enrolled(study, new_patient(world))
+    walk_visit(one)
+    one.visits.filter(number=1).update(day=NOW.date() - timedelta(days=3))
+    close(study, None, NOW)
+    found = read_results(study, NOW).occurrences
+    assert [row.value for row in found if row.what == OUTSIDE] == expected
 
 
 def test_who_has_not_agreed_to_a_version_that_asks_for_it_does_not_walk(world):

@@ -351,6 +351,8 @@ def test_a_follow_up_is_registered_planned_and_walked_without_feedback(world):
     ("plan", "arm", "cure"),
     [
         ({"primary_outcome": "follow_up_change"}, {}, "give the days to it"),
+        ({"secondary_outcomes": ["10mwt_follow_up"]}, {}, "give the days to it"),
+        ({"secondary_outcomes": ["tlx"]}, {}, "does not ask it"),
         ({"secondary_outcomes": ["savings"], "visits": 1}, {}, "plan more of them"),
         ({"primary_outcome": "catch_change"}, {}, "choose another protocol or outcome"),
         ({"secondary_outcomes": ["score"]}, {}, "Choose an outcome that is measured"),

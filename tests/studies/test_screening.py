@@ -64,7 +64,8 @@ def test_the_flow_begins_with_everybody_who_was_assessed(world):
     ]
     for number, answer in enumerate(answers):
         patient = new_patient(world, number)
-        sent = {"patient": patient.pk, "takes_part": "yes", "keep_data": "yes"} | answer
+        sent = {"patient": patient.pk, "takes_part": "yes", "keep_data": "yes"}
+        sent |= {"consent_version": "1", "consented_on": NOW.date().isoformat()} | answer
         page = pt.post(url, sent, follow=True).content.decode()
         assert ("screening log" in page) == (number > 0)
     assert "not enrolled (Follows two-step orders: no; Pacemaker: yes)" in page

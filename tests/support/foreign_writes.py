@@ -23,6 +23,8 @@ WORDS = {
     **dict.fromkeys(("reason", "note", "nickname", "name", "new"), "by a stranger"),
     **dict.fromkeys(("emergency", "keep_data", "answer", "post", "delete", "confirm"), "yes"),
     "purpose": "research",
+    "consent_version": "1",
+    "consented_on": "2026-11-01",
     "field": "note",
     "day": "2026-12-01",
     "questionnaire": "tlx",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import date
+from datetime import date, timedelta
 from typing import Any
 
 from rehab.people.consent.models import Purpose
@@ -10,6 +10,7 @@ from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.studies.agreements import StudyConsent
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Arm, Study
 from rehab.studies.participants import Enrollment
@@ -19,6 +20,7 @@ from rehab.training.measures import A2
 from tests.support.world import NOW, World
 
 SEED = "the seed of tests"
+CONSENT = StudyConsent("1.0", NOW.date() - timedelta(days=1))
 STROKE = date(2020, 1, 1)  # years before `NOW`
 
 
@@ -77,5 +79,6 @@ def enrolled(study: Study, patient: Patient, **settings: Any) -> Enrollment:
     """Return a patient's enrollment in a running study."""
     from rehab.studies.enrolling import enroll
 
-    options: dict[str, Any] = {"keep_data": True, "by": None, "now": NOW} | settings
+    options: dict[str, Any] = {"keep_data": True, "by": None, "now": NOW, "consent": CONSENT}
+    options |= settings
     return enroll(study, patient, options.pop("levels", ()), **options)

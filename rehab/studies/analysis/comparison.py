@@ -78,6 +78,13 @@ class Difference:
     missing: Missing | None = None
 
     @property
+    def sd(self) -> float | None:
+        """The standard deviation between participants that the effect is a ratio to."""
+        if self.effect is None or not self.effect.estimate:
+            return None
+        return self.difference.estimate / self.effect.estimate * small_sample(*self.participants)
+
+    @property
     def p(self) -> float | None:
         """Two-sided p of no difference, of this comparison alone."""
         return None if self.estimate is None else self.estimate.p
@@ -245,4 +252,9 @@ def _effect(difference: Interval, a: Floats, b: Floats) -> Interval | None:
     spread = float(((a.var(ddof=1) + b.var(ddof=1)) / 2) ** 0.5)
     if not spread > 0:
         return None
-    return difference.times((1 - 3 / (4 * (len(a) + len(b) - 2) - 1)) / spread)
+    return difference.times(small_sample(len(a), len(b)) / spread)
+
+
+def small_sample(a: int, b: int) -> float:
+    """Return Hedges' correction of two groups of ``a`` and ``b`` people."""
+    return 1 - 3 / (4 * (a + b - 2) - 1)

@@ -181,6 +181,11 @@ OF_SESSIONS = {
     for metric in METRICS.values()
     if metric.unit not in {"days", "sessions"} and metric.slug not in NOT_COMPARED
 }
+# Scores of questionnaires that a protocol asks after its sessions, stored like a session's figures.
+OF_QUESTIONS = {
+    "sus": (gettext_noop("System usability (SUS)"), "points"),
+    "tlx": (gettext_noop("Workload (NASA-TLX)"), "points"),
+}
 # How each outcome is computed; of sessions, with the visit's own baseline.
 MEANINGS = {
     "score": "Points of the session; none where the feedback type has no points.",
@@ -192,16 +197,21 @@ MEANINGS = {
     f"baseline, in percent of {OWN}.",
     "steps": "Judged strides with feedback.",
     "active_minutes": "Time that was walked.",
+    "sus": "System Usability Scale after the session, 0 to 100; none where an item was skipped; "
+    "higher is better.",
+    "tlx": "Raw NASA-TLX after the session, 0 to 100; none where a scale was skipped; lower is "
+    "better.",
 } | {slug: one.meaning for slug, one in (OF_STRIDES | CLINICAL_OUTCOMES).items()}
 LOWER_IS_BETTER = frozenset(
-    {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"}
+    {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides", "tlx"}
     | {slug for slug, one in CLINICAL_OUTCOMES.items() if not one.test.higher_is_better}
 )
 BOUNDS = {"hit_rate": (0.0, 1.0), "invalid_strides": (0.0, 100.0)}  # where intervals are cut
 # Slug to label and unit of all that may be registered.
 OUTCOMES: dict[str, tuple[str, str]] = {
-    slug: (one.label, one.unit)
-    for slug, one in (OF_SESSIONS | OF_STRIDES | CLINICAL_OUTCOMES).items()
+    **{slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()},
+    **OF_QUESTIONS,
+    **{slug: (one.label, one.unit) for slug, one in CLINICAL_OUTCOMES.items()},
 }
 
 

@@ -118,6 +118,15 @@ class Study(ClinicModel):
         blank=True,
         help_text=_("After the last visit: a baseline, without feedback. Empty: no follow-up."),
     )
+    window_days = models.PositiveSmallIntegerField(
+        _("days that a visit may be off"),
+        null=True,
+        blank=True,
+        validators=between(0, 30),
+        help_text=_(
+            "Before or after the planned day. Further off is a deviation. Empty: any day will do."
+        ),
+    )
     goal_percent = models.FloatField(
         _("goal (% of baseline)"), default=100, validators=between(50, 200, "%")
     )
@@ -144,15 +153,13 @@ class Study(ClinicModel):
         ),
     )
     planned_sd = models.FloatField(
-        _("SD that the size rests on"),
+        _("SD between people"),
         null=True,
         blank=True,
         validators=between(0.001, 1000),
-        help_text=_(
-            "Between people, of the primary outcome. A look then says how many participants the "
-            "spread of all together needs."
-        ),
+        help_text=_("Of the primary outcome, from earlier studies."),
     )
+    assumed = models.JSONField(default=dict, editable=False)  # `analysis.sample_size.Assumed`
     facts = models.JSONField(default=dict, editable=False)  # to what `registration.facts` asks
     created_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
     created_at = models.DateTimeField(default=timezone.now, editable=False)

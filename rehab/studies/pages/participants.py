@@ -62,7 +62,12 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
                 messages.success(request, message % {"why": noted.why_not})
                 return redirect(reverse("study", args=[study.pk]) + "#screening")
             enrollment = enroll(
-                study, patient, form.levels, keep_data=keep_data, by=user, now=now, met=form.met
+                *(study, patient, form.levels),
+                keep_data=keep_data,
+                by=user,
+                now=now,
+                met=form.met,
+                consent=form.consent,
             )
         except InvalidSetting as problem:
             form.add_error(None, refuse(request, problem))
@@ -149,7 +154,8 @@ def leave_study(request: HttpRequest, enrollment_id: int) -> HttpResponse:
     """Record that a participant leaves the study."""
     user = user_of(request)
     enrollment = get_enrollment(user, enrollment_id)
-    withdraw(enrollment, user, timezone.now(), request.POST.get("reason", "")[:1000])
+    reason, back = request.POST.get("reason", "")[:1000], request.POST.get("consent") == "back"
+    withdraw(enrollment, user, timezone.now(), reason, takes_consent_back=back)
     return redirect("participant", enrollment_id=enrollment.pk)
 
 

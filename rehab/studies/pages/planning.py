@@ -10,7 +10,7 @@ from django.contrib import messages
 from django.core.exceptions import PermissionDenied
 from django.db import transaction
 from django.db.models import Count
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.template.defaultfilters import floatformat
 from django.utils import timezone
@@ -28,8 +28,10 @@ from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.analysis.outcomes import define_outcomes
+from rehab.studies.arm_forms import build_arm_forms, save_arms
+from rehab.studies.arms import MAX_ARMS
 from rehab.studies.blinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
-from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
+from rehab.studies.forms import StudyForm, save_draft
 from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
@@ -41,6 +43,7 @@ from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import plan_rows, write_pdf
 from rehab.studies.results.reading import UNREAD
 from rehab.studies.results.results import may_look
+from rehab.studies.size_form import SizeForm
 from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
@@ -103,6 +106,22 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
         "outcomes": define_outcomes(),
     }
     return render(request, "studies/form.html", context)
+
+
+@for_roles(Role.LEAD, patients=False)
+@require_POST
+def show_size(request: HttpRequest) -> HttpResponse:
+    """Answer how many participants the plan needs that is being typed; nothing is stored."""
+    sent = request.POST
+    rows = [n for n in range(MAX_ARMS) if sent.get(f"arm-{n}-name")]
+    weights = [read_key(sent.get(f"arm-{row}-weight", "")) or 1 for row in rows]
+    form = SizeForm(sent)
+    form.full_clean()
+    try:
+        words, participants = form.tell(weights if len(rows) > 1 else [1, 1])
+    except InvalidSetting as problem:
+        words, participants = format_refusal(problem), None
+    return JsonResponse({"words": words, "participants": participants})
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)

@@ -1,4 +1,4 @@
-"""A study's power by simulation: started, watched, continued."""
+"""A study's power: by formula at once, then by simulation: started, watched, continued."""
 
 from __future__ import annotations
 
@@ -21,12 +21,10 @@ from rehab.sessions.live import runtime
 from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
 from rehab.studies.pages.refusals import refuse
-from rehab.studies.power_runs import SIMULATIONS_MAX, PowerRun, plan_run
+from rehab.studies.power_runs import SIMULATIONS_MAX, PowerRun, plan_run, usual_settings
+from rehab.studies.registration.size import size_of_study
 from rehab.studies.results.drawing import outcome_label, outcome_unit
-from rehab.studies.simulation.walkers import Population
 from rehab.training.measures import InvalidSetting
-
-USUAL = Population()
 
 
 class PowerForm(forms.Form):
@@ -40,16 +38,11 @@ class PowerForm(forms.Form):
 
     def __init__(self, *args: Any, study: Study, **options: Any) -> None:
         super().__init__(*args, **options)
-        self.initial = {
-            "participants": study.participants,
-            "sd_percent": USUAL.sd_percent,
-            "kept_percent": 100 * USUAL.retained,
-            "dropout_percent": 100 * USUAL.dropout,
-            "simulations": 200,
-        }
+        self.initial = usual_settings(study)
         self.arms = list(study.arms.all())
         for arm in self.arms:
-            self.fields[f"effect_{arm.code}"] = NumberField(label=str(arm), initial=0.0)
+            effect = self.initial["effects"].get(arm.code, 0.0)
+            self.fields[f"effect_{arm.code}"] = NumberField(label=str(arm), initial=effect)
 
     @property
     def effects(self) -> list[Any]:
@@ -96,6 +89,7 @@ def show_power(request: HttpRequest, study_id: int) -> HttpResponse:
     context = {
         "study": study,
         "form": form,
+        "size": (size_of_study(study) or ("", ""))[1],
         "runs": [{"run": run, "works": run.is_working(now), "power": run.power} for run in runs],
         "outcome": outcome_label(study.primary_outcome),
         "unit": outcome_unit(study.primary_outcome),

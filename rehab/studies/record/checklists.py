@@ -14,6 +14,7 @@ from textwrap import fill
 from rehab.studies.models import Study
 from rehab.studies.record.known import UNMASKED, know
 from rehab.studies.registration.facts import ASKED
+from rehab.studies.registration.size import size_of_study
 from rehab.studies.results.results import Results
 
 INDENT = "    "
@@ -23,6 +24,8 @@ NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 SAID_BLINDED = "a marked assessor, or other words: “{said}” is not so, no assessor is marked"
 # Words that say that assessors are blinded, up to three words apart.
 ASSESSOR, BLINDED = r"\b(?:assessor|rater)\w*", r"\b(?:blind|mask)\w*"
+NO_CRITERIA = "who may take part (age, diagnosis, abilities): no criteria are registered"
+TOO_FEW = "why {planned} are planned where the formula asks for {needed}"
 NEAR = r"\W+(?:(?!not\b)\w+\W+){0,3}?"
 SAYS_BLINDED = re.compile(f"{ASSESSOR}{NEAR}{BLINDED}|{BLINDED}{NEAR}{ASSESSOR}", re.IGNORECASE)
 # List; then one line for each item: number | words | what answers it.
@@ -33,7 +36,7 @@ ITEMS = {
         2 | version and date | version
         3a | who wrote it | contributors
         3b | sponsor, contact | sponsor
-        3c | part of sponsor and funders | sponsor funding
+        3c | part of sponsor and funders | sponsor_role
         3d | committees | committees
         4 | registration | registry
         5 | where protocol and analysis plan are | version plan
@@ -87,7 +90,7 @@ ITEMS = {
         2 | registration | registry
         3 | protocol and analysis plan | version plan
         4 | sharing | exportable sharing
-        5a | funding | funding
+        5a | funding, part of funders | funding sponsor_role
         5b | conflicts of interest | conflicts
         6 | background | background
         7 | objectives | question
@@ -177,7 +180,8 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
     """
     answers = know(study, results) | study.facts
     is_unmasked, said_blinded = UNMASKED in answers["masked"], ""
-    if is_unmasked and _says_blinded([answers.get("blinding", "")]):
+    further = _further(study)
+    if is_unmasked and _names_assessor(answers.get("blinding", "")):
         said_blinded = answers.pop("blinding")  # a report tells one truth: GARRY's
     for name, items in ITEMS.items():
         said: dict[str, str] = {}  # at which item
@@ -195,6 +199,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 else str(ASKED[slug])
                 for slug in asked
             ]
+            lacking += [further[slug] for slug in named if slug in further]
             if slugs == "-" or not (given or lacking):
                 lacking = [BY_HAND]
             if "masked" in named and is_unmasked and _says_blinded(given):
@@ -206,6 +211,24 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "answer": " ".join([*(f"{one.rstrip('.')}." for one in given[:-1]), *given[-1:]]),
                 "still asked": "; ".join(lacking),
             }
+
+
+def _further(study: Study) -> dict[str, str]:
+    """Return what a plan leaves open though it could be registered, by the slug of its answer."""
+    found = {}
+    sized = size_of_study(study)
+    if sized is not None and (needed := sized[0].enrolled) > study.participants:
+        found["participants"] = TOO_FEW.format(planned=study.participants, needed=needed)
+    if not study.criteria:
+        found["eligibility"] = NO_CRITERIA
+    return found
+
+
+def _names_assessor(who_is_blinded: str) -> bool:
+    """Return whether an answer to who is blinded names assessors, and does not say they are not."""
+    clauses = re.split(r"[.;,]", who_is_blinded)
+    text = " ".join(one for one in clauses if not re.search(r"\b(?:not|know)\b", one))
+    return bool(re.search(ASSESSOR, text, re.IGNORECASE))
 
 
 def _says_blinded(given: Iterable[str]) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 
 from rehab.people.covariates import age_band, months_since
 from rehab.sessions.log import RobotEntry
+from rehab.studies.agreements import WITHDRAWN
 from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
 from rehab.studies.analysis.outcomes import OUTCOMES, scale_of
@@ -37,6 +38,8 @@ def find(study: Study, results: Results) -> dict[str, str]:
     kinds = StudyEvent.Kind
     revealed = study.events.filter(kind__in=(kinds.UNBLINDED, kinds.EMERGENCY))
     alone = revealed.filter(about="alone").count()
+    back = study.events.filter(kind=kinds.WITHDRAWN, about=WITHDRAWN)
+    groups = Counter(back.values_list("enrollment__allocation__group", flat=True))
     reasons = "".join(f", {count} {reason}" for reason, count in assessed.reasons.most_common())
     return {
         "flow": f"{assessed.people} assessed, {assessed.turned_away} turned away "
@@ -48,7 +51,8 @@ def find(study: Study, results: Results) -> dict[str, str]:
         ),
         "losses": "; ".join(
             f"{one.arm}: {one.never_began} never began, {one.left} left later, {one.removed} "
-            f"removed; {len(_visits(results, one.arm, Attendance.MISSED))} visits missed, "
+            f"removed, {_of_arm(groups, one.arm)} took the consent back; "
+            f"{len(_visits(results, one.arm, Attendance.MISSED))} visits missed, "
             f"{one.visits_excluded} excluded"
             for one in flow
         )
@@ -73,6 +77,11 @@ def find(study: Study, results: Results) -> dict[str, str]:
         "ended": f"Closed on {study.closed_at:%Y-%m-%d}, with {len(results.participants)} of "
         f"{study.participants} participants.",
     }
+
+
+def _of_arm(groups: Counter[str], arm: str) -> int:
+    """Return how many of some people were allocated to an arm, or to begin with it."""
+    return sum(count for group, count in groups.items() if group.split("-")[0] == arm)
 
 
 def _delivered(results: Results, flow: ArmFlow) -> str:

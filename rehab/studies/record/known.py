@@ -12,6 +12,7 @@ from rehab.studies.record.found import find
 from rehab.studies.registration.document import FIRST_A2, describe
 from rehab.studies.registration.estimands import METHOD, estimands, summary
 from rehab.studies.registration.outcome_changes import outcome_changes
+from rehab.studies.registration.size import size_of_document
 from rehab.studies.results.results import Results
 from rehab.training.valences import find_valence
 
@@ -73,7 +74,8 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
     for arm in arms:
         phases = _phases(arm["phases"])
         walked[phases] = f"{walked[phases]}, {arm['code']}" if phases in walked else arm["code"]
-    follow_up, crossed = visits.get("days_to_follow_up"), document["design"] == "crossover"
+    follow_up, window = visits.get("days_to_follow_up"), visits.get("window_days")
+    crossed = document["design"] == "crossover"
     return {
         "title": document["title"],
         "question": document["question"],
@@ -91,8 +93,10 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "timeline": f"Visits{' in each period' * crossed}: {visits['in_each_period']}, days "
         f"between them: {visits['days_between']}"
         + f", between periods: {visits['days_between_periods']}" * crossed
-        + (f", to the follow-up: {follow_up}." if follow_up else "; no follow-up."),
-        "participants": f"{document['participants']} participants are planned.",
+        + (f", to the follow-up: {follow_up}" if follow_up else "; no follow-up")
+        + (f"; a visit may be {window} days off." if window is not None else "."),
+        "participants": f"{document['participants']} participants are planned. "
+        f"{size_of_document(document)}".strip(),
         "allocation": f"{METHODS[allocation['method']]}; factors: {factors}.",
         "sequence": "GARRY draws it from a seed of 128 random bits; the rule is in the protocol.",
         "concealment": CONCEALED,
@@ -113,8 +117,9 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         "power": _power(study),
         "exportable": EXPORTABLE,
         "confidentiality": "Pseudonyms; exports by roles, logged; erasure on demand.",
-        "consents": "Each consent to research names its text's version; a new version of the study "
-        "may require each participant's consent before the next visit.",
+        "consents": "Nobody is enrolled without a signed consent to the study, whose version, day "
+        "and recorder are stored; a new version of the study may require another one before the "
+        "next visit; whoever takes it back leaves the study.",
     }
 
 

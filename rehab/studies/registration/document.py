@@ -15,6 +15,7 @@ from rehab.feedback.models import FeedbackType
 from rehab.questionnaires.instrument import Instrument
 from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.models import Arm, Study
+from rehab.studies.registration.size import read_assumed
 from rehab.training.goals import GoalRule
 from rehab.training.measures import Measure
 from rehab.training.phases import Phase
@@ -35,7 +36,7 @@ FIRST_A2 = Measure(
     goal_max=15.0,
     first_goal=3.9,
 )
-ANALYSIS = ("margin", "spending", "planned_sd")
+ANALYSIS = ("margin", "spending", "planned_sd", "assumed")
 USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
 
 
@@ -67,7 +68,11 @@ def describe(study: Study) -> dict[str, Any]:
         document["visits"]["days_to_follow_up"] = plan.follow_up_days
         for arm in study.arms.all():
             arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
+    if study.window_days is not None:
+        document["visits"]["window_days"] = study.window_days
     planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
+    if read_assumed(planned) is None:
+        planned.pop("assumed", None)
     document |= {"analysis": planned} if planned else {}
     document |= {"facts": study.facts} if study.facts else {}
     criteria = {"inclusion": study.inclusion_criteria, "exclusion": study.exclusion_criteria}

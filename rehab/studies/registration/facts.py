@@ -6,9 +6,12 @@ from django.utils.translation import gettext_lazy as _
 
 # Slug to the question; `checklists` says which items each answers.
 ASKED = {
-    "sponsor": _("Sponsor: name, address, and its part in the study"),
+    "sponsor": _("Sponsor: name, address, contact"),
+    "sponsor_role": _(
+        "What sponsor and funders do in design, conduct, analysis and report, and who decides"
+    ),
     "secondary_sponsors": _("Further sponsors"),
-    "funding": _("Money and other support, and the funders’ part in the study"),
+    "funding": _("Money and other support, and from whom"),
     "conflicts": _("Conflicts of interest"),
     "contributors": _("Who wrote the protocol: names, affiliations, parts"),
     "committees": _("Committees: who steers, who decides"),

@@ -24,7 +24,7 @@ Kind = StudyEvent.Kind
 # What a version may change of a study; of its arms, their names and conditions.
 REVISABLE = (
     *("title", "question", "participants", "months_since_stroke", "goal_percent"),
-    *("inclusion", "exclusion", "follow_up_days"),
+    *("inclusion", "exclusion", "follow_up_days", "window_days"),
     *("visits", "days_between", "washout_days", "primary_outcome", "secondary_outcomes"),
     *(*ANALYSIS, "facts"),
 )

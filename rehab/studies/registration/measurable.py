@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from django.utils.translation import gettext
 
+from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES, FOLLOW_UP
+from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.models import Study
 from rehab.studies.models.protocol import OUTCOMES
 from rehab.training.measures import InvalidSetting
@@ -35,6 +37,12 @@ WITH_FEEDBACK = {
 }
 
 
+def needs_follow_up(slug: str) -> bool:
+    """Return whether an outcome is found at the follow-up alone."""
+    of_test = CLINICAL_OUTCOMES.get(slug)
+    return slug == "follow_up_change" or (of_test is not None and of_test.window == FOLLOW_UP)
+
+
 def check_outcomes(study: Study) -> None:
     """Raise InvalidSetting for the outcomes that a study could not find, each with its cure."""
     labels = dict(OUTCOMES)
@@ -51,7 +59,7 @@ def check_outcomes(study: Study) -> None:
 def _reasons(study: Study, slug: str) -> Iterator[str]:
     """Yield why a study could not find an outcome, and what to do."""
     arms = list(study.arms.select_related("measure", "protocol"))
-    if slug == "follow_up_change" and study.follow_up_days is None:
+    if needs_follow_up(slug) and study.follow_up_days is None:
         yield gettext(
             "needs a follow-up, and none is planned: give the days to it, or choose another "
             "outcome."
@@ -60,6 +68,12 @@ def _reasons(study: Study, slug: str) -> Iterator[str]:
     visits += slug == "baseline_change" and study.follow_up_days is not None
     if slug in SEVERAL_VISITS and visits < 2:
         yield gettext("needs two visits: plan more of them, or choose another outcome.")
+    without = [a.code for a in arms if a.protocol and slug not in a.protocol.questionnaires]
+    if slug in OF_QUESTIONS and without:
+        yield gettext(
+            "is asked after sessions, and the protocol of arm %(arms)s does not ask it: choose it "
+            "there (Admin › Protocols), or another outcome."
+        ) % {"arms": ", ".join(without)}
     phases = {arm.code: arm.phases() for arm in arms}
     kind = PHASES.get(slug, "")
     without = [code for code, of in phases.items() if all(one.kind != kind for one in of)]

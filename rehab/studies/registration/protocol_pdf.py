@@ -21,6 +21,7 @@ from rehab.studies.models import METHODS, OUTCOMES, SPENDINGS, Study, StudyVersi
 from rehab.studies.registration.estimands import METHOD, summary
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.outcome_changes import outcome_changes
+from rehab.studies.registration.size import size_of_document
 from rehab.training.schedules import Schedule, ScheduleKind
 
 MARGIN = 20 * mm
@@ -182,12 +183,14 @@ def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Days between visits"), visits["days_between"]),
         (gettext("Days between periods"), visits["days_between_periods"] if crossed else None),
         (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
+        (Study._meta.get_field("window_days").verbose_name, visits.get("window_days")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
         (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
         (gettext("Secondary outcomes (others are exploratory)"), secondary),
         (Study._meta.get_field("margin").verbose_name, analysis.get("margin")),
         (Study._meta.get_field("spending").verbose_name, SPENDINGS.get(analysis.get("spending"))),
         (Study._meta.get_field("planned_sd").verbose_name, analysis.get("planned_sd")),
+        (gettext("Why so many"), size_of_document(document)),
         (gettext("Version of the scoring rules"), document["scoring_rules_version"]),
     ]
     return [(capfirst(name), value) for name, value in rows if value not in (None, "")]

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from datetime import date
 
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.sessions.alarms import UNASKED
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import EVENTS, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.noted import ABOUT_A_FALL, ADVERSE, read_noted
@@ -31,12 +33,13 @@ PLANNED = (
 CHANGES = tuple(str(kind) for kind in CONTROLS if kind not in PLANNED)
 DEVIATIONS = (*CHANGES, RobotEntry.STOP.value)
 ENDED_EARLY, UNWALKED = "ended_early", "phases_not_walked"
-EXCLUDED, UNBLINDED = "excluded", "unblinded"
+EXCLUDED, UNBLINDED, OUTSIDE = "excluded", "unblinded", "outside_window"
 OTHERS = {
     ENDED_EARLY: _("session ended early"),
     UNWALKED: _("finished before the last phase"),
     EXCLUDED: _("session excluded by a correction"),
     UNBLINDED: _("arm revealed"),
+    OUTSIDE: _("visit outside its window"),
 }
 REVEALED = (StudyEvent.Kind.UNBLINDED, StudyEvent.Kind.EMERGENCY)
 
@@ -94,9 +97,11 @@ def read_occurrences(study: Study) -> tuple[Occurrence, ...]:
     visits = StudyVisit.everywhere.filter(enrollment__study=study, session__isnull=False)
     related = ("enrollment__allocation", "enrollment__patient", "session")
     of_people = counts_people_alone(study)
+    planned: dict[tuple[int, int], date] = {}  # of a repeated visit, that of the first attempt
     found: list[Occurrence] = []
     for visit in visits.select_related(*related).order_by("enrollment", "number", "attempt"):
         enrollment, session = visit.enrollment, visit.session
+        day = planned.setdefault((enrollment.pk, visit.number), visit.day)
         if of_people and visit.is_simulated:
             continue
         if enrollment.is_analyzed and session is not None:
@@ -106,6 +111,9 @@ def read_occurrences(study: Study) -> tuple[Occurrence, ...]:
                 visit.number,
             )
             found += _of_session(session, lambda *about, place=place: _make(place, *about))
+            late = (clinic_time(session.created_at, study.clinic).date() - day).days
+            if study.window_days is not None and abs(late) > study.window_days:
+                found.append(_make(place, OUTSIDE, late))
     events = study.events.filter(kind__in=REVEALED, enrollment__isnull=False)
     for event in events.select_related("enrollment__allocation"):
         if event.enrollment is not None and event.enrollment.is_analyzed:

@@ -14,12 +14,13 @@ from functools import cached_property
 from threading import Lock
 from typing import Any
 
-from django.db.models import Count, F, Q, Sum
+from django.db.models import Count, F, Max, Q, Sum
 
 from rehab.sessions.assessments import Assessment
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.sessions.replay import fold_log
 from rehab.studies.analysis.clinical_outcomes import (
     AFTER,
@@ -125,14 +126,15 @@ def _read_people(
     study: Study, until: date, known: Mapping[int, tuple[Any, Participant]]
 ) -> dict[int, tuple[Any, Participant]]:
     """Return everybody who was ever taken in, by enrollment; as known where nothing differs."""
-    metrics, tests = _sum_metrics(study), _read_tests(study)
+    metrics, tests, answered = _sum_metrics(study), _read_tests(study), _answered_at(study)
     people = {}
     of_people = counts_people_alone(study)
     for enrollment in study.enrollments.select_related("allocation", "patient").order_by("pk"):
         visits = latest_attempts(enrollment)
         out = {visit.pk for visit in visits if _is_excluded(visit, of_people=of_people)}
         taken = tests.get(enrollment.patient_id, ())
-        key = (_key(enrollment, visits, until), out, metrics.get(enrollment.pk), taken)
+        pk = enrollment.pk
+        key = (_key(enrollment, visits, until), out, metrics.get(pk), answered.get(pk), taken)
         earlier = known.get(enrollment.pk)
         if earlier is None or earlier[0] != key:
             earlier = (key, _read(enrollment, visits, until, out, taken))
@@ -146,6 +148,15 @@ def _sum_metrics(study: Study) -> dict[int, tuple[int, float]]:
     rows = SessionMetric.everywhere.filter(**{f"{of_whom}__study": study}).order_by()
     sums = rows.values_list(of_whom).annotate(Count("pk"), Sum("value"))
     return {enrollment: (count, total) for enrollment, count, total in sums}
+
+
+def _answered_at(study: Study) -> dict[int, datetime]:
+    """Return when the last questionnaire of each enrollment was finished."""
+    of_whom = "session__study_visit__enrollment"
+    rows = QuestionnaireResponse.everywhere.filter(
+        finished_at__isnull=False, **{f"{of_whom}__study": study}
+    )
+    return dict(rows.order_by().values_list(of_whom).annotate(Max("finished_at")))
 
 
 def _read_tests(study: Study) -> dict[int, tuple[ClinicalResult, ...]]:
@@ -291,4 +302,6 @@ def read_walked(session: TrainingSession) -> AnalyzedSession:
         rows.values_list(*COLUMNS).iterator(),
         higher_is_better=plan.measure.higher_is_better,
     )
+    scores = {one.slug: one.score for one in session.questionnaires.all() if one.finished_at}
+    metrics |= {slug: score for slug, score in scores.items() if score is not None}
     return AnalyzedSession(walk, metrics, plan.measure.slug, is_finished)

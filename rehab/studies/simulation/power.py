@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+from statistics import fmean
 from typing import NamedTuple
 
 from rehab.studies.analysis.comparison import CONFIDENCE
@@ -12,13 +14,17 @@ from rehab.studies.simulation.trial import Trial, differences, simulate
 
 
 class SimulatedDifference(NamedTuple):
-    """What one simulated study found of a pair of arms: the difference with its interval."""
+    """What one simulated study found of a pair of arms: the difference, its interval, the spread.
+
+    ``sd``: between people of an arm, of the mean of their visits.
+    """
 
     group: str
     reference: str
     estimate: float
     low: float | None
     high: float | None
+    sd: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +41,8 @@ class PairPower:
         Share of studies that found it (ratio), with its own 95 % interval.
     estimate
         Mean difference that was found, in the outcome's unit.
+    sd
+        How people differed, in the same unit; None where that was not stored.
     """
 
     group: str
@@ -44,6 +52,7 @@ class PairPower:
     low: float
     high: float
     estimate: float
+    sd: float | None = None
 
 
 def simulate_from(
@@ -62,8 +71,11 @@ def simulate_from(
     began = time.monotonic()
     for seed in seeds:
         batch[seed] = [
-            SimulatedDifference(one.group, one.reference, *astuple(one.difference))
+            SimulatedDifference(
+                one.group, one.reference, found.estimate, found.low, found.high, one.sd
+            )
             for one in differences(trial, simulate(trial, seed))
+            for found in [one.difference]
         ]
         if time.monotonic() - began >= every_s:
             yield batch
@@ -110,7 +122,9 @@ def _power(
     hits = sum(map(is_found, mine))
     low, high = wilson(hits, len(mine))
     estimate = sum(one.estimate for one in mine) / len(mine)
-    return PairPower(group, reference, len(mine), hits / len(mine), low, high, estimate)
+    spreads = [one.sd for one in mine if one.sd is not None]
+    sd = math.sqrt(fmean(each**2 for each in spreads)) if spreads else None
+    return PairPower(group, reference, len(mine), hits / len(mine), low, high, estimate, sd)
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:

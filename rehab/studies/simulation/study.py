@@ -83,6 +83,7 @@ def _plan(
         question="Do intervals cover what each arm truly adds? Nobody walked here.",
         participants=trial.participants,
         months_since_stroke=6,
+        inclusion="Hemiparesis after stroke; walks on a treadmill for ten minutes",
         visits=trial.visits,
         primary_outcome=OUTCOME,
         secondary_outcomes=[
@@ -155,7 +156,9 @@ def _find_or_enroll(study: Study, number: int, now: datetime) -> Enrollment:
         code=code,
         defaults={"nickname": code, "paretic_side": Side.LEFT.value, "simulated": True},
     )
-    return enroll(study, patient, (), keep_data=True, by=None, now=now)
+    return enroll(
+        study, patient, (), keep_data=True, by=None, now=now, met=study.inclusion_criteria
+    )
 
 
 def _walk_all(
