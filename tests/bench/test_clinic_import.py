@@ -9,6 +9,7 @@ import sys
 import time
 from contextlib import ExitStack
 from statistics import median
+from typing import Any
 
 import pytest
 
@@ -32,7 +33,7 @@ def test_sessions_go_on_beside_imports(tmp_path, vendor, monkeypatch):
     ]
     command = [sys.executable, "manage.py", "clinic", "import"]
     rows, took_s = tmp_path / "rows.json", []
-    windows = {"alone": [], "beside": [], "relay": []}
+    windows: dict[str, list[dict[str, Any]]] = {"alone": [], "beside": [], "relay": []}
     with ExitStack() as stack:
         settings = {}
         if vendor == "postgresql":

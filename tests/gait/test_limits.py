@@ -226,7 +226,7 @@ def test_no_ankle_turns_back_before_its_foot_leaves():
 @cache
 def measure_usual() -> dict[str, dict[str, list[float]]]:
     """Return what is usual of each leg's stances, by figure and walk, from the corpus alone."""
-    found = defaultdict(lambda: defaultdict(list))
+    found: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for name in PRESENT:
         walk = open_corpus(name)
         weight_n = walk.mass_kg * GRAVITY_M_S2
