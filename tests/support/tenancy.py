@@ -207,6 +207,9 @@ def fill(
         elif wanted == {"token"}:  # of a family's link; nobody knows one that is there
             yield Route(name, reverse(name, kwargs={"token": "no-such-link"}))
             return
+        elif wanted == {"page"}:  # of the documentation
+            yield Route(name, reverse(name, kwargs={"page": "sources"}))
+            return
         elif wanted == {"language"}:
             yield Route(name, reverse(name, kwargs={"language": "es"}))
             return

@@ -20,8 +20,8 @@ from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, POSITION, TIME
 from rehab.gait.stances.continuity import (
     check_fills,
     check_samples,
+    find_breaks,
     read_moving,
-    take_out_steps,
 )
 from rehab.gait.stances.gaps import HARMFUL_FROM, ClockJudge
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
@@ -57,9 +57,9 @@ LONGEST_S = BEFORE_S + STANCE_MAX_S + 1.0
 # Neighbors are averaged down to 200-400 Hz before the filter: signals up to 6 Hz lose nothing.
 DECIMATED_HZ = 200.0
 FORWARD_HZ = 20.0
-# Of A2: what a spike or a step of moment or angle changes beyond this makes it another value. Less
-# is added to its standard deviation.
-STEPS_SHARE = 0.05
+# Of A2: what a spike of moment or angle changes beyond this makes it another value. Less is added
+# to its standard deviation.
+SPIKES_SHARE = 0.05
 LATE_FROM = 0.72  # of stance; there moment and force have their late peaks
 
 
@@ -212,11 +212,13 @@ class StanceAnalyzer:
         flags: list[Flag],
     ) -> float:
         """Append what a push-off is like; return what spikes and steps make of its A2 [W/kg]."""
-        found, without = take_out_steps(stance, push_off, gap_s)
-        other = (self._analyzer.measure(without) if found else None) or push_off
+        breaks = find_breaks(stance, push_off, gap_s)
+        measured = None if breaks.without is stance else self._analyzer.measure(breaks.without)
+        other = measured or push_off
         by_steps = abs(push_off.a2_w_kg - other.a2_w_kg)
-        if found and not by_steps <= STEPS_SHARE * push_off.a2_w_kg:
-            reasons += found
+        reasons += breaks.steps
+        if not by_steps <= SPIKES_SHARE * push_off.a2_w_kg:
+            reasons += breaks.spikes
         half = stance.index(0.5)
         force_n = stance.signals[0, half : stance.end + 1] - contact.offset_n
         moment_nm = stance.signals[1, half : stance.end + 1]

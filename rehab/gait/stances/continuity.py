@@ -31,7 +31,7 @@ STRAIGHT_S = 0.06
 STRAIGHT_TO = np.array([[4.0], [0.02]])
 # At once [Nm/kg, rad], and by time: the six people of ``plausibility`` reach 13-23 Nm/kg/s and 4-9
 # rad/s, and gaitalytics' unfiltered moment 0.37 Nm/kg at once. Beyond, a channel is no ankle's; of
-# less, what it does to A2 judges (``take_out_steps``).
+# less, ``find_breaks`` judges.
 MOMENT_JUMP = (0.5, 40.0)
 ANGLE_JUMP = (0.2, 15.0)
 
@@ -46,8 +46,8 @@ ANGLE_JUMP = (0.2, 15.0)
 # medians are 5.4 sd of white noise, once in 10 million samples, and six 4 sd: 25 Nm in a moment of
 # noise are told by these (``tests/gait/test_bad_input.py``). Of the unfiltered angles that the
 # markers of four people make (gaitalytics, BTK's two, HBM's) none exceeds k, of gaitalytics' own
-# the largest is 7.6 medians beyond it. What exceeds all that is unusual; a stride is refused by it
-# only where its A2 changes once it is taken out (``analysis.STEPS_SHARE``).
+# the largest is 7.6 medians beyond it. A step beyond all that refuses the stride, a spike
+# only where A2 changes once it is taken out (``analysis.SPIKES_SHARE``).
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 8.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
@@ -172,12 +172,20 @@ def _find_longest_run(found: NDArray[np.bool_]) -> int:
     return int(np.diff(others).max()) - 1
 
 
-def take_out_steps(
-    stance: ResampledStance, push_off: PushOff, gap_s: float
-) -> tuple[list[RejectionReason], ResampledStance]:
-    """Return which channels of a stance have a spike or a step, and the stance without these.
+class Breaks(NamedTuple):
+    """Which channels of a stance have steps that stay, which spikes alone; it without these."""
 
-    What these do to A2 judges the stance: people's channels differ in noise more than in that.
+    steps: list[RejectionReason]
+    spikes: list[RejectionReason]
+    without: ResampledStance
+
+
+def find_breaks(stance: ResampledStance, push_off: PushOff, gap_s: float) -> Breaks:
+    """Return where the channels of a stance are not continuous.
+
+    After a step that stays a channel contradicts itself: time or an offset was lost, and nobody
+    knows how much. Of a spike, what it does to A2 judges the stance: people's channels differ in
+    noise more than in that.
 
     Parameters
     ----------
@@ -196,7 +204,7 @@ def take_out_steps(
     last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
     angle = stance.signals[ANGLE - FORCE, first:]
     if last - first <= apart or len(angle) <= 4 * apart:
-        return [], stance
+        return Breaks([], [], stance)
     found = []
     smooth = np.array([push_off.moment_nm_kg * push_off.mass_kg, push_off.angle_rad])
     rough = stance.signals[MOMENT - FORCE :] - smooth
@@ -211,14 +219,17 @@ def take_out_steps(
     fourth += bends[: -2 * apart]
     if (limit := _find_limit(np.abs(fourth), angle, walking, *ANGLE_FOURTH)) is not None:
         found.append((RejectionReason.ANGLE_LOST, 1, limit / 6, len(push_off.angle_rad)))
+    breaks = Breaks([], [], stance)
     if not found:
-        return [], stance
+        return breaks
     signals = stance.signals.copy()
     before = max(0, first - 4 * apart)
-    for _, row, least, stop in found:
+    for reason, row, least, stop in found:
         values = signals[MOMENT - FORCE + row, before:]
-        values -= _find_steps(values, rough[row, before:], apart, least, stop - before)
-    return [reason for reason, *_ in found], replace(stance, signals=signals)
+        steps, stays = _find_steps(values, rough[row, before:], apart, least, stop - before)
+        values -= steps
+        (breaks.steps if stays else breaks.spikes).append(reason)
+    return breaks._replace(without=replace(stance, signals=signals))
 
 
 def _find_limit(
@@ -241,16 +252,19 @@ def _find_limit(
     return limit if highest > limit else None
 
 
-def _find_steps(values: Floats, rough: Floats, apart: int, least: float, stop: int) -> Floats:
-    """Return the steps of a channel, of which a spike has two, added up from its first sample on.
+def _find_steps(
+    values: Floats, rough: Floats, apart: int, least: float, stop: int
+) -> tuple[Floats, bool]:
+    """Return the steps of a channel, added up from its first sample on, and whether one stays.
 
     A step is what a change over ``apart`` samples has beyond the median of five such changes in a
     row. It is taken, with its neighbors, where it is ``least`` or more in what the channel has
-    beside its smooth curve (``rough``), and before sample ``stop``.
+    beside its smooth curve (``rough``), and before sample ``stop``. A spike has two, of which
+    nothing stays.
     """
-    added = np.zeros_like(values)
+    added, stays = np.zeros_like(values), False
     if len(values) <= 5 * apart:
-        return added
+        return added, stays
     near = np.abs(_find_changes(rough, apart)) >= least
     near = np.convolve(near, np.ones(2 * WHOLE * apart + 1), "same") >= 1
     beyond = np.where(near, _find_changes(values, apart), 0.0)
@@ -259,10 +273,12 @@ def _find_steps(values: Floats, rough: Floats, apart: int, least: float, stop: i
         part = beyond[first:last]
         if abs(float(part.sum())) / apart < SPIKE * float(np.abs(part).max()):
             part -= part.mean()
+        else:
+            stays = True
     begin = 2 * apart + (apart + 1) // 2  # in the middle of the change
     added[begin : begin + len(beyond)] = beyond / apart
     added[stop:] = 0.0
-    return np.cumsum(added)
+    return np.cumsum(added), stays
 
 
 def _find_changes(values: Floats, apart: int) -> Floats:

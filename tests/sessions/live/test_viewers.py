@@ -7,7 +7,7 @@ import random
 import pytest
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.consumers.screens import PAGE_STEPS
+from rehab.sessions.live.protocol.backlog import PAGE_STEPS
 from rehab.sessions.live.session import hub
 from rehab.training.phases import make_phase
 from tests.support.callers import (

@@ -21,6 +21,7 @@ from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder
+from rehab.sessions.live.protocol.backlog import read_backlog
 from rehab.sessions.live.protocol.messages import (
     is_mirror,
     read_after,
@@ -32,7 +33,6 @@ from rehab.sessions.live.protocol.messages import (
 from rehab.sessions.live.robot_permissions import RobotOrder, read_robot_order
 from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.log import Step
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
@@ -40,15 +40,6 @@ from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame, read_flag, read_name, read_number, read_whole
-
-PAGE_STEPS = 256  # past steps of one query
-
-
-@database_sync_to_async
-def read_backlog(session_id: int, after: int, until: int) -> list[Step]:
-    """Return the next page of steps after one number up to another, oldest first."""
-    steps = Step.everywhere.filter(session_id=session_id, number__gt=after, number__lte=until)
-    return list(steps.order_by("number")[:PAGE_STEPS])
 
 
 class ScreenConsumer(Socket):
