@@ -25,6 +25,7 @@ const SCALE_LEAST = 260; // of the thermometer
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
+const INSET = 56; // of the thermometer where all is in the middle of a high screen
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -89,7 +90,9 @@ export function createFitting(body, scene) {
     const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
     const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
-    return { width, height, isWide, top, zero, goal, reach, below: goal + reach + AIR - main.offsetTop / u };
+    const inset = column === "center" && !landscape.matches ? INSET : 0;
+    const below = goal + reach + AIR - main.offsetTop / u;
+    return { width, height, isWide, inset, top, zero, goal, reach, below };
   }
 
   function set(level, short) {
