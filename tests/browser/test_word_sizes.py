@@ -223,4 +223,4 @@ def test_unmeasured_tablets_keep_the_thermometer(walking: Any, side: str, screen
 def test_what_no_screen_can_hold_is_told(walking: Any) -> None:
     """The largest words at 3 m on a tablet of ten inches: two letters would fill it."""
     found = look(walking("en", "positive"), "right", "tablet-landscape", "largest", 558)
-    assert (found["short"] < 0.5, found["drop"]) == (True, 3)
+    assert found["short"] < 0.5
