@@ -25,7 +25,11 @@ ALL = [(slug, language) for slug in VALENCES for language, _ in LANGUAGES]
 @pytest.mark.parametrize(("slug", "language"), ALL)
 def test_each_band_has_twelve_phrases_that_fit(slug: str, language: str) -> None:
     longest, word = LENGTHS[language]
-    for band in default_valence(slug, language).bands:
+    valence = default_valence(slug, language)
+    for band in valence.bands:
+        if not valence.has_points:
+            assert band.phrases == ()  # its page says the goal
+            continue
         assert len(set(band.phrases)) >= 12
         assert max(map(len, band.phrases)) <= longest
         assert max(len(part) for phrase in band.phrases for part in phrase.split()) <= word

@@ -158,15 +158,15 @@ def patient_step(
         "streak": streak if valence.rewards else None,
         # What is measured is shown where it is the feedback itself.
         "shown": None if valence.has_points or step.shown is None else round(step.shown, 2),
-        "goal": _goal_beside(context, step),
+        **_goal_beside(context, step),
     }
 
 
-def _goal_beside(context: StepContext, step: StoredStep) -> float | None:
-    """Return the goal that the patient reads beside a value; None where points tell."""
+def _goal_beside(context: StepContext, step: StoredStep) -> Message:
+    """Return the goal that the patient reads beside a value, where no points tell."""
     if context.valence.has_points or not context.words_shown or step.goal is None:
-        return None
-    return round(step.goal, 2)
+        return {}
+    return {"goal": round(step.goal, 2)}
 
 
 def _summary(
@@ -196,7 +196,7 @@ def _summary(
         "score": score,
         "streak": streak if valence.rewards else None,
         "shown": None if valence.has_points else round(answer.mean_shown, 2),
-        "goal": _goal_beside(context, step),
+        **_goal_beside(context, step),
         "summary": {"hits": answer.hits, "steps": answer.steps, "close": answer.close},
     }
 

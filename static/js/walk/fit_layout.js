@@ -1,7 +1,7 @@
 // The words and the number keep the size that was promised: in degrees, as the patient sees them. What does not fit
 // beside them goes, in this order: the chart of strides, the badge, the thermometer, each only if that makes the words
-// larger. On a screen that nobody measured no size is promised: the thermometer, which says most, stays there if that
-// costs at most a quarter. Where words are smaller than promised the page says by how much (`data-short`).
+// larger. On a screen that nobody measured no size is promised: the badge stays there if that costs at most a tenth, the
+// thermometer, which says most, for a quarter. Where words are smaller than promised the page says by how much (`data-short`).
 //
 // One frame holds for all steps: it follows from the longest phrases and a number of as many digits, so that goal,
 // thermometer, badge and total stay where they are. Heights are in units, --u (walk.css).
@@ -9,8 +9,9 @@
 const CHART = 1;
 const BADGE = 2;
 const LAST = 3;
-const WORTH = 0.75; // of the words' size: so much the thermometer may cost where no size is promised
 const ENOUGH = 0.99; // of the largest size that is possible
+// So much of it must be left where no size is promised, for the chart, the badge and the thermometer to stay.
+const WORTH = [ENOUGH, 0.9, 0.75];
 const LEAST = 0.1; // of the promised size
 const HALVINGS = 8; // of the search for what fits
 
@@ -24,13 +25,14 @@ const SCALE_LEAST = 260; // of the thermometer
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
+const INSET = 56; // of the thermometer where all is in the middle of a high screen
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
 
 // Return how much goes, by the largest size of words at each level.
 export function chooseLevel(size, isMeasured, isColumn) {
-  const worth = (level) => (isMeasured || level < (isColumn ? CHART : BADGE) ? ENOUGH : WORTH);
+  const worth = (level) => (isMeasured ? ENOUGH : WORTH[level]);
   let level = isColumn ? CHART : 0;
   while (level < LAST && size(level) < 1 && size(level) < worth(level) * size(LAST)) level++;
   return level;
@@ -39,7 +41,7 @@ export function chooseLevel(size, isMeasured, isColumn) {
 export function createFitting(body, scene) {
   const find = (selector) => body.querySelector(selector);
   const [stage, main, phrase, words, count, key] = [".stage", "main", ".phrase", ".words", ".count", ".key"].map(find);
-  const feet = body.querySelectorAll(".part, .actions");
+  const [part, actions] = [".part", ".actions"].map(find);
   const landscape = matchMedia("(orientation: landscape)");
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
@@ -88,7 +90,9 @@ export function createFitting(body, scene) {
     const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
     const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
-    return { width, height, isWide, top, zero, goal, reach, below: goal + reach + AIR - main.offsetTop / u };
+    const inset = column === "center" && !landscape.matches ? INSET : 0;
+    const below = goal + reach + AIR - main.offsetTop / u;
+    return { width, height, isWide, inset, top, zero, goal, reach, below };
   }
 
   function set(level, short) {
@@ -118,7 +122,7 @@ export function createFitting(body, scene) {
     const shown = key.textContent.replace("−", "").replace(/\d/g, "8");
     widest = [usual, shown].reduce((a, b) => (b.length > a.length ? b : a), widest);
     const number = isFeedback ? widest : "";
-    const said = isFeedback ? samples : [phrase.textContent];
+    const said = isFeedback ? samples : [phrase.textContent, actions.textContent];
     const { text, column, side } = body.dataset;
     const degree = body.style.getPropertyValue("--degree");
     const { status } = document.fonts;
@@ -128,7 +132,7 @@ export function createFitting(body, scene) {
 
     if (!isFeedback) {
       set(0, largest(0, holdsMessage));
-      const foot = Math.max(...[...feet].map((one) => one.offsetHeight));
+      const foot = Math.max(part.offsetHeight, actions.offsetHeight);
       const below = foot ? foot / unit() + 36 + EDGE : 64;
       body.style.setProperty("--floor", `${stage.clientHeight - below * unit()}px`);
       return;

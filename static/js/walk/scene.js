@@ -27,9 +27,9 @@ export function createScene(svg) {
   // Place all: `top`, `zero` and `goal` are heights of the scale, `reach` that of the strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, top: top150, zero, goal, reach, isWide, isFlipped } = frame;
+    const { width, height, top: top150, zero, goal, reach, isWide, isFlipped, inset } = frame;
     const { sign, room, rise, turn } = isWide ? BESIDE : BEFORE;
-    const x = width - EDGE - room;
+    const x = width - EDGE - room - inset;
     const [top, bottom, r] = [top150 - 36, zero + 78, TUBE_RADIUS];
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
