@@ -16,6 +16,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
+from rehab.studies.allocation.blocks import MAX_BLOCK
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
 from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
@@ -80,7 +81,7 @@ SECTIONS = (
     Section(
         _("Allocation"),
         ("method", "block_sizes", "factors_text", "allocation_list"),
-        _("blocks of 4 or 6 at random, no strata"),
+        _("blocks of random size, no strata"),
     ),
     Section(
         _("Non-inferiority, and looks before the end"),
@@ -95,11 +96,10 @@ class StudyForm(ClinicForm, AssumedForm):
 
     block_sizes = forms.CharField(
         label=_("sizes of blocks"),
-        initial="4, 6",
         required=False,
         help_text=_(
             "Of permuted blocks, drawn at random. Sealed: those who enroll patients do not see "
-            "them."
+            "them. Empty: two and three times the ratio, such as 4 and 6."
         ),
     )
     factors_text = forms.CharField(
@@ -164,7 +164,8 @@ class StudyForm(ClinicForm, AssumedForm):
             self.initial["factors_text"] = "\n".join(lines)
             if study.sealed:
                 sizes = unseal(study.sealed).block_sizes
-                self.initial["block_sizes"] = ", ".join(map(str, sizes))
+                shown = () if sizes == usual_sizes(study) else sizes
+                self.initial["block_sizes"] = ", ".join(map(str, shown))
         else:
             for name in ALLOCATION_FIELDS:
                 del self.fields[name]
@@ -224,11 +225,16 @@ class StudyForm(ClinicForm, AssumedForm):
             scheme = study.scheme()
             listed = read_list(data["allocation_list"], scheme.groups, scheme.factors)
         is_list, is_blocks = study.method == Method.LIST, study.method == Method.BLOCKS
-        secret = Secret(
-            before.seed, data["block_sizes"] if is_blocks else (), listed if is_list else ()
-        )
+        sizes = data["block_sizes"] or usual_sizes(study)
+        secret = Secret(before.seed, sizes if is_blocks else (), listed if is_list else ())
         study.sealed = seal(secret)
         check_secret(study)
+
+
+def usual_sizes(study: Study) -> tuple[int, ...]:
+    """Return the sizes of blocks unless others are given: whole, and not to be guessed by two."""
+    share = sum(group.weight for group in study.groups())
+    return tuple(size for size in (2 * share, 3 * share) if size <= MAX_BLOCK) or (share,)
 
 
 OF_VISIT, SEVERAL = _("Of each visit’s strides"), _("From visit to visit")

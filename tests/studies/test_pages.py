@@ -129,6 +129,16 @@ def test_a_plan_that_cannot_be_run_is_told_how_to_mend(world, arms, change, word
     assert logged == f"Refused to account {lead.pk}: {reverse('new-study')}"
 
 
+@pytest.mark.parametrize(("count", "sizes"), [(2, (4, 6)), (3, (6, 9))])
+def test_blocks_fit_the_arms_unless_others_are_given(world, count, sizes):
+    lead, url = client_of(world, Role.LEAD), reverse("new-study")
+    lead.post(url, plan(*("positive", "negative", "explicit")[:count], block_sizes=""))
+    study = Study.everywhere.get(code="VAL")
+    assert unseal(study.sealed).block_sizes == sizes
+    form = lead.get(reverse("plan-study", args=[study.pk])).context["form"]
+    assert form["block_sizes"].value() == ""  # and its part of the page stays folded
+
+
 def refusals(caplog) -> list[str]:
     return [
         one.getMessage() for one in caplog.records if one.name.endswith("studies.pages.refusals")
