@@ -1,7 +1,8 @@
 // The words and the number keep the size that was promised: in degrees, as the patient sees them. What does not fit
-// beside them goes, in this order: the chart of strides, the badge, the thermometer, each only if that makes the words
-// larger. On a screen that nobody measured no size is promised: the badge stays there if that costs at most a tenth, the
-// thermometer, which says most, for a quarter. Where words are smaller than promised the page says by how much (`data-short`).
+// beside them goes, in this order: the chart of strides, the badge, the thermometer, each only if that makes the
+// words larger. On a screen that nobody measured no size is promised: the badge stays there if that costs at most a
+// tenth, the thermometer, which says most, for a quarter. Where words are smaller than promised the page says by how
+// much (`data-short`).
 //
 // One frame holds for all steps: it follows from the longest phrases and a number of as many digits, so that goal,
 // thermometer, badge and total stay where they are. Heights are in units, --u (walk.css).
