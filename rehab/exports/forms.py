@@ -38,6 +38,7 @@ class ClinicExportForm(forms.Form):
 
     keys = forms.CharField(
         label=_("Public keys of who takes it in (age1…), one a line"),
+        help_text=_("The other host makes a pair of keys and gives you the public one."),
         widget=forms.Textarea({"rows": 2}),
         max_length=1000,
     )

@@ -49,7 +49,7 @@ SECRET, PUBLIC = generate_key()
 @pytest.fixture(autouse=True)
 def short_wait(monkeypatch: pytest.MonkeyPatch, settings: Any) -> None:
     monkeypatch.setattr("rehab.management.commands.clinic.LEAVES_WITHIN_S", 0.0)
-    monkeypatch.setattr(arrival, "REST", 0.0)
+    monkeypatch.setattr(departure, "REST", 0.0)
     monkeypatch.setattr(os, "nice", lambda _by: None)
     settings.BACKUP_KEYS = [PUBLIC]
 

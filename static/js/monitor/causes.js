@@ -50,7 +50,7 @@ function describeFall(session, { robot }) {
     session.state === "paused" && _("Paused"),
     robot.isStopped && _("Robot stopped"),
   ];
-  return `${fell}\n${facts.filter(Boolean).join(" · ")}`;
+  return `${fell}\n${facts.filter(Boolean).join(" · ")}\n${_("If the belt still runs, stop it by hand.")}`;
 }
 
 function describeOwnStop(session, { robot }) {
