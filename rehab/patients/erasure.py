@@ -1,22 +1,19 @@
-"""Erasure of what identifies a person, and retention periods."""
+"""Erasure of what identifies a person."""
 
 from __future__ import annotations
 
-from calendar import monthrange
 from contextlib import suppress
 from datetime import datetime
 
 from django.contrib.admin.models import LogEntry
 from django.contrib.contenttypes.models import ContentType
 from django.db import DatabaseError, connection, transaction
-from django.db.models import Exists, Max, Model, OuterRef, QuerySet
-from django.db.models.functions import Coalesce, Greatest
+from django.db.models import Model
 
 from rehab.patients.closure import lock_without_open_session
-from rehab.patients.visits import Visit
-from rehab.people.audit import audit_log, seals
-from rehab.people.audit.audit_log import Act, AuditEntry
-from rehab.people.audit.history import HistoryEntry, erase_values
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
+from rehab.people.audit.history import erase_values
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.consent.tombstones import block_reimport
@@ -27,8 +24,7 @@ from rehab.people.field_policy import (
     paths_to_patient,
     policies_of,
 )
-from rehab.people.models import Clinic, ErasureReason, Patient, User
-from rehab.sessions.formatting import clinic_time
+from rehab.people.models import ErasureReason, Patient, User
 from rehab.sessions.seals import replace_seals
 
 
@@ -97,34 +93,3 @@ def _erase_rows(model: type[Model], path: str, patient: Patient, pseudonym: str)
         rows.update(**values)
     for eraser in erasers_of(model):
         eraser(patient, pseudonym)
-
-
-def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
-    """Return the patients whose retention period has passed.
-
-    It begins with the last session, but not before the patient was added, since imported sessions
-    are older. Patients with a planned visit are not among them.
-    """
-    patients = Patient.everywhere.filter(clinic=clinic, erased_at=None, simulated=False)
-    if clinic.retention_months is None:
-        return patients.none()
-    last = Greatest(Coalesce(Max("sessions__created_at"), "created_at"), "created_at")
-    before = months_before(now, clinic.retention_months)
-    today = clinic_time(now, clinic).date()
-    expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
-    past = patients.annotate(last_here=last).filter(last_here__lt=before)
-    return past.exclude(Exists(expected)).order_by("pk")
-
-
-def delete_old_logs(clinic: Clinic, now: datetime) -> int:
-    """Delete entries that are older than a clinic keeps its logs; return how many."""
-    before = months_before(now, clinic.log_retention_months)
-    logs = (AuditEntry.__name__, HistoryEntry.__name__)
-    return sum(seals.cut_before(log, clinic.pk, before, now) for log in logs)
-
-
-def months_before(moment: datetime, months: int) -> datetime:
-    """Return the same day some months earlier, or the last day of a shorter month."""
-    year, month = divmod(moment.year * 12 + moment.month - 1 - months, 12)
-    year, month = max(year, 1), month + 1
-    return moment.replace(year=year, month=month, day=min(moment.day, monthrange(year, month)[1]))

@@ -125,7 +125,7 @@ LIMITS = {  # the figure, its least and its largest allowed value, and the margi
     "angle's jumps": (None, 1, 5),
     "moment's bends": (1, None, 5),
     "angle's bends": (1, None, 5),
-    "by steps": (None, analysis.SPIKES_SHARE, 3),
+    "by steps": (None, continuity.SPIKES_SHARE, 3),
     "stance": (plausibility.STANCE_MIN_S, plausibility.STANCE_MAX_S, 3),
     "moment": (plausibility.MOMENT_MIN, plausibility.MOMENT_MAX, 1.9),
     "moment in swing": (None, plausibility.MOMENT_SWING, 9),
@@ -287,7 +287,7 @@ RESTS_ON = {  # what each number of these modules rests on, that is no limit of 
         one_leg.USUAL_STANCES one_leg.USUAL_MIN one_leg.USUAL_MAX lag_watch.STRIDES
         lag_watch.OWN_STRIDES lag_watch.DRIFT_MAX_S lag_watch.DRIFT_SCATTERS lag_watch.DRIFT_MOST_S
         lag_watch.SLOPE_STRIDES lag_watch.SLOPE_LEAST lag_watch.SLOPE_ERRORS
-        lag_watch.SLOPE_MOVED_S lag_watch.SCATTER_S lag_watch.SCATTER_WEIGHT analysis.SPIKES_SHARE
+        lag_watch.SLOPE_MOVED_S lag_watch.SCATTER_S lag_watch.SCATTER_WEIGHT continuity.SPIKES_SHARE
         checks.OWN_TOLERANCE_S one_leg.OFTEN""",
     "mechanics: plates carry a body, a foot is no longer than a shoe": """
         two_legs.WEIGHT_MIN two_legs.WEIGHT_MAX two_legs.SUPPORTED_BELOW plausibility.LOAD_MIN

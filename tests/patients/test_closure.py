@@ -15,7 +15,8 @@ from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
-from rehab.patients.erasure import erase, months_before, patients_past_retention
+from rehab.patients.erasure import erase
+from rehab.patients.retention import months_before, patients_past_retention
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry

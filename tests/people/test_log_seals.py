@@ -15,7 +15,7 @@ from django.db import IntegrityError, connection, transaction
 from django.utils import timezone
 
 from rehab.management.commands.doctor import examine_seals
-from rehab.patients.erasure import delete_old_logs
+from rehab.patients.retention import delete_old_logs
 from rehab.people.audit import audit_log, guards, history, seals
 from rehab.people.audit.audit_log import Act, AuditEntry, Recent
 from rehab.people.audit.history import HistoryEntry

@@ -18,6 +18,7 @@ from rehab.gait.signals.filters import (
 )
 from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, POSITION, TIME
 from rehab.gait.stances.continuity import (
+    SPIKES_SHARE,
     check_fills,
     check_samples,
     find_breaks,
@@ -57,9 +58,6 @@ LONGEST_S = BEFORE_S + STANCE_MAX_S + 1.0
 # Neighbors are averaged down to 200-400 Hz before the filter: signals up to 6 Hz lose nothing.
 DECIMATED_HZ = 200.0
 FORWARD_HZ = 20.0
-# Of A2: what a spike of moment or angle changes beyond this makes it another value. Less is added
-# to its standard deviation.
-SPIKES_SHARE = 0.05
 LATE_FROM = 0.72  # of stance; there moment and force have their late peaks
 
 

@@ -47,11 +47,12 @@ ANGLE_JUMP = (0.2, 15.0)
 # noise are told by these (``tests/gait/test_bad_input.py``). Of the unfiltered angles that the
 # markers of four people make (gaitalytics, BTK's two, HBM's) none exceeds k, of gaitalytics' own
 # the largest is 7.6 medians beyond it. A step beyond all that refuses the stride, a spike
-# only where A2 changes once it is taken out (``analysis.SPIKES_SHARE``).
+# only where A2 changes once it is taken out (``SPIKES_SHARE``).
 APART_S = 0.01
 ANGLE_FOURTH = (350.0, 0.01, 8.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
 WHOLE = 3  # h on each side of a spike or step, which samples of uneven times smear
+SPIKES_SHARE = 0.05  # of A2: more makes it another value; less is added to its standard deviation
 SPIKE = 0.5  # of a step that does not stay: then it was a spike, of which nothing stays
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 

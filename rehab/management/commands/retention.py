@@ -14,7 +14,8 @@ from django.utils import timezone
 from rehab.boards.changes import delete_old_changes
 from rehab.exports.research.package import discard_old
 from rehab.patients.closure import SessionStillOpen
-from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
+from rehab.patients.erasure import erase
+from rehab.patients.retention import delete_old_logs, patients_past_retention
 from rehab.people.models import Clinic, ErasureReason
 from rehab.sessions.setup.recordings import discard_old_uploads
 

@@ -1,8 +1,8 @@
-// Shows what a therapist has to look at (causes.js): the cause behind the others first, with its button, and a tone
+// Shows what a therapist has to look at (alarm_causes.js): the cause behind the others first, with its button, and a tone
 // when it begins. It stays until it is gone; what needs to be acknowledged is red on each page until somebody did.
 
 import { soundAlarm } from "garry/monitor/alarm_tone";
-import { findCauses } from "garry/monitor/causes";
+import { findCauses } from "garry/monitor/alarm_causes";
 
 const REFRESH_MS = 250; // silence sends no event
 

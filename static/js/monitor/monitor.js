@@ -72,7 +72,7 @@ const socket = connect(root.dataset.socket, {
     if (!frame) frame = requestAnimationFrame(draw);
   },
   onLink(link, reason) {
-    const note = document.querySelector(".notice.link"); // a lost one is told by its silence (causes.js)
+    const note = document.querySelector(".notice.link"); // a lost one is told by its silence (alarm_causes.js)
     note.hidden = link === "open" || (link === "lost" && Boolean(state.session));
     note.textContent = link === "lost" ? _("No connection to the server. This page tries again by itself.") : reason;
     if (link === "closed" && state.session) leaveWhenEnded();
