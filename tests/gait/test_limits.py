@@ -299,7 +299,7 @@ RESTS_ON = {  # what each number of these modules rests on, that is no limit of 
         find_forces.STEPS_MIN drag.HIDDEN contact_finder.DRAG_S""",
     "sensors and how they send": """
         continuity.RATE_TOLERANCE continuity.MOMENT_FROZEN_S continuity.ANGLE_FROZEN_S
-        continuity.STRAIGHT_S gaps.GAP_S gaps.GAP_MAX_S gaps.LATE_S gaps.CERTAIN gaps.MOST
+        continuity.STRAIGHT_S gaps.GAP_S gaps.GAP_MAX_S gaps.LATE_SAMPLE_S gaps.CERTAIN gaps.MOST
         one_leg.LONGEST_GAP_S one_leg.OFFSET_N contact_finder.CONTACT_N contact_finder.RELEASE_N
         zero.OFFSET_MAX zero.OFFSET_SWINGS zero.ZERO_STEP_N zero.ZERO_SWINGS zero.ZERO_SPREAD_N
         zero.LEAST_N zero.QUIET_N drag.REST_N drag.DIP_N uncertainty.THIRD_DIFFERENCE
