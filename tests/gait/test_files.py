@@ -191,3 +191,17 @@ def test_exports_of_qualisys(tmp_path, heads, column):
 
     assert table[column].tolist() == [row[-1] for row in rows]
     assert np.diff(table["time"]).tolist() == pytest.approx([0.02])
+
+
+def test_points_without_units_are_in_millimeters_and_no_force(tmp_path):
+    """As in C3D: a marker's height must not be taken for a plate's force."""
+    ezc3d = pytest.importorskip("ezc3d")
+    path, (walk, _) = tmp_path / "walk.c3d", make_walk(strides=12)
+    write_c3d(path, walk)
+    file = ezc3d.c3d(str(path))
+    file["parameters"]["POINT"]["LABELS"]["value"] = ["LTOE", "LHEE", "RTOE", "RHEE"]
+    file["parameters"]["POINT"]["UNITS"]["value"] = []
+    del file["data"]["meta_points"]
+    file.write(str(path))
+    table = read_any_table(path)
+    assert {table.units[f"{label}.Z"] for label in ("LTOE", "RHEE")} == {"mm"}

@@ -58,7 +58,7 @@ def read_table(path: Path) -> Table:
     ):
         table[label] = resample_channel(values, rates[1], time)
         table.units[label] = units[place] if place < len(units) else ""
-    length = "".join(str(unit) for unit in read_values(file, "POINT", "UNITS")[:1])
+    length = "".join(str(unit) for unit in read_values(file, "POINT", "UNITS")[:1]) or "mm"
     of_kind = {
         label: str(unit[0])
         for kind in ("ANGLE", "FORCE", "MOMENT")
