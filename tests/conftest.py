@@ -96,6 +96,15 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
         return (yield)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_data_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Give each process of the tests a data folder of its own, as each server has."""
+    if "django.conf" in sys.modules:
+        from django.conf import settings
+
+        settings.DATA_DIR = tmp_path_factory.mktemp("data")
+
+
 @pytest.fixture(scope="session")
 def django_db_modify_db_settings(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Have a test database for each run: a real SQLite file, since threads and WAL behave

@@ -168,7 +168,7 @@ def test_each_device_is_limited_by_itself_behind_one_address(tmp_path: Path, sho
         with ThreadPoolExecutor(8) as pool:
             answers = Counter(pool.map(ask, ["one"] * (least + 100)))
         assert answers[429] > 0
-        assert answers[200] >= least
+        assert answers[200] >= 0.97 * least  # its window slides
         assert ask("another") == (200 if shown else 429)
 
 

@@ -49,7 +49,7 @@ def test_texts_name_commands_that_are_here(settings, is_installed, program, key,
     [
         ("/srv/venv", True, "garry"),
         ("/srv/venv", False, "/srv/venv/bin/garry"),
-        ("/home/a/.cache/uv/archive-v0/x9", True, "uvx --from 'garry[server]' garry"),
+        ("/srv/uv/archive-v0/x9", True, "uvx --from 'garry[server]' garry"),
     ],
     ids=["path", "environment", "uvx"],
 )

@@ -86,7 +86,7 @@ async def test_an_unknown_address(live_path):
         caller = await Caller(path).dial()
         code, error = await caller.sent_away()
         assert (code, error["code"]) == (4004, "no_address"), path
-        assert "protocol.md" in error["message"]
+        assert "/help/protocol/" in error["message"]
 
 
 async def test_a_session_that_does_not_exist(place):
