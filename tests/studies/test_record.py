@@ -24,7 +24,7 @@ from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
 from rehab.studies.record.found import find
 from rehab.studies.record.known import UNMASKED
 from rehab.studies.registration.estimands import estimands
-from rehab.studies.registration.facts import ASKED
+from rehab.studies.registration.facts import ASKED, BEFORE
 from rehab.studies.registration.lifecycle import close, register, revise
 from rehab.studies.results.harms_and_deviations import OUTSIDE
 from rehab.studies.results.results import read_results
@@ -426,3 +426,12 @@ def test_a_look_records_how_many_have_the_outcome(world):
     assert page.get(reverse("study-results", args=[study.pk])).status_code == 200
     look = study.events.get(kind=StudyEvent.Kind.LOOKED)
     assert look.about == "0/20"
+
+
+def test_what_is_asked_before_a_study_is_registered_stands_on_its_page(world):
+    study, lead = draft_study(world), client_of(world, Role.LEAD)
+    page = reverse("study", args=[study.pk])
+    assert "Not said yet:" in lead.get(page).content.decode()
+    study.facts |= dict.fromkeys(BEFORE, "Said.")
+    study.save()
+    assert "Not said yet:" not in lead.get(page).content.decode()

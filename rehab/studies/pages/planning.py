@@ -37,6 +37,7 @@ from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import may_monitor
 from rehab.studies.registration.document import describe
+from rehab.studies.registration.facts import ASKED, BEFORE
 from rehab.studies.registration.lifecycle import close, register, revise, start
 from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
 from rehab.studies.registration.protocol_json import write_json
@@ -154,6 +155,7 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "primary": dict(OUTCOMES)[first_primary(study)],
         "plan": () if blind else _plan(study),
         "changes": outcome_changes(study),
+        "unsaid": [ASKED[slug] for slug in BEFORE if not study.facts.get(slug)],
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
         "screened": Screening.objects.visible_to(user)

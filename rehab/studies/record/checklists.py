@@ -204,6 +204,8 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 lacking = [BY_HAND]
             if "masked" in named and is_unmasked and _says_blinded(given):
                 lacking.append(NO_ASSESSOR)
+            elif "scientific_title" in named and is_unmasked:
+                given.remove(answers["masked"])
             yield {
                 "list": name,
                 "item": number,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from django.utils.translation import gettext_lazy as _
 
+BEFORE = ("sponsor", "sponsor_role", "funding", "ethics")  # asked for before a study is registered
 # Slug to the question; `checklists` says which items each answers.
 ASKED = {
     "sponsor": _("Sponsor: name, address, contact"),
