@@ -50,7 +50,7 @@ from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.setup.recordings import recordings_folder
 
-BATCH_ROWS = 200
+BATCH_ROWS = 100
 USER, CLINIC = User._meta.label_lower, Clinic._meta.label_lower
 
 
