@@ -8,7 +8,6 @@ from django.db.models import F
 from django.utils.translation import gettext
 
 from rehab.sessions.alarms import UNASKED
-from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Study
@@ -18,6 +17,7 @@ from rehab.studies.results.harms_and_deviations import (
     ENDED_EARLY,
     EXCLUDED,
     UNWALKED,
+    find_days_off,
     label_of,
 )
 from rehab.training.changes import ChangeKind, State
@@ -35,13 +35,9 @@ def describe_visits(
     blind
         Whether to hide what was changed, which could tell the arm.
     """
-    days: dict[tuple[int, int], StudyVisit] = {}
-    walked: dict[TrainingSession, tuple[StudyVisit, int]] = {}
-    for visit in visits:
-        planned = days.setdefault((visit.enrollment_id, visit.number), visit).day
-        if (session := visit.session) is not None:
-            day = clinic_time(session.created_at, study.clinic).date()
-            walked[session] = visit, (day - planned).days
+    visits = list(visits)
+    days_off = find_days_off(study, visits)
+    walked = {visit.session: visit for visit in visits if visit.session is not None}
     window = study.window_days or 0
     unwalked, changed = _unwalked(walked), {} if blind else _changed(walked)
     return {
@@ -52,12 +48,12 @@ def describe_visits(
             *([label_of(EXCLUDED)] if session.excluded else ()),
             *changed.get(session.pk, ()),
             *(
-                [gettext("outside the planned days (%(days)+d)") % {"days": late}]
-                if abs(late) > window
+                [gettext("outside the planned days (%(days)+d)") % {"days": off}]
+                if abs(off := days_off[visit.pk]) > window
                 else ()
             ),
         ]
-        for session, (visit, late) in walked.items()
+        for session, visit in walked.items()
     }
 
 

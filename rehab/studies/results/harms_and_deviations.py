@@ -92,16 +92,32 @@ def label_of(what: str) -> str:
     return gettext(str(OTHERS.get(what) or dict(EVENTS)[what]))
 
 
+def find_days_off(study: Study, visits: Iterable[StudyVisit]) -> dict[int, int]:
+    """Return how many days after its planned one each visit was walked, by its key.
+
+    Of a repeated visit the first attempt's day counts. ``visits``: all attempts, in their order,
+    each with its session.
+    """
+    planned: dict[tuple[int, int], date] = {}
+    found = {}
+    for visit in visits:
+        day = planned.setdefault((visit.enrollment_id, visit.number), visit.day)
+        if visit.session is not None:
+            walked = clinic_time(visit.session.created_at, study.clinic).date()
+            found[visit.pk] = (walked - day).days
+    return found
+
+
 def read_occurrences(study: Study) -> tuple[Occurrence, ...]:
     """Return all that happened in a study, by participant and visit."""
     visits = StudyVisit.everywhere.filter(enrollment__study=study, session__isnull=False)
     related = ("enrollment__allocation", "enrollment__patient", "session")
     of_people = counts_people_alone(study)
-    planned: dict[tuple[int, int], date] = {}  # of a repeated visit, that of the first attempt
     found: list[Occurrence] = []
-    for visit in visits.select_related(*related).order_by("enrollment", "number", "attempt"):
+    in_order = list(visits.select_related(*related).order_by("enrollment", "number", "attempt"))
+    days_off = find_days_off(study, in_order)
+    for visit in in_order:
         enrollment, session = visit.enrollment, visit.session
-        day = planned.setdefault((enrollment.pk, visit.number), visit.day)
         if of_people and visit.is_simulated:
             continue
         if enrollment.is_analyzed and session is not None:
@@ -111,9 +127,9 @@ def read_occurrences(study: Study) -> tuple[Occurrence, ...]:
                 visit.number,
             )
             found += _of_session(session, lambda *about, place=place: _make(place, *about))
-            late = (clinic_time(session.created_at, study.clinic).date() - day).days
-            if study.window_days is not None and abs(late) > study.window_days:
-                found.append(_make(place, OUTSIDE, late))
+            off = days_off[visit.pk]
+            if study.window_days is not None and abs(off) > study.window_days:
+                found.append(_make(place, OUTSIDE, off))
     events = study.events.filter(kind__in=REVEALED, enrollment__isnull=False)
     for event in events.select_related("enrollment__allocation"):
         if event.enrollment is not None and event.enrollment.is_analyzed:
