@@ -34,7 +34,10 @@ EXPORTABLE = (
     "GARRY's export: outcomes of each visit under codes, their definitions, the protocol with all "
     "versions, reanalyze.py and reanalyze.R, which compute the results again."
 )
-UNMASKED = "Nobody is blinded. What GARRY computes depends on nobody’s judgment."
+UNMASKED = (
+    "Participants and therapists are not blinded, nor is who takes the tests. What GARRY computes "
+    "depends on nobody's judgment."
+)
 HARMS_FOLLOWED = (
     "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
     "themselves and are offered as adverse events, each with severity, relation, expectedness and "
