@@ -79,8 +79,10 @@ class Case:
     @property
     def way(self) -> str:
         """Whether the goal rose or fell over them, as a sign."""
-        newest, *_others, oldest = self._compared * 2 or (0, 0)
-        return ("", "▲", "▼")[(newest > oldest) - (newest < oldest)]
+        goals = self._compared
+        if not goals or goals[0] == goals[-1]:
+            return ""
+        return "▲" if goals[0] > goals[-1] else "▼"
 
     @property
     def _compared(self) -> list[float]:

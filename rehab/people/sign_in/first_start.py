@@ -27,7 +27,7 @@ def count_pending_migrations() -> int:
     return len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
 
 
-def prepare_database(say: Callable[[str], object] = str) -> None:
+def prepare_database(say: Callable[[str], object] = lambda _words: None) -> None:
     """Apply pending migrations; on a hosted server, refuse to start while some are pending.
 
     ``say`` is told what takes its time. Raises CommandError, with the cure, where the database

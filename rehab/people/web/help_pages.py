@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -71,7 +71,7 @@ def _file_of(name: str) -> Path:
     return Path(settings.FILES_DIR, "docs", f"{name}.md")
 
 
-@cache
+@lru_cache(maxsize=64)  # the address in it is the reader's
 def render_page(text: str) -> str:
     """Return a page as HTML: headings have GitHub's anchors, pictures and pages our addresses."""
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")

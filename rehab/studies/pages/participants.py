@@ -62,7 +62,9 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
                 messages.success(request, message % {"why": noted.why_not})
                 return redirect(reverse("study", args=[study.pk]) + "#screening")
             enrollment = enroll(
-                *(study, patient, form.levels),
+                study,
+                patient,
+                form.levels,
                 keep_data=keep_data,
                 by=user,
                 now=now,
