@@ -16,7 +16,7 @@ PRIVATE_MOODS = re.compile(r"(Gives?|Says?)\b")
 def test_the_glossary_has_each_term_once() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text()
     glossary = text[text.index("## Glossary") : text.index("## Tests")]
-    rows = re.findall(r"^\| ([^|]+) \| [^|]+ \|$", glossary, re.MULTILINE)
+    rows = re.findall(r"^\* \*\*(.+?)\*\*: ", glossary, re.MULTILINE)
     assert len(rows) > 50
     assert len(rows) == len(set(rows))
 

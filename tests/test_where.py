@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
+# What is asked for or added, and where it stands.
 ROWS = [
-    [cell.strip() for cell in line.strip("|").split("|")]
+    re.split(r"[:?] ", line.removeprefix("* "), maxsplit=1)
     for line in (ROOT / "docs" / "where.md").read_text(encoding="utf-8").splitlines()
-    if line.startswith("| ") and not line.startswith("| to add ")
+    if line.startswith("* ")
 ]
 # A path lies in the root, in the app, or beside another one of its row.
 PLACES = (ROOT, ROOT / "rehab", ROOT / "rehab" / "sessions")
