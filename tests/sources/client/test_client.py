@@ -55,34 +55,6 @@ async def test_the_end_of_a_recording_is_told_once_all_is_stored(garry, stay):
     assert len(told) == (2 if stay else 1)
 
 
-@pytest.mark.parametrize("code", [1001, 4011, 4012])
-async def test_after_a_drop_it_resumes_where_the_server_is(garry, code):
-    garry.close_after = {100: code, 101: code, 500: code}
-    async with serve_garry(garry):
-        client = make_client(garry, even_walk(600))
-        await run(client)
-
-    assert garry.numbers == list(range(1, 601))
-    assert len(garry.hellos) == 4
-    assert len({hello["run"] for hello in garry.hellos}) == 1
-    assert garry.hellos[1]["last"] >= 100
-    assert client.unacknowledged == 0
-    assert 0 < len(garry.repeated) <= 3  # one each, to have its ack again
-
-
-async def test_a_server_that_comes_up_later_is_waited_for(garry):
-    async with serve_garry(garry) as server:
-        port = server.sockets[0].getsockname()[1]
-    notices: list[str] = []
-    async with running(make_client(garry, even_walk(5), notify=notices.append)) as task:
-        await until(lambda: len(notices) > 2)
-        async with serve_garry(garry, port):
-            await asyncio.wait_for(task, 5)
-
-    assert garry.numbers == [1, 2, 3, 4, 5]
-    assert "No server at" in notices[0]
-
-
 async def test_another_content_under_the_same_number_stops_it_with_the_servers_words(garry):
     garry.close_after = {3: 4012}
     async with serve_garry(garry):
@@ -105,15 +77,6 @@ async def test_a_server_that_lost_acknowledged_steps_is_found_out(garry):
             await garry.sockets[-1].close(4012)
             with pytest.raises(StepsLost, match="older copy"):
                 await asyncio.wait_for(task, 5)
-
-
-async def test_a_wrong_token_stops_it_with_the_servers_words(garry):
-    async with serve_garry(garry):
-        with pytest.raises(LinkRefused, match="Unknown token") as refused:
-            await run(make_client(garry, even_walk(), token="t-2"))
-
-    assert refused.value.code == 4001
-    assert len(garry.sockets) == 1
 
 
 @pytest.mark.parametrize(
