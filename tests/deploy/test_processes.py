@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -25,8 +24,6 @@ pytestmark = [
     pytest.mark.timeout(400),
     pytest.mark.skipif(bool(find_missing()), reason=f"two servers: {find_missing()}"),
 ]
-
-LATE_S = 20.0  # 10 s on a machine that does nothing else
 
 
 class Served(Pair):
@@ -108,62 +105,6 @@ def test_a_walk_goes_on_while_one_server_after_the_other_restarts(tmp_path: Path
         assert (log["numbers"], walk.seen, log["paused"]) == (whole, whole, 0)
         assert log["refolds"]
         assert walk.made > 15
-
-
-async def hang(served: Served, entrance: Entrance) -> tuple[list[Walk], list[Message], list[float]]:
-    """Freeze twice the server that has most; return walks, logs, and how long until all went on."""
-    took_s: list[float] = []
-    try:
-        async with served:
-            rows = served.seed(4)
-            walks = [Walk(row, entrance, 10.0) for row in rows]
-            senders = [asyncio.create_task(walk.send()) for walk in walks]
-            watchers = [asyncio.create_task(walk.watch()) for walk in walks]
-            await go_on(walks)
-            for turn in (1, 2):
-                served.find_process(served.find_busiest()).suspend()
-                began_s = time.monotonic()
-                await go_on(walks)
-                took_s.append(time.monotonic() - began_s)
-                await served.until_said("hangs, and is ended", turn)
-                await served.until_said("Ready", 2 + turn)
-            for walk in walks:
-                walk.stopping = True
-            await asyncio.wait_for(asyncio.gather(*senders), 60)
-            await asyncio.sleep(2)
-            for watcher in watchers:
-                watcher.cancel()
-            logs = [served.read_log(row) for row in rows]
-    finally:
-        served.command.send_signal(signal.SIGTERM)
-        status = await asyncio.to_thread(served.command.wait, 60)
-    assert status == 0
-    return walks, logs, took_s
-
-
-async def go_on(walks: list[Walk]) -> None:
-    """Wait until each source is acknowledged and each viewer sees more than was made until now."""
-    marks = [walk.made + 1 for walk in walks]
-    async with asyncio.timeout(90):
-        while any(  # noqa: ASYNC110
-            walk.acknowledged < mark or not walk.seen or walk.seen[-1] < mark
-            for walk, mark in zip(walks, marks, strict=True)
-        ):
-            await asyncio.sleep(0.05)
-
-
-def test_a_server_that_hangs_is_ended_and_its_clinics_go_on(tmp_path: Path) -> None:
-    (tmp_path / "garry").mkdir()
-    with run_postgres() as database:
-        served = Served(tmp_path / "garry", database)
-        served.ports = two_free_ports()
-        with run_haproxy(tmp_path / "haproxy", *served.ports) as (_, secure, tls):
-            walks, logs, took_s = asyncio.run(hang(served, Entrance(secure, tls)))
-    print("all went on after", [round(one, 1) for one in took_s], "s")
-    for walk, log in zip(walks, logs, strict=True):
-        whole = list(range(1, walk.made + 1))
-        assert (log["numbers"], walk.seen, log["refolds"]) == (whole, whole, True)
-    assert max(took_s) < LATE_S
 
 
 def test_half_a_configuration_is_refused_with_the_cure(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import secrets
@@ -230,16 +229,6 @@ def test_each_step_says_under_which_feedback_type_it_was_taken(world):
     (corrected,) = (row for row in rows if row["session"] == str(session.pk))
     assert (corrected["field"], corrected["old"], corrected["new"]) == ("counts", "yes", "no")
     assert (corrected["reason"], corrected["by"]) == ("The sensor slipped.", lead.username)
-
-
-def test_the_codebook_says_what_every_column_means(world):
-    files = fetch(world)
-    told = {(row["file"], row["column"]): row["meaning"] for row in rows_of(files["codebook.csv"])}
-    for table in TABLES:
-        header = next(csv.reader(io.StringIO(files[table.file])))
-        assert header == table.header
-        assert all(told[table.file, name] for name in header)
-    assert len(told) == sum(len(table.columns) for table in TABLES)
 
 
 def test_giving_a_file_is_noted_each_time_with_who_and_whose(world):

@@ -186,16 +186,6 @@ def test_it_stays_where_it_is_told_to():
     assert 1.6 < still * 0.02 < 2.2
 
 
-def test_twenty_gestures_do_not_walk_away():
-    player, floor = Player(Limits()), Floor(grip=(0.98, 1.03))
-    for number in range(20):
-        gesture = list(GESTURES.values())[number % len(GESTURES)]
-        player.start(gesture, floor.time_s, floor.pose)
-        floor.play(player)
-        assert player.outcome == DONE
-        assert is_at_home(floor.pose)
-
-
 @pytest.mark.parametrize("beside_m", [0.03, -0.045])
 def test_only_a_holonomic_base_corrects_what_it_is_beside_home(beside_m):
     ends = {}

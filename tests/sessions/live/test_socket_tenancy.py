@@ -167,15 +167,6 @@ async def test_a_leak_is_caught(everyone, monkeypatch):
 
 
 @pytest.mark.long
-async def test_a_patient_whom_a_researcher_hears_of_is_caught(everyone, monkeypatch):
-    everybody = frozenset(Role)
-    monkeypatch.setattr(screens.ScreenConsumer, "people", everybody)
-    leaks, _ = await find_leaks(everyone)
-    route = "ws/session/<int:session_id>/monitor/"
-    assert f"researcher of amber: {route} names a patient by nickname" in leaks
-
-
-@pytest.mark.long
 async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypatch):
     async def find_open_session(device: Device, session_id: int | None) -> int | None:
         return session_id or everyone.sessions["amber"].pk
@@ -185,19 +176,6 @@ async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypat
     assert "device of birch: ws/source/ of amber, None" in leaks
     assert "robot of birch: ws/robot/ of amber, None" in leaks
     assert not any("researcher" in leak or "pt" in leak.split()[0] for leak in leaks)
-
-
-@pytest.mark.long
-async def test_words_of_another_clinic_are_caught(everyone, monkeypatch):
-    """Who may come in hears a name of another clinic beside the own session."""
-    told = screens.ScreenConsumer.send_message
-
-    async def say(self: Any, message: Any) -> None:
-        await told(self, message | {"nickname": everyone.worlds[0].patient.nickname})
-
-    monkeypatch.setattr(screens.ScreenConsumer, "send_message", say)
-    leaks, _ = await find_leaks(everyone)
-    assert "pt of birch: ws/session/<int:session_id>/monitor/ shows amber" in leaks
 
 
 async def test_a_new_socket_must_be_given_its_place(everyone, monkeypatch):

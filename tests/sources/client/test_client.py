@@ -55,77 +55,6 @@ async def test_the_end_of_a_recording_is_told_once_all_is_stored(garry, stay):
     assert len(told) == (2 if stay else 1)
 
 
-async def test_never_more_than_the_window_is_on_the_way(garry):
-    garry.holds_acks = True
-    async with serve_garry(garry):
-        client = make_client(garry, even_walk(1000))
-        async with running(client) as task:
-            await until(lambda: len(garry.log) == 256)
-            await asyncio.sleep(0.05)
-            assert len(garry.log) == 256
-            await garry.acknowledge()
-            await asyncio.wait_for(task, 5)
-
-    assert garry.unacknowledged_max == 256
-    assert garry.numbers == list(range(1, 1001))
-
-
-@pytest.mark.parametrize("code", [1001, 4011, 4012])
-async def test_after_a_drop_it_resumes_where_the_server_is(garry, code):
-    garry.close_after = {100: code, 101: code, 500: code}
-    async with serve_garry(garry):
-        client = make_client(garry, even_walk(600))
-        await run(client)
-
-    assert garry.numbers == list(range(1, 601))
-    assert len(garry.hellos) == 4
-    assert len({hello["run"] for hello in garry.hellos}) == 1
-    assert garry.hellos[1]["last"] >= 100
-    assert client.unacknowledged == 0
-    assert 0 < len(garry.repeated) <= 3  # one each, to have its ack again
-
-
-async def test_steps_that_the_server_had_seen_but_not_stored_are_sent_again(garry):
-    """It dies with 10 of 20 steps in memory: nothing that was not acknowledged is forgotten."""
-    garry.holds_acks = True
-    async with serve_garry(garry):
-        client = make_client(garry, even_walk(20))
-        async with running(client) as task:
-            await until(lambda: len(garry.log) == 20)
-            await garry.sockets[-1].close(1001)  # welcomes with next 21 …
-            await until(lambda: len(garry.hellos) == 2 and garry.repeated)
-            assert client.unacknowledged == 20
-            del garry.log[10:]  # … and dies before it has stored them
-            garry.holds_acks = False
-            await garry.sockets[-1].close(1001)
-            await asyncio.wait_for(task, 5)
-
-    assert garry.numbers == list(range(1, 21))
-
-
-async def test_when_nothing_but_the_last_ack_was_lost_it_ends(garry):
-    garry.close_after = {5: 4012}
-    async with serve_garry(garry):
-        client = make_client(garry, even_walk(5))
-        await run(client)
-
-    assert garry.numbers == [1, 2, 3, 4, 5]
-    assert garry.repeated == [5]
-
-
-async def test_a_server_that_comes_up_later_is_waited_for(garry):
-    async with serve_garry(garry) as server:
-        port = server.sockets[0].getsockname()[1]
-    notices: list[str] = []
-    async with running(make_client(garry, even_walk(5), notify=notices.append)) as task:
-        await until(lambda: len(notices) > 2)
-        async with serve_garry(garry, port):
-            await asyncio.wait_for(task, 5)
-
-    assert garry.numbers == [1, 2, 3, 4, 5]
-    assert "No server at" in notices[0]
-
-
 async def test_another_content_under_the_same_number_stops_it_with_the_servers_words(garry):
     garry.close_after = {3: 4012}
     async with serve_garry(garry):
@@ -148,25 +77,6 @@ async def test_a_server_that_lost_acknowledged_steps_is_found_out(garry):
             await garry.sockets[-1].close(4012)
             with pytest.raises(StepsLost, match="older copy"):
                 await asyncio.wait_for(task, 5)
-
-
-async def test_a_wrong_token_stops_it_with_the_servers_words(garry):
-    async with serve_garry(garry):
-        with pytest.raises(LinkRefused, match="Unknown token") as refused:
-            await run(make_client(garry, even_walk(), token="t-2"))
-
-    assert refused.value.code == 4001
-    assert len(garry.sockets) == 1
-
-
-async def test_a_run_that_begins_anew_goes_on_in_the_session(garry):
-    async with serve_garry(garry):
-        await run(make_client(garry, even_walk(10)))
-        await run(make_client(garry, even_walk(10)))
-
-    assert garry.numbers == list(range(1, 21))
-    assert garry.hellos[0]["run"] != garry.hellos[1]["run"]
-    assert garry.hellos[1]["last"] == 0
 
 
 @pytest.mark.parametrize(

@@ -26,18 +26,6 @@ class Time:
         self.now_s += seconds + 1e-6  # no clock stops for want of digits
 
 
-async def test_it_waits_for_the_start(garry):
-    garry.state = "ready"
-    async with serve_garry(garry), running(make_client(garry, even_walk(5))) as task:
-        await until(lambda: garry.hellos)
-        await asyncio.sleep(0.03)
-        assert not garry.frames
-        await garry.change("start")
-        await asyncio.wait_for(task, 5)
-
-    assert garry.numbers == [1, 2, 3, 4, 5]
-
-
 async def test_steps_that_were_refused_before_the_start_are_sent_after_it(garry):
     garry.holds_acks = True
     async with serve_garry(garry):
