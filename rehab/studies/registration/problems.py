@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from django.utils.translation import gettext
@@ -53,7 +54,7 @@ def find_problems(study: Study) -> list[Problem]:
 def _problems(study: Study) -> Iterator[tuple[str, str]]:
     yield from _tried(study.groups, "arm-0-valence")
     for row, arm in enumerate(study.arms.select_related("measure", "protocol")):
-        yield from _tried(lambda arm=arm: describe_arm(study, arm), f"arm-{row}-protocol")
+        yield from _tried(partial(describe_arm, study, arm), f"arm-{row}-protocol")
         if study.follow_up_days is not None:
             yield from _tried(arm.baseline, f"arm-{row}-protocol")
     yield from _tried(lambda: study.visit_plan, "visits")
