@@ -24,13 +24,12 @@ from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.arm_forms import save_arms
 from rehab.studies.arms import EARLY_MONTHS
 from rehab.studies.models import OUTCOMES, Study
-from rehab.studies.registration.document import describe
 from rehab.studies.registration.lifecycle import check_secret
 from rehab.studies.registration.measurable import (
     SEVERAL_VISITS,
-    check_outcomes,
     needs_follow_up,
 )
+from rehab.studies.registration.problems import DECIDES, Problem, UnfitPlan, find_problems
 from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.registration.size import read_assumed
 from rehab.studies.size_form import STORED, AssumedForm
@@ -269,13 +268,20 @@ def _is_usual(field: Any) -> bool:
 def save_draft(form: StudyForm, arms: Any) -> Study:
     """Store a draft from its valid ``form`` and the valid formset ``arms``, and return it.
 
-    Raises InvalidSetting, and stores nothing, for a study that could not be run.
+    Raises UnfitPlan, and stores nothing, for a study that could not be run.
     """
     with transaction.atomic():
         study: Study = form.save()
         save_arms(arms, study)
-        form.seal_allocation()
+        problems = []
+        try:
+            form.seal_allocation()
+        except InvalidSetting as problem:
+            field = DECIDES.get(Method(study.method), "factors_text")
+            problems.append(Problem(format_refusal(problem), field))
         study.save()
-        describe(study)
-        check_outcomes(study)
+        found = find_problems(study)
+        told = {one.words for one in found}
+        if problems := [*found, *(one for one in problems if one.words not in told)]:
+            raise UnfitPlan(problems)
     return study

@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.studies.pages import participants, planning, power, record, results
+from rehab.studies.pages import confirming, participants, planning, power, record, results
 
 urlpatterns = [
     path("studies/", planning.list_studies, name="studies"),
@@ -10,7 +10,19 @@ urlpatterns = [
     path("studies/size/", planning.show_size, name="study-size"),
     path("studies/<int:study_id>/", planning.show_study, name="study"),
     path("studies/<int:study_id>/plan/", planning.plan_study, name="plan-study"),
-    path("studies/<int:study_id>/state/", planning.change_state, name="study-state"),
+    path(
+        "studies/<int:study_id>/register/",
+        confirming.confirm_step,
+        {"step": "register"},
+        name="register-study",
+    ),
+    path(
+        "studies/<int:study_id>/start/",
+        confirming.confirm_step,
+        {"step": "start"},
+        name="start-study",
+    ),
+    path("studies/<int:study_id>/close/", planning.close_study, name="close-study"),
     path("studies/<int:study_id>/marks/", planning.change_marks, name="study-marks"),
     path(
         "studies/<int:study_id>/protocol.json",

@@ -85,9 +85,13 @@ def plan_by_clicks(page: Page) -> None:
     page.click("button:has-text('Save')")
     expect(page.locator("h1")).to_have_text("VAL Draft")
     expect(page.locator(".risk")).to_contain_text("punishment has worked worse")
+    page.click("text=Register")
+    page.fill("#id_everybody", "Whoever walks on a treadmill.")
     page.click("button:has-text('Register')")
     page.select_option("#mark-assessor", label="asha")
     page.click("form:has(#mark-assessor) button")
+    page.click("text=Start enrolling")
+    expect(page.locator("dl")).to_contain_text("asha")
     page.click("button:has-text('Start enrolling')")
     expect(page.locator("h1")).to_have_text("VAL Running")
 
@@ -247,7 +251,12 @@ def test_a_plan_is_short_answers_at_once_and_keeps_what_was_typed(server, browse
             expect(page.locator(f"#id_{name}")).to_have_value(value)
         page.fill("#id_block_sizes", "2, 4")
         page.click("button:has-text('Save')")
-        expect(page.locator(".errorlist")).to_contain_text("give the days to it")
+        expect(page.locator("[role=alert] a")).to_contain_text("give the days to it")
+        asked: list[str] = []
+        page.on("dialog", lambda dialog: (asked.append(dialog.type), dialog.dismiss()))
+        page.get_by_role("link", name="Back").click()  # not left unasked
+        page.wait_for_timeout(500)
+        assert asked == ["beforeunload"]
         page.fill("#id_follow_up_days", "28")
         page.click("button:has-text('Save')")
         expect(page.locator("h1")).to_have_text("KEPT Draft")

@@ -23,7 +23,7 @@ from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.registration.document import digest_of
 from rehab.studies.registration.lifecycle import close
-from rehab.studies.registration.sealing import unseal
+from rehab.studies.registration.sealing import seal, unseal
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World, client_of, signed_in
 
@@ -91,10 +91,10 @@ def test_a_study_is_planned_registered_started_and_closed_by_clicks(world):
     assert sent["Location"] == page
     assert [arm.code for arm in study.arms.all()] == ["A", "B", "C"]
     assert "punishment has worked worse" in text_of(lead.get(page))
-    refused = lead.post(reverse("study-state", args=[study.pk]), {"step": "start"}, follow=True)
-    assert "This study is draft" in text_of(refused)
+    assert lead.post(reverse("start-study", args=[study.pk])).url == page  # not before
+    why = {"everybody": "A feasibility study."}
     for step, state in (("register", "registered"), ("start", "running"), ("close", "closed")):
-        lead.post(reverse("study-state", args=[study.pk]), {"step": step})
+        lead.post(reverse(f"{step}-study", args=[study.pk]), why)
         study.refresh_from_db()
         assert study.state == state
     told = json.loads(lead.get(reverse("study-protocol", args=[study.pk])).content)
@@ -127,6 +127,57 @@ def test_a_plan_that_cannot_be_run_is_told_how_to_mend(world, arms, change, word
     lead = world.people[Role.LEAD]
     [logged] = refusals(caplog)
     assert logged == f"Refused to account {lead.pk}: {reverse('new-study')}"
+
+
+def test_a_step_lists_what_it_fixes_and_asks_why_where_a_reviewer_would(world):
+    study = draft_study(world, planned_sd=10.0, assumed={"difference": 5.0})
+    lead, url = client_of(world, Role.LEAD), reverse("register-study", args=[study.pk])
+    page = text_of(lead.get(url))
+    for words in ("Change in washout", "Kenward", "Permuted blocks", "Nobody yet", "Goal"):
+        assert words in page
+    assert "20 participants are planned where the formula asks for" in page
+    assert "No criteria say who may take part." in page
+    assert "This field is required" in text_of(lead.post(url, {"size": "What we can reach."}))
+    study.refresh_from_db()
+    assert study.is_draft
+    why = {"size": "What we can reach.", "everybody": "Whoever comes."}
+    assert lead.post(url, why).status_code == 302
+    [version] = study.versions.all()
+    assert version.document["facts"] == why
+    start = reverse("start-study", args=[study.pk])
+    assert "Kenward" in text_of(lead.get(start))
+    study.refresh_from_db()
+    assert study.started_at is None  # looking is not starting
+    lead.post(start)
+    study.refresh_from_db()
+    assert study.started_at is not None
+
+
+def test_all_that_keeps_a_plan_from_being_registered_is_told_at_once_at_its_field(world):
+    study = draft_study(world, visits=1, secondary_outcomes=["between_visits", "sus"])
+    study.primary_outcome, study.sealed = "10mwt_follow_up", seal(Secret(SEED, (3,)))
+    study.save()
+    page = text_of(client_of(world, Role.LEAD).get(reverse("register-study", args=[study.pk])))
+    plan_page = reverse("plan-study", args=[study.pk])
+    links = re.findall(rf'href="{plan_page}#id_(\w+)"', page)
+    assert links == ["block_sizes", "primary_outcome", *["secondary_outcomes"] * 2]
+    lead, refused = (
+        client_of(world, Role.LEAD),
+        plan("positive", "negative", block_sizes="3", code="NEW"),
+    )
+    refused |= {"primary_outcome": "10mwt_follow_up", "secondary_outcomes": ["sus"]}
+    page = text_of(lead.post(reverse("new-study"), refused))
+    found = set(re.findall(r'<li><a href="#id_(\w+)"', page))
+    assert found == {"primary_outcome", "block_sizes", "secondary_outcomes"}
+
+
+def test_where_nobody_can_assess_it_is_said_where_to_add_one(world):
+    study = draft_study(world)
+    page, lead = reverse("study", args=[study.pk]), client_of(world, Role.LEAD)
+    User.everywhere.filter(role=Role.PT).update(is_active=False)
+    told = text_of(lead.get(page))
+    assert "no further account of the clinic can be chosen" in told
+    assert reverse("admin:rehab_user_add") in told
 
 
 @pytest.mark.parametrize(("count", "sizes"), [(2, (4, 6)), (3, (6, 9))])
@@ -220,7 +271,16 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     lines = " ".join(re.findall(r"\((.*?)\) Tj", told))
     for words in ("goal at 110 %", "without the robot", "then a rest of 90 s", "Push, please."):
         assert words in lines
-    for words in ("Margin of non-inferiority", "2.5", "Pocock", "BASEC 2026-01234", "Kenward"):
+    for words in (
+        "Margin of non-inferiority",
+        "2.5",
+        "Pocock",
+        "BASEC 2026-01234",
+        "Kenward",
+        "strides of washout",
+        "Per protocol",
+        "near falls",
+    ):
         assert words in lines
     page = lead.get(reverse("study", args=[study.pk])).content.decode()
     assert "Margin of non-inferiority" in page

@@ -121,6 +121,7 @@ def test_who_is_blinded_is_one_truth_whatever_was_typed(world):
 def test_what_a_reviewer_would_still_ask_is_asked(world):
     study = draft_study(world, planned_sd=10.0, assumed={"difference": 5.0, "dropout": 0.1})
     study.facts = dict.fromkeys(ASKED, "Zq") | {"blinding": "Assessors, until the study is closed"}
+    study.facts |= {"size": "", "everybody": ""}
 
     def asked():
         found = {(r["list"], r["item"]): r for r in checklist_rows(study, None)}
@@ -132,6 +133,7 @@ def test_what_a_reviewer_would_still_ask_is_asked(world):
     assert "20 are planned where the formula asks for 144" in size
     assert "is not so, no assessor is marked" in blinded
     study.inclusion, study.participants = "Hemiparesis after stroke", 144
+    study.facts["size"] = "Zq"
     study.facts["blinding"] = "Nobody; assessors know the arm, and are not kept from it"
     assert asked() == ["", "", ""]
 
@@ -430,7 +432,7 @@ def test_a_look_records_how_many_have_the_outcome(world):
 
 def test_what_is_asked_before_a_study_is_registered_stands_on_its_page(world):
     study, lead = draft_study(world), client_of(world, Role.LEAD)
-    page = reverse("study", args=[study.pk])
+    page = reverse("register-study", args=[study.pk])
     assert "Not said yet:" in lead.get(page).content.decode()
     study.facts |= dict.fromkeys(BEFORE, "Said.")
     study.save()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
 from typing import Any
 
 from django.contrib import messages
@@ -37,9 +36,9 @@ from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import may_monitor
 from rehab.studies.registration.document import describe
-from rehab.studies.registration.facts import ASKED, BEFORE
-from rehab.studies.registration.lifecycle import close, register, revise, start
+from rehab.studies.registration.lifecycle import close, revise
 from rehab.studies.registration.outcome_changes import first_primary, outcome_changes
+from rehab.studies.registration.problems import UnfitPlan
 from rehab.studies.registration.protocol_json import write_json
 from rehab.studies.registration.protocol_pdf import plan_rows, write_pdf
 from rehab.studies.results.reading import UNREAD
@@ -48,10 +47,6 @@ from rehab.studies.size_form import SizeForm
 from rehab.studies.visit_marks import describe_visits
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
-
-# What each button of a study's state does, by its name.
-StudyAction = Callable[[Study, User, datetime], Any]
-STEPS: dict[str, StudyAction] = {"register": register, "start": start, "close": close}
 
 
 def get_study(user: User, study_id: int) -> Study:
@@ -93,7 +88,7 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
                     reason, again = (form.cleaned_data[n] for n in ("reason", "needs_consent"))
                     revise(study, reason, user, timezone.now(), needs_consent=again)
         except InvalidSetting as problem:
-            form.add_error(None, format_refusal(problem))
+            _show_problems(form, arms, problem)
             if study_id is None:
                 study.pk = None
         else:
@@ -103,10 +98,25 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
     context = {
         "form": form,
         "arms": arms,
+        "wrong": [field for one in (form, *arms.forms) for field in one if field.errors],
         "study": study if study_id else None,
         "outcomes": define_outcomes(),
     }
     return render(request, "studies/form.html", context)
+
+
+def _show_problems(form: StudyForm, arms: Any, problem: InvalidSetting) -> None:
+    """Show each reason why a plan cannot be registered at the field that mends it."""
+    if not isinstance(problem, UnfitPlan):
+        form.add_error(None, format_refusal(problem))
+        return
+    filled = [one for one in arms.forms if one.instance.code and one not in arms.deleted_forms]
+    for one in problem.problems:
+        prefix, row, name = (*one.field.split("-"), "", "")[:3]
+        if prefix == "arm" and int(row) < len(filled):
+            filled[int(row)].add_error(name, one.words)
+        else:
+            form.add_error(one.field if one.field in form.fields else None, one.words)
 
 
 @for_roles(Role.LEAD, patients=False)
@@ -149,13 +159,12 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "may_plan": user.role in {Role.LEAD, Role.RESEARCHER},
         "may_see_harms": may_monitor(study, user) or user.role in {Role.LEAD, Role.PT},
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
-        **({} if blind else _compare_arms(study)),
+        **({} if blind else compare_arms(study)),
         "participants": (people := _participants(study, user, blind=blind)),
         "has_simulated": any(one["has_simulated"] for one in people),
         "primary": dict(OUTCOMES)[first_primary(study)],
         "plan": () if blind else _plan(study),
         "changes": outcome_changes(study),
-        "unsaid": [ASKED[slug] for slug in BEFORE if not study.facts.get(slug)],
         "versions": study.versions.all(),
         "events": () if blind else events.filter(study=study).select_related("by"),
         "screened": Screening.objects.visible_to(user)
@@ -166,7 +175,7 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
     }
 
 
-def _compare_arms(study: Study) -> dict[str, Any]:
+def compare_arms(study: Study) -> dict[str, Any]:
     """Return the columns in which the arms differ, with each arm's values, and what is alike."""
     arms = list(study.arms.select_related("measure", "protocol"))
     facts: list[tuple[str, list[object]]] = [
@@ -222,27 +231,30 @@ def _participants(study: Study, user: User, *, blind: bool) -> list[dict[str, An
     ]
 
 
-def _markable(study: Study) -> list[tuple[str, Any, list[User]]]:
+def _markable(study: Study) -> list[tuple[str, Any, Any, list[User]]]:
     """Return the marks that a lead can give, and whom each could be given to."""
     people = User.everywhere.filter(clinic=study.clinic_id, is_active=True).order_by("username")
     found = []
     for task, role in MARKABLE.items():
         marked = study.marks.filter(task=task, ended_at=None).values("user")
         found.append(
-            (task.value, task.label, list(people.filter(role=role).exclude(pk__in=marked)))
+            (
+                task.value,
+                task.label,
+                role.label,
+                list(people.filter(role=role).exclude(pk__in=marked)),
+            )
         )
     return found
 
 
 @for_roles(Role.LEAD, patients=False)
 @require_POST
-def change_state(request: HttpRequest, study_id: int) -> HttpResponse:
-    """Register, start or close a study."""
+def close_study(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Close a study."""
     user = user_of(request)
     study = get_study(user, study_id)
-    step = STEPS.get(request.POST.get("step", ""))
-    if step is not None:
-        _try(request, lambda: step(study, user, timezone.now()))
+    _try(request, lambda: close(study, user, timezone.now()))
     return redirect("study", study_id=study.pk)
 
 

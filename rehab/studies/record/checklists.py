@@ -14,6 +14,7 @@ from textwrap import fill
 from rehab.studies.models import Study
 from rehab.studies.record.known import UNMASKED, know
 from rehab.studies.registration.facts import ASKED
+from rehab.studies.registration.problems import find_doubts
 from rehab.studies.registration.size import size_of_study
 from rehab.studies.results.results import Results
 
@@ -50,7 +51,7 @@ ITEMS = {
         11 | patients and public | involvement
         12 | design | design
         13 | setting | clinic setting countries
-        14a | eligibility of participants | eligibility
+        14a | eligibility of participants | eligibility everybody
         14b | eligibility of sites and providers | provider
         15a | interventions | arms phases
         15b | when they are changed or stopped | discontinuing
@@ -98,7 +99,7 @@ ITEMS = {
         9 | design | design
         10 | changes after the start | changes
         11 | setting | clinic setting countries
-        12a | eligibility of participants | eligibility
+        12a | eligibility of participants | eligibility everybody
         12b | sites and providers | provider
         13 | interventions | arms phases
         14 | outcomes | primary secondary
@@ -154,15 +155,15 @@ ITEMS = {
         11 | countries | countries
         12 | condition | condition
         13 | interventions | arms
-        14 | eligibility | eligibility
+        14 | eligibility | eligibility everybody
         15 | type | design allocation
-        16 | first enrollment | dates
+        16 | first enrollment | first_day
         17 | size, planned and reached | participants flow
         18 | status | status simulated
         19 | primary outcome | primary
         20 | secondary outcomes | secondary
         21 | ethics | ethics
-        22 | completion | ended
+        22 | completion | last_day
         23 | summary of results | estimates
         24 | sharing of data | sharing""",
 }
@@ -178,7 +179,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
     results
         Of a closed study; None before.
     """
-    answers = know(study, results) | study.facts
+    answers = study.facts | know(study, results)  # what happened, not what was planned
     is_unmasked, said_blinded = UNMASKED in answers["masked"], ""
     further = _further(study)
     if is_unmasked and _names_assessor(answers.get("blinding", "")):
@@ -193,6 +194,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
             if number != SUMMARY:
                 said |= {s: said.get(s, number) for s in known if s not in REPEATED}
             asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
+            asked = [slug for slug in asked if slug != "everybody"]  # asked below, where it lacks
             lacking = [
                 SAID_BLINDED.format(said=said_blinded)
                 if said_blinded and slug == "blinding"
@@ -217,13 +219,12 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
 
 def _further(study: Study) -> dict[str, str]:
     """Return what a plan leaves open though it could be registered, by the slug of its answer."""
-    found = {}
+    found, doubts = {}, find_doubts(study)
     sized = size_of_study(study)
-    if sized is not None and (needed := sized[0].enrolled) > study.participants:
-        found["participants"] = TOO_FEW.format(planned=study.participants, needed=needed)
-    if not study.criteria:
-        found["eligibility"] = NO_CRITERIA
-    return found
+    if sized is not None and "size" in doubts:
+        planned, needed = study.participants, sized[0].enrolled
+        found["participants"] = TOO_FEW.format(planned=planned, needed=needed)
+    return found | ({"eligibility": NO_CRITERIA} if "everybody" in doubts else {})
 
 
 def _names_assessor(who_is_blinded: str) -> bool:

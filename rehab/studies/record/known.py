@@ -10,7 +10,13 @@ from rehab.studies.models import Study, StudyMark
 from rehab.studies.participants import StudyEvent
 from rehab.studies.record.found import find
 from rehab.studies.registration.document import FIRST_A2, describe
-from rehab.studies.registration.estimands import METHOD, estimands, summary
+from rehab.studies.registration.estimands import (
+    HARMS_FOLLOWED,
+    METHOD,
+    POPULATIONS,
+    estimands,
+    summary,
+)
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.registration.size import size_of_document
 from rehab.studies.results.results import Results
@@ -25,11 +31,6 @@ CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
     "first participant; a group is drawn when a person is enrolled, and shown to nobody."
 )
-POPULATIONS = (
-    "Intention to treat: everybody as allocated. Who walked no visit{counted} adds nothing to the "
-    "model's estimate, and counts as missing in the tipping point. Per protocol: without visits "
-    "that deviated."
-)
 EXPORTABLE = (
     "GARRY's export: outcomes of each visit under codes, their definitions, the protocol with all "
     "versions, reanalyze.py and reanalyze.R, which compute the results again."
@@ -37,11 +38,6 @@ EXPORTABLE = (
 UNMASKED = (
     "Participants and therapists are not blinded, nor is who takes the tests. What GARRY computes "
     "depends on nobody's judgment."
-)
-HARMS_FOLLOWED = (
-    "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
-    "themselves and are offered as adverse events, each with severity, relation, expectedness and "
-    "the day by which it has to be reported."
 )
 
 
@@ -97,7 +93,7 @@ def _planned(study: Study, document: dict[str, Any]) -> dict[str, str]:
         f"between them: {visits['days_between']}"
         + f", between periods: {visits['days_between_periods']}" * crossed
         + (f", to the follow-up: {follow_up}" if follow_up else "; no follow-up")
-        + (f"; a visit may be {window} days off." if window is not None else "."),
+        + (f"; a visit may be off by days: {window}." if window is not None else "."),
         "participants": f"{document['participants']} participants are planned. "
         f"{size_of_document(document)}".strip(),
         "allocation": f"{METHODS[allocation['method']]}; factors: {factors}.",
@@ -176,9 +172,10 @@ def _conducted(study: Study) -> dict[str, str]:
         walked = study.enrollments.aggregate(last=Max("visits__session__created_at"))
         dates |= {"last enrollment": enrolled["last"], "last visit": walked["last"]}
         dates |= {"closed": study.closed_at}
+    known_days = {"first_day": enrolled["first"], "last_day": study.closed_at}
     looks = study.events.filter(kind=StudyEvent.Kind.LOOKED).order_by("pk")
     counts = list(dict.fromkeys(looks.values_list("about", flat=True)))
-    return {
+    return {name: f"{at:%Y-%m-%d}" for name, at in known_days.items() if at} | {
         "clinic": study.clinic.name,
         "version": f"Version {versions[-1].number}, {versions[-1].at:%Y-%m-%d}, SHA-256 "
         f"{versions[-1].digest}" if versions else "A draft.",

@@ -52,7 +52,7 @@ def describe(study: Study) -> dict[str, Any]:
         "participants": study.participants,
         "months_since_stroke_at_least": study.months_since_stroke,
         "design": "crossover" if study.crossover else "parallel",
-        "arms": [_describe_arm(study, arm) for arm in study.arms.select_related("measure")],
+        "arms": [describe_arm(study, arm) for arm in study.arms.select_related("measure")],
         "allocation": scheme.to_json() | {"commitment_sha256": study.commitment},
         "visits": {
             "in_each_period": plan.visits,
@@ -100,7 +100,8 @@ def digest_of(document: dict[str, Any]) -> str:
     return sha256(text.encode()).hexdigest()
 
 
-def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
+def describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
+    """Return an arm as it is registered. Raises InvalidSetting for one that cannot be walked."""
     phases, schedule = arm.phases(), arm.to_rule().condition.schedule
     measure, protocol = find_rule(study, arm), arm.protocol
     assert protocol is not None  # noqa: S101 - phases() refuses an arm without one

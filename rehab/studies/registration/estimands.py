@@ -27,6 +27,16 @@ METHOD = (
     "Secondary outcomes, and pairs of several arms, by Holm. Per protocol: without visits that "
     "deviated."
 )
+POPULATIONS = (
+    "Intention to treat: everybody as allocated. Who walked no visit{counted} adds nothing to the "
+    "model's estimate, and counts as missing in the tipping point. Per protocol: without visits "
+    "that deviated."
+)
+HARMS_FOLLOWED = (
+    "Falls, near falls, dizziness, pain and stops of the robot follow from the sessions' logs by "
+    "themselves and are offered as adverse events, each with severity, relation, expectedness and "
+    "the day by which it has to be reported."
+)
 
 
 def summary(document: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
 from rehab.studies.participants import Allocation, StudyEvent
 from rehab.studies.registration.document import ANALYSIS, describe, digest_of
-from rehab.studies.registration.measurable import check_outcomes
+from rehab.studies.registration.problems import check_plan
 from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
@@ -98,17 +98,17 @@ def register(study: Study, by: User | None, now: datetime) -> StudyVersion:
     with transaction.atomic():
         lock(study)
         _expect(study, StudyState.DRAFT)
+        check_plan(study)
         secret = check_secret(study)
         study.state, study.registered_at = StudyState.REGISTERED, now
         study.commitment = secret.commitment
         version = _add_version(study, by, now)
-        check_outcomes(study)
         study.save(update_fields=["state", "registered_at", "commitment"])
         note(study, Kind.REGISTERED, by, now, about=version.digest)
     return version
 
 
-def start(study: Study, by: User | None, now: datetime) -> None:
+def start(study: Study, by: User | None, now: datetime, reason: str = "") -> None:
     """Open a registered study to participants.
 
     Parameters
@@ -117,6 +117,8 @@ def start(study: Study, by: User | None, now: datetime) -> None:
         A registered study.
     by, now
         Who starts it (None for a program), and when.
+    reason
+        Why it starts in spite of what was doubted.
 
     Raises
     ------
@@ -128,7 +130,7 @@ def start(study: Study, by: User | None, now: datetime) -> None:
         _expect(study, StudyState.REGISTERED)
         study.state, study.started_at = StudyState.RUNNING, now
         study.save(update_fields=["state", "started_at"])
-        note(study, Kind.STARTED, by, now)
+        note(study, Kind.STARTED, by, now, reason=reason)
 
 
 def current_version(study: Study) -> StudyVersion:
@@ -197,7 +199,7 @@ def revise(
                     "chosen later, they could follow the results."
                 )
             )
-        check_outcomes(study)
+        check_plan(study)
         study.save(update_fields=REVISABLE)
         version = _add_version(study, by, now, reason.strip(), needs_consent=needs_consent)
         note(study, Kind.REVISED, by, now, about=version.digest, reason=reason.strip())

@@ -10,7 +10,6 @@ from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES, FOLLOW_U
 from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.models import Study
 from rehab.studies.models.protocol import OUTCOMES
-from rehab.training.measures import InvalidSetting
 from rehab.training.phases import PHASE_KINDS
 from rehab.training.valences import find_valence
 
@@ -43,17 +42,11 @@ def needs_follow_up(slug: str) -> bool:
     return slug == "follow_up_change" or (of_test is not None and of_test.window == FOLLOW_UP)
 
 
-def check_outcomes(study: Study) -> None:
-    """Raise InvalidSetting for the outcomes that a study could not find, each with its cure."""
-    labels = dict(OUTCOMES)
-    slugs = dict.fromkeys((study.primary_outcome, *study.secondary_outcomes))
-    problems = " ".join(
-        gettext("“%(outcome)s” %(why)s") % {"outcome": labels.get(slug, slug), "why": why}
-        for slug in slugs
-        for why in _reasons(study, slug)
-    )
-    if problems:
-        raise InvalidSetting(problems)
+def find_unmeasurable(study: Study, slug: str) -> Iterator[str]:
+    """Yield why a study could not find an outcome, each with its cure. Raises InvalidSetting."""
+    label = dict(OUTCOMES).get(slug, slug)
+    for why in _reasons(study, slug):
+        yield gettext("“%(outcome)s” %(why)s") % {"outcome": label, "why": why}
 
 
 def _reasons(study: Study, slug: str) -> Iterator[str]:

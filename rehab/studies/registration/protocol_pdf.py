@@ -17,8 +17,9 @@ from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, T
 from rehab.sessions.formatting import format_schedule
 from rehab.studies.allocation.draws import RULE
 from rehab.studies.allocation.scheme import Method
+from rehab.studies.analysis.outcomes import define_outcomes, scale_of
 from rehab.studies.models import METHODS, OUTCOMES, SPENDINGS, Study, StudyVersion
-from rehab.studies.registration.estimands import METHOD, summary
+from rehab.studies.registration.estimands import HARMS_FOLLOWED, METHOD, POPULATIONS, summary
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.registration.size import size_of_document
@@ -96,7 +97,13 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
             yield _text(gettext("Asked after sessions of %(arm)s: %(questionnaire)s") % asked_of)
     yield _text(gettext("Plan"), "Heading2")
     yield _table([(gettext("What"), gettext("Planned")), *plan_rows(document)])
-    yield _text(f"{summary(document)} {METHOD}")
+    yield _text(f"{summary(document)} {METHOD} {POPULATIONS.format(counted='')}")
+    yield _text(gettext("Outcomes"), "Heading2")
+    yield _table([(gettext("What"), gettext("Unit"), gettext("How")), *_outcome_rows(document)])
+    if phase := document["visits"].get("days_to_follow_up") and _follow_up(document):
+        yield _text(f"{gettext('At the follow-up')}: {phase}")
+    yield _text(gettext("Harms"), "Heading2")
+    yield _text(HARMS_FOLLOWED)
     if asked := document.get("facts"):
         yield _text(gettext("Record of the study"), "Heading2")
         yield _table([(ASKED[slug], asked[slug]) for slug in ASKED if slug in asked])
@@ -106,6 +113,19 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
     yield _text(gettext("Of the seed, block sizes or list that participants are allocated by:"))
     yield _text(document["allocation"]["commitment_sha256"], "Code")
     yield Spacer(1, 10 * mm)
+
+
+def _outcome_rows(document: dict[str, Any]) -> Iterator[tuple[object, ...]]:
+    meanings = {one["outcome"]: one["meaning"] for one in define_outcomes()}
+    labels = dict(OUTCOMES)
+    for slug in dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])):
+        yield labels.get(slug, slug), gettext(scale_of(slug)), meanings.get(slug)
+
+
+def _follow_up(document: dict[str, Any]) -> str:
+    """Return what is walked at the follow-up: the first baseline of the protocol."""
+    baselines = (phase for phase in document["arms"][0]["phases"] if phase["kind"] == "baseline")
+    return next(map(_phase_text, baselines), "")
 
 
 def _table(rows: list[tuple[object, ...]]) -> Table:
