@@ -21,7 +21,7 @@ LOOKED_BACK = timedelta(weeks=26)
 COMING = timedelta(weeks=4)
 COMPARED = 3  # the newest sessions
 UNMOVED = 0.02  # up to which change of the goal it has not moved
-IMPROVED = 0.05  # from which change of the goal on a patient has improved
+IMPROVED = 0.05  # from which change of the goal on a patient has improved, or got worse
 OVERDUE = timedelta(days=7)  # without a session and without a planned visit
 
 
@@ -31,16 +31,21 @@ class Flag(StrEnum):
     DUE = "due"
     STUCK = "stuck"
     IMPROVING = "improving"
+    DECLINING = "declining"
     NEW = "new"
 
 
-ORDER = [Flag.STUCK, Flag.DUE, Flag.IMPROVING, Flag.NEW]  # who needs thought first
+ORDER = [Flag.DUE, Flag.DECLINING, Flag.STUCK, Flag.IMPROVING, Flag.NEW]  # who needs thought first
 FLAGS: dict[str, str | Promise] = {
     Flag.DUE: _("overdue"),
+    Flag.DECLINING: _("getting worse"),
     Flag.STUCK: _("stuck"),
     Flag.IMPROVING: _("improving"),
     Flag.NEW: _("new"),
 }
+
+
+SIGNS = {Flag.IMPROVING: "▲", Flag.DECLINING: "▼"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +83,8 @@ class Case:
 
     @property
     def way(self) -> str:
-        """Whether the goal rose or fell over them, as a sign."""
-        goals = self._compared
-        if not goals or goals[0] == goals[-1]:
-            return ""
-        return "▲" if goals[0] > goals[-1] else "▼"
+        """The sign of the flag that tells how the goal went: up is better."""
+        return next((SIGNS[flag] for flag in self.flags if flag in SIGNS), "")
 
     @property
     def _compared(self) -> list[float]:
@@ -119,7 +121,9 @@ def judge(
         flags.append(Flag.NEW)
     if len(goals) == COMPARED:
         change = goals[0] / goals[-1] if compared[0].higher_is_better else goals[-1] / goals[0]
-        if change <= 1 + UNMOVED:
+        if change <= 1 - IMPROVED:
+            flags.append(Flag.DECLINING)
+        elif change <= 1 + UNMOVED:
             flags.append(Flag.STUCK)
         elif change >= 1 + IMPROVED:
             flags.append(Flag.IMPROVING)

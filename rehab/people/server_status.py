@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from typing import Any
 
-import django
 from django.conf import settings
 from django.db import connection
 from django.db.models import Count, Q
@@ -35,7 +34,7 @@ def server_status(user: User) -> dict[str, Any]:
     ]
     if pending:
         alerts.append(
-            gettext("%(count)s migrations are due. Run %(command)s.")
+            gettext("The database is %(count)s changes behind this version. Run %(command)s.")
             % {"count": pending, "command": command("migrate")}
         )
     if free is not None and free < LOW_DISK:
@@ -46,14 +45,13 @@ def server_status(user: User) -> dict[str, Any]:
         "switched_off": accounts.filter(is_active=False).count(),
         "server_alerts": alerts,
         "server": {
-            gettext("GARRY"): garry_version(),
-            gettext("Django"): django.get_version(),
+            gettext("Version"): garry_version(),
             gettext("Database"): connection.display_name,
-            gettext("Migrations"): gettext("up to date")
+            gettext("Its tables"): gettext("up to date")
             if not pending
-            else gettext("%(count)s due") % {"count": pending},
+            else gettext("%(count)s changes are due") % {"count": pending},
             gettext("Free on the disk"): "–" if free is None else f"{free / 2**30:.1f} GB",
-            gettext("Many clinics behind TLS"): gettext("yes")
+            gettext("Open to several clinics, by https"): gettext("yes")
             if settings.HOSTED
             else gettext("no"),
         },

@@ -124,6 +124,12 @@ class Course:
         return text
 
     @property
+    def ends(self) -> tuple[str, str]:
+        """Its best and worst result, as text: what is at the top of its line and at the foot."""
+        values = sorted((one.value for one in self.results), reverse=self.test.higher_is_better)
+        return format_result(self.test, values[0]), format_result(self.test, values[-1])
+
+    @property
     def spark(self) -> list[str]:
         """The points of its line in a drawing of the size `SPARK`, better results higher."""
         values = [one.value for one in self.results]

@@ -31,7 +31,9 @@ def walks(*goals, days_ago=1, higher=True, measure=1):
         ([], TODAY, None, ["new"]),
         ([], None, None, ["due", "new"]),
         (walks(4.0, 4.0, 4.0), None, None, ["stuck"]),
-        (walks(3.8, 3.9, 4.0), None, None, ["stuck"]),  # it went down
+        (walks(3.9, 3.9, 4.0), None, None, ["stuck"]),  # it went down a little
+        (walks(3.8, 3.9, 4.0), None, None, ["declining"]),
+        (walks(1.1, 1.0, 1.0, higher=False), None, None, ["declining"]),
         (walks(4.1, 4.0, 4.0), None, None, []),
         (walks(4.2, 4.1, 4.0), None, None, ["improving"]),
         (walks(4.0, 4.0), None, None, []),  # too few to say
@@ -53,11 +55,14 @@ def test_flags(newest_first, next_day, missed, flags):
         ([], ("", "")),
         ([2.5, 2.0, 2.0], ("2.00 → 2.50 W/kg", "▲")),
         ([2.0, 2.0], ("2.00 W/kg", "")),
-        ([1.5, 2.0], ("2.00 → 1.50 W/kg", "▼")),
+        ([1.5, 2.0], ("2.00 → 1.50 W/kg", "")),  # too few to say
+        ([2.0, 2.0, 1.99], ("1.99 → 2.00 W/kg", "")),  # stuck, by its flag
+        ([1.5, 1.8, 2.0], ("2.00 → 1.80 → 1.50 W/kg", "▼")),
     ],
 )
 def test_how_the_goal_went(newest_first, told):
-    case = Case(Patient(), walks(*newest_first), 0, None, None, ())
+    newest = walks(*newest_first)
+    case = Case(Patient(), newest, 0, None, None, judge(newest, TODAY, None, TODAY))
     assert (case.goals, case.way) == told
 
 

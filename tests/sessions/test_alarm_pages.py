@@ -59,6 +59,27 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert row.by == world.people[Role.PT]
 
 
+def test_what_an_ended_session_left_is_folded_up_on_the_page_of_another(world, session):
+    note(session, "fall")
+    pt = client_of(world)
+    for query, is_folded in (({"but": 0}, True), ({}, False)):
+        told = pt.get(reverse("alarms"), query).content.decode()
+        assert "Iris fell." in told
+        assert ("1 alarm of an ended session" in told) is is_folded
+
+
+def test_a_fall_stands_first_in_the_admins_day(world, session):
+    note(session, "fall")
+    TrainingSession.everywhere.filter(pk=session.pk).update(active_s=60)
+    walk(make_patient(world.clinic, "Tom", code="K-2"), "positive", [HIT])
+    page = client_of(world).get(reverse("admin:index"))
+    fallen = [(row.patient, row.has_fallen) for row in page.context["today"]]
+    assert fallen[0] == ("Iris", True)
+    assert sum(has_fallen for _, has_fallen in fallen) == 1
+    text = plain(page.content.decode())
+    assert text.index("Needs attention") < text.index("Iris fell.") < text.index("Today")
+
+
 def test_each_page_of_a_patient_asks_for_alarms_where_they_are(world, session):
     pt, asked = client_of(world), {}
     for pattern in urls.urlpatterns:

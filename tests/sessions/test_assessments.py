@@ -72,6 +72,7 @@ def test_a_course_leaves_out_what_was_struck_out(world):
     (course,) = [c for c in load_courses(world.people[Role.PT], world.patient) if c.results]
     assert (course.summary, course.verdict) == ("28.0 s, at first 31.0 s", 1)
     assert course.spark == ["4.0,28.0", "116.0,4.0"]
+    assert course.ends == ("28.0 s", "31.0 s")  # at its top and at its foot: lower is better
     wrong.refresh_from_db()
     assert wrong.struck_at is not None
     for address, said in (("sessions", "28.0 s, at first 31.0 s"), ("tests", "at first 31.0 s")):

@@ -60,6 +60,23 @@ def test_columns_are_found_once_half_a_minute_has_come(table):
     assert "left.angle=LAnk*0.0174532" in text
 
 
+def test_a_check_to_which_nothing_comes_says_so_once_with_the_cure():
+    check, said, now = make_check()
+
+    async def wait():
+        waiting = asyncio.create_task(check.wait_until_done())
+        await asyncio.sleep(0)
+        for now[0] in (14.0, 16.0, 60.0):
+            told = list(said)
+            await asyncio.sleep(0.15)
+            assert bool(said) is (now[0] > 15), told
+        waiting.cancel()
+
+    asyncio.run(wait())
+    (text,) = said
+    assert "Nothing has arrived for 15 s. Start the sender" in text
+
+
 def test_a_stream_with_times_beside_it_and_rows_of_their_own(table):
     check, _, now = make_check()
     check.add_rows([{"stamp": 0.1, "elbow": 2.0}])

@@ -132,7 +132,10 @@ def check_setup(
     for key, text in unlike.items():  # what their curve and label say is then not sure
         proposal.guesses[key] = replace(proposal.guesses[key], doubt=text)
     findings += unlike.values()
-    findings += [finding.message for finding in check.findings]
+    findings += [
+        f"{one.side.capitalize()} leg: {one.message}" if one.side else one.message
+        for one in check.findings
+    ]
     return SetupCheck(
         proposal=proposal,
         columns=found,

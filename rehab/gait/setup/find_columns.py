@@ -196,7 +196,8 @@ def _describe_no_force(table: Table, labels: Mapping[str, Label | None]) -> str:
             "of a foot that swings. Record the plates too, and compute the moments with them."
         )
     return begin + (
-        "Give the files that belong together in one command: check FORCES MOMENTS ANGLES."
+        "Give the files that belong together in one command: check FORCES MOMENTS ANGLES. If "
+        "there is none with forces, export the vertical force of each plate from the lab's program."
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
+from datetime import datetime, timedelta
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
@@ -15,8 +15,10 @@ from rehab.people.roles import Role
 from rehab.sessions.alarms import Alarm, find_incidents, open_alarms
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import acknowledge
+from rehab.training.changes import OPEN_STATES, State
 
 LISTED = timedelta(days=365)
 MAX_INCIDENTS = 200
@@ -28,14 +30,19 @@ MAX_INCIDENTS = 200
 def show_alarms(request: HttpRequest) -> HttpResponse:
     """Return what is open in the clinic, or at one station, as a part of a page.
 
-    ``but``: of which session the page itself tells.
+    ``but``: of which session the page itself tells: there, what ended sessions left is folded up.
     """
     station = request.GET.get("station", "")
     found = open_alarms(
         user_of(request), timezone.now(), int(station) if station.isdecimal() else None
     )
-    shown = [one for one in found if str(one.session_id) != request.GET.get("but")]
-    context = {"alarms": [(one, clinic_time(one.at, one.session.clinic)) for one in shown]}
+    but = request.GET.get("but")
+    context: dict[str, list[tuple[SessionEvent, datetime]]] = {"alarms": [], "ended": []}
+    for one in found:
+        if str(one.session_id) != but:
+            has_ended = but is not None and State(one.session.state) not in OPEN_STATES
+            row = (one, clinic_time(one.at, one.session.clinic))
+            context["ended" if has_ended else "alarms"].append(row)
     return render(request, "sessions/alarms.html", context)
 
 

@@ -118,8 +118,9 @@ def _answer(request: HttpRequest, files: list[Path], mass_kg: float | None) -> d
         for file in files:
             file.unlink(missing_ok=True)
         command = ["--overground"] if is_overground else []
-        command += ["--columns", *map(_quote, columns)]
-        shown |= {"stored": name, "found": None, "command": " ".join(command)}
+        is_ours = any("=plates." in one or "=own." in one for one in columns)
+        command += ["--check"] if is_ours else ["--columns", *map(_quote, columns)]
+        shown |= {"stored": name, "found": None, "command": " ".join(command), "is_ours": is_ours}
     return shown
 
 

@@ -18,6 +18,7 @@ from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.reporting import Notify, SourceError
 
 CHECK_S = 30.0
+NOTHING_AFTER_S = 15.0  # without a sample
 ROWS_MAX = 300_000  # a minute at 5 kHz
 TIME = "time_s"  # of streams whose samples carry their times beside the columns
 
@@ -52,10 +53,21 @@ class StreamCheck(Intake):
         """Return at once: there is no session."""
 
     async def wait_until_done(self) -> None:
-        """Return once half a minute is over, whether or not the sender goes on."""
+        """Return once half a minute is over, whether or not the sender goes on.
+
+        Says so, with the cure, where no sample arrives.
+        """
+        begin_s, is_told = self._clock(), False
         while not self.is_done.is_set():
-            if self._first_s is not None and self._clock() - self._first_s >= self._seconds:
-                return
+            if self._first_s is not None:
+                if self._clock() - self._first_s >= self._seconds:
+                    return
+            elif not is_told and self._clock() - begin_s >= NOTHING_AFTER_S:
+                is_told = True
+                self._say(
+                    f"Nothing has arrived for {NOTHING_AFTER_S:.0f} s. Start the sender, and look "
+                    "at its address, port and firewall; Ctrl-C ends the waiting."
+                )
             await asyncio.sleep(0.1)
 
     def accepts(self, names: Iterable[str]) -> bool:

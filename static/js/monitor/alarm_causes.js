@@ -41,16 +41,21 @@ function describeServer({ number }, { socket }) {
   return `${fill(text, values)} ${_("To stop the robot, use its own switch.")}`;
 }
 
+// Whether somebody fell, and nobody has said yet that they saw it: until then nothing goes on.
+export const hasFallen = (session) => Boolean(session && alarmOf(session, "fall"));
+
 function describeFall(session, { robot }) {
   const alarm = alarmOf(session, "fall");
   if (!alarm) return "";
   const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
   const facts = [
+    document.getElementById("monitor").dataset.station,
     minutesAgo(alarm.at),
     session.state === "paused" && _("Paused"),
     robot.isStopped && _("Robot stopped"),
   ];
-  return `${fell}\n${facts.filter(Boolean).join(" · ")}\n${_("If the belt still runs, stop it by hand.")}`;
+  const cure = `${_("If the belt still runs, stop it by hand.")} ${_("Stay with the patient and call for help.")}`;
+  return `${fell}\n${facts.filter(Boolean).join(" · ")}\n${cure}`;
 }
 
 function describeOwnStop(session, { robot }) {
@@ -129,7 +134,7 @@ export const CAUSES = [
   },
   {
     cause: "fall",
-    hides: ["robot_stop", "source", "robot", "why"],
+    hides: ["robot_stop", "restart", "ended", "source", "signals", "strides", "tablet", "robot", "why"],
     isRed: true,
     describe: describeFall,
     isOwn: ({ state }) => state.fellHere,

@@ -2,6 +2,7 @@
 
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
+import { hasFallen } from "garry/monitor/alarm_causes";
 import { RobotPlacing } from "garry/monitor/robot_placing";
 import {
   cureOf,
@@ -188,6 +189,7 @@ export class RobotPanel {
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
     this.#button("arm").hidden = !this.#isHeld;
+    this.#button("arm").disabled = hasFallen(this.#page.state.session);
   }
 
   #enlarge(button) {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -14,6 +14,7 @@ from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, may_see_names, rights_of
 from rehab.people.simulated import counted
+from rehab.sessions.alarms import Alarm, open_alarms
 from rehab.sessions.formatting import clinic_time, format_duration, format_rate, midnight_of
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day.stations import StationStatus, find_live_session, station_statuses
@@ -40,6 +41,7 @@ class SessionRow:
     time: str
     state: str
     is_open: bool
+    has_fallen: bool
     duration: str
     hit_rate: str
 
@@ -56,7 +58,9 @@ class Alert:
 def dashboard_context(user: User, now: datetime) -> dict[str, Any]:
     """Return the template's context, with the rows that the user's role may see."""
     clinic = clinic_of(user)
-    today = sessions_today(user, clinic, now)
+    alarms = open_alarms(user, now) if user.role in (Role.LEAD, Role.PT) else []
+    fallen = {one.session_id for one in alarms if one.kind == Alarm.FALL}
+    today = sessions_today(user, clinic, now, fallen)
     open_sessions = [row.session for row in today if row.is_open]
     may_see_stations = Right.VIEW in rights_of(user.role, Station.__name__)
     stations = list(station_statuses(user, open_sessions, now)) if may_see_stations else []
@@ -67,13 +71,19 @@ def dashboard_context(user: User, now: datetime) -> dict[str, Any]:
         "walking": sum(row.session.state == State.RUNNING for row in today),
         "week": week_summary(user, clinic, now),
         "stations": stations,
+        "fallen": [one for one in alarms if one.kind == Alarm.FALL],
         "alerts": list(find_alerts(user, today, stations, now)),
         "can_steer": user.role in (Role.LEAD, Role.PT),
     }
 
 
-def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow]:
-    """Return who walked today by the clinic's clock, and every open session; running ones first."""
+def sessions_today(
+    user: User, clinic: Clinic, now: datetime, fallen: Collection[int] = ()
+) -> list[SessionRow]:
+    """Return who walked today by the clinic's clock, and every open session.
+
+    Those whose fall (``fallen``: keys) nobody has seen come first, then those that run.
+    """
     local = clinic_time(now, clinic)
     sessions = todays_sessions(TrainingSession.objects.visible_to(user), local)
     rows = (
@@ -83,7 +93,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
     )
     walked = rows.exclude(IS_OPEN).filter(counted(), active_s__gt=0)
     listed = [*rows.filter(IS_OPEN), *walked[:MAX_ENDED]]
-    listed.sort(key=lambda row: STATE_ORDER.index(State(row.state)))
+    listed.sort(key=lambda row: (row.pk not in fallen, STATE_ORDER.index(State(row.state))))
     by_name = may_see_names(user.role)
     return [
         SessionRow(
@@ -92,6 +102,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
             time=_format_time(clinic_time(row.began_at, clinic), midnight_of(local)),
             state=row.get_state_display(),
             is_open=State(row.state) in OPEN_STATES,
+            has_fallen=row.pk in fallen,
             duration=format_duration(row.active_s),
             hit_rate=_format_hit_rate(row),
         )

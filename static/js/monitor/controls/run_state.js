@@ -3,6 +3,7 @@
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
 import { icon } from "garry/shared/svg";
+import { hasFallen } from "garry/monitor/alarm_causes";
 import { openDialog } from "garry/monitor/controls/open_dialog";
 
 // The one main button, by the session's state: the change it asks for, its label and icon.
@@ -35,10 +36,15 @@ export function createRunState({ state, show, onPress, change }) {
 
   function drawButtons(session) {
     const [kind, label, iconId] = MAIN[session.state] ?? [""];
-    main.disabled = end.disabled = !kind;
-    if (main.dataset.of === kind) return;
-    main.dataset.of = main.value = kind;
-    main.innerHTML = kind ? `${icon(iconId)}<span>${label}</span>` : _("Ended");
+    const waits = kind === "resume" && hasFallen(session);
+    end.disabled = !kind;
+    main.disabled = !kind || waits;
+    const drawn = `${kind} ${waits}`;
+    if (main.dataset.of === drawn) return;
+    main.dataset.of = drawn;
+    main.value = kind;
+    const why = waits ? `<small>${_("once the fall is seen to")}</small>` : "";
+    main.innerHTML = kind ? `${icon(iconId)}<span>${label}${why}</span>` : _("Ended");
   }
 
   return {
