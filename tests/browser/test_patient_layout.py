@@ -98,6 +98,14 @@ LOOK = f"""async ([texts, buttons, words]) => {{
 }}"""
 
 
+# How far the level is below the goal line, and how many steps are off the chart.
+LEVEL = """() => {
+  const top = (name) => document.querySelector(name).getBoundingClientRect().top;
+  const arrows = document.querySelectorAll('.dots path[d^="M"]').length;
+  return [top(".liquid") - top(".goal"), arrows];
+}"""
+
+
 def look_everywhere(page: Page, before: Callable[[], None] = lambda: None) -> None:
     """Check the page as it is now at every size, with all sizes of words."""
     look = page.get_attribute("body", "data-look")
@@ -162,3 +170,24 @@ def test_the_frame_stays_from_step_to_step(server: Server, visit: Visit) -> None
                 assert (screen, wrong) == (screen, [])
                 found.append(frames)
             assert found == [found[0]] * len(found), screen
+
+
+def test_a_near_miss_is_seen_to_miss_and_a_step_off_the_chart_to_be_off(
+    server: Server, visit: Visit
+) -> None:
+    (walk,) = make_walks(server, {"valence": "explicit"})
+    page = visit(walk.path, walk, reduced_motion="reduce")
+    set_screen(page, "tablet-landscape")
+    with feet_of(server, walk) as feet:
+        page.click("[data-change=start]")
+        page.wait_for_selector("body[data-look=begin]")
+        gaps, arrows = [], []
+        for performance in (0.995, 1.0, 0.05):
+            feet.walk(performance)
+            page.wait_for_function("n => document.body.dataset.step == n", arg=feet.number)
+            gap, drawn = page.evaluate(LEVEL)
+            gaps.append(gap)
+            arrows.append(drawn)
+    assert gaps[0] > 20  # pixels of a tablet
+    assert gaps[1] < 0
+    assert arrows == [0, 0, 1]

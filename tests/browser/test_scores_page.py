@@ -25,6 +25,15 @@ print(walk(rosa, "positive", strides(13, 10), now=timezone.now()).pk)
 print(walk(rosa, "negative", strides(12, 3), now=timezone.now()).pk)
 """
 BLUE = "rgb(10, 63, 168)"
+NO_ROW_CUT = """() => {
+  const board = document.querySelector(".board:not([hidden])").getBoundingClientRect();
+  const rows = [...document.querySelectorAll(".board:not([hidden]) li")];
+  const seen = rows.filter((row) => getComputedStyle(row).opacity > 0)
+    .map((row) => row.getBoundingClientRect());
+  const shown = seen.filter(({ top, bottom }) => bottom > board.top + 9 && top < board.bottom - 9);
+  return shown.length > 1
+    && shown.every(({ top, bottom }) => top > board.top - 9 && bottom < board.bottom + 9);
+}"""
 TABLETS = ("tablet-portrait", "tablet-landscape")
 
 
@@ -110,6 +119,13 @@ def test_with_reduced_motion_the_score_is_there_at_once(server, sessions, browse
         assert page.locator(".gliding").count() == 0
         assert is_in_view(page, "board-same")
         expect(page.locator("#board-same .you")).to_have_css("background-color", BLUE)
+
+
+@pytest.mark.parametrize("size", TABLETS)
+def test_no_row_is_cut_by_the_edge_of_the_list(server, sessions, browser, size):
+    with tablet(browser, server, size, still=True) as page:
+        page.goto(f"/sessions/{sessions[0]}/scores/")
+        page.wait_for_function(NO_ROW_CUT)
 
 
 @pytest.mark.parametrize("size", TABLETS)

@@ -50,7 +50,11 @@ def presence_event(fold: SessionFold, presence: Message) -> LiveEvent:
 
 def presence_for_patient(presence: Message) -> Message:
     """Return the part of the presence that a patient's page gets."""
-    return {"source": presence["source"], "robot": presence["robot"]}
+    return {
+        "source": presence["source"],
+        "ended": presence["source_trouble"] == "ended",  # the recording that played
+        "robot": presence["robot"],
+    }
 
 
 def robot_report_event(fold: SessionFold, report: Message) -> LiveEvent:

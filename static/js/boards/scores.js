@@ -69,4 +69,11 @@ for (const [index, tab] of tabs.entries()) {
 }
 const boards = [...document.querySelectorAll("section.board")];
 addEventListener("resize", () => boards.filter((board) => !board.hidden).forEach(goTo));
+for (const board of boards) {
+  const rows = board.querySelectorAll("li:not(.you)");
+  // What the edge would cut is not shown.
+  const show = (seen) => seen.forEach((row) => row.target.classList.toggle("cut", row.intersectionRatio < 0.95));
+  const watch = new IntersectionObserver(show, { root: board, threshold: 0.95 });
+  rows.forEach((row) => watch.observe(row));
+}
 if (boards.length) glide(boards[0]);

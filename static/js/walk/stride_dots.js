@@ -1,5 +1,6 @@
 // The latest strides about the goal line: a disc at or above it, a ring below, a small disc where it was close, a gap
-// where nothing was measured. Few and large, to be read from 2 m; the newest is the largest.
+// where nothing was measured, an arrow up or down where a step is off the chart. Few and large, to be read from 2 m;
+// the newest is the largest.
 import { append } from "garry/shared/svg";
 import { isStill } from "garry/walk/reduced_motion";
 
@@ -14,10 +15,11 @@ export function createDots(svg) {
     dot.setAttribute("r", i === SHOWN - 1 ? 28 : 20);
     return dot;
   });
+  const arrows = dots.map(() => append(group, "path"));
   let layout, newest;
 
-  function layOut({ left, right, y }) {
-    layout = { left, y, step: (right - left) / (SHOWN - 1) };
+  function layOut({ left, right, y, beyond }) {
+    layout = { left, y, beyond, step: (right - left) / (SHOWN - 1) };
     dots.forEach((dot, i) => dot.setAttribute("cx", left + i * layout.step));
   }
 
@@ -27,18 +29,26 @@ export function createDots(svg) {
     const first = SHOWN - recent.length;
     let line = "";
     let joined = false;
+    let before = 0;
     dots.forEach((dot, i) => {
       const { performance = null, hit, close = false } = recent[i - first] ?? {};
       const gap = performance === null;
+      const beyond = gap ? 0 : layout.beyond(performance); // −1 above, 1 below
+      arrows[i].setAttribute("d", "");
       dot.classList.toggle("gap", gap);
       if (!gap) {
         const y = layout.y(performance).toFixed(1);
         dot.setAttribute("cy", y);
         dot.classList.toggle("hit", hit && !close);
         dot.classList.toggle("close", close);
-        line += `${joined ? "L" : "M"}${layout.left + i * layout.step} ${y}`;
+        const x = layout.left + i * layout.step;
+        // Between two that are off on the same side nobody knows the way: no line.
+        line += `${joined && !(beyond && beyond === before) ? "L" : "M"}${x} ${y}`;
+        if (beyond) arrows[i].setAttribute("d", `M${x - 9} ${y - 4.5 * beyond}l9 ${9 * beyond}l9 ${-9 * beyond}`);
+        arrows[i].classList.toggle("hit", hit && !close);
       }
       joined = !gap;
+      before = beyond;
     });
     trace.setAttribute("d", line);
     const last = recent.at(-1);

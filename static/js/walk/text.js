@@ -10,6 +10,8 @@ const KEEP_WALKING = _("Keep walking if you feel well.");
 // `isAlone`: on a tablet that cannot go on by itself; `silent_s`: how long the server has said nothing.
 export function messageFor(screen, session, name, { isAlone, silent_s }) {
   const safe = session?.has_points === false ? "" : SAFE;
+  if (session?.presence.ended && (screen === "lost" || screen === "still"))
+    return [_("The recording has ended."), safe];
   switch (screen) {
     case "ready":
       return [

@@ -197,7 +197,7 @@ async def test_the_monitor_hears_how_long_sensor_and_tablet_are_silent(place, be
     source, tablet = await place.source().open(), place.tablet(session)
     await source.walk(4.0)
     seen = await tablet.watch()
-    assert seen["presence"] == {"source": True, "robot": False}  # no concern of the patient's
+    assert seen["presence"] == {"source": True, "ended": False, "robot": False}
     told = await monitor.until(
         lambda event: event["kind"] == "presence" and event["presence"]["tablets"] == 1
     )

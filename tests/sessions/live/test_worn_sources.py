@@ -73,7 +73,7 @@ async def test_the_therapist_sees_what_plays_instead_of_a_leg(place, sourced):
 
 async def test_the_end_of_a_recording_outlives_its_source(place, sourced):
     session, source = await sourced(place)
-    monitor = await place.monitor(session).open()
+    monitor, tablet = await place.monitor(session).open(), await place.tablet(session).open()
 
     def is_told(trouble, *, is_there):
         def judge(event):
@@ -88,6 +88,7 @@ async def test_the_end_of_a_recording_outlives_its_source(place, sourced):
         await monitor.until(is_told(trouble, is_there=True))
     await source.hang_up()
     await monitor.until(is_told("ended", is_there=False))
+    await tablet.until(lambda event: event.get("presence", {}).get("ended"))
     again = await place.source().open()
     await monitor.until(is_told("", is_there=True))
     await again.say({"type": "sensor", "trouble": "hidden"})
