@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.servers import run_python
+
 ROOT = Path(__file__).parent.parent
 
 PACKAGE_ADDRESS = re.compile(
@@ -183,3 +185,22 @@ def test_imports_without_django_posix_and_pybullet(package: str) -> None:
     assert done.returncode == 0, done.stderr
     files = len(list((ROOT / package.replace(".", "/")).rglob("*.py")))
     assert int(done.stdout) == files
+
+
+# What few clinics need: extras, each loaded when it is asked for, and parts that only need us.
+OPTIONAL = ("bleak", "cv2", "ezc3d", "mcap", "pyarrow", "pybullet", "pylsl", "serial")
+SELDOM = ("rehab.legacy.importing", "robot.bases.avatar", "robot.homing", "rehab.sources.lsl")
+SERVE = """
+import sys
+import garry_site.asgi
+from django.urls import get_resolver
+
+assert get_resolver().url_patterns
+print(*(name for name in sys.argv[1:] if name in sys.modules))
+"""
+
+
+@pytest.mark.server
+def test_a_server_loads_nothing_that_few_clinics_need(tmp_path: Path) -> None:
+    done = run_python(tmp_path, "-c", SERVE, *OPTIONAL, *SELDOM)
+    assert done.split() == []

@@ -1,6 +1,5 @@
 """The bases that can be driven, each in its own module or folder."""
 
-from robot.bases.avatar import AvatarBase
 from robot.bases.base import (
     Abilities,
     Answer,
@@ -12,23 +11,18 @@ from robot.bases.base import (
     MobileBase,
     SensorState,
 )
-from robot.bases.kinematic import KinematicBase
-from robot.bases.kobuki import KobukiBase
-from robot.bases.null import NullBase
-from robot.bases.rosbridge import RosbridgeBase
-from robot.bases.twinned import TwinBase
 from robot.plugins import Registry, check_class
 
-# Name: its class, made with a monotonic clock [s].
+# Name: its class, made with a monotonic clock [s]; its module is imported when it is asked for.
 BASES: Registry[type[MobileBase]] = Registry(
     "garry.bases",
     {
-        "avatar": AvatarBase,
-        "null": NullBase,
-        "kinematic": KinematicBase,
-        "twin": TwinBase,
-        "kobuki": KobukiBase,
-        "rosbridge": RosbridgeBase,
+        "avatar": "robot.bases.avatar:AvatarBase",
+        "null": "robot.bases.null:NullBase",
+        "kinematic": "robot.bases.kinematic:KinematicBase",
+        "twin": "robot.bases.twinned:TwinBase",
+        "kobuki": "robot.bases.kobuki:KobukiBase",
+        "rosbridge": "robot.bases.rosbridge:RosbridgeBase",
     },
     check_class(MobileBase),
 )

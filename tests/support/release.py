@@ -34,6 +34,8 @@ def main(version: str) -> None:
     replace("CITATION.cff", r"^version: .*", f"version: {version}")
     replace("CITATION.cff", r"^date-released: .*", f"date-released: {today}")
     replace("CHANGELOG.md", r"^## Unreleased$", f"## Unreleased\n\n## {version}, {today}")
+    if "Nothing was released yet. " in (ROOT / "CHANGELOG.md").read_text("utf-8"):
+        replace("CHANGELOG.md", r"^Nothing was released yet\. ", "")
     subprocess.run(
         ["npm", "install", "--package-lock-only", "--ignore-scripts"], cwd=ROOT, check=True
     )
