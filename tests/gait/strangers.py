@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -92,6 +92,20 @@ def make_known_walk(**given) -> CorpusWalk:
     legs = {side: LegSamples(*getattr(walk, side)) for side in SIDES}
     known = tuple(("left", s.initial_contact_s, s.terminal_contact_s) for s in truth)
     return CorpusWalk("synthetic", walk.t_s, legs, walk.mass_kg, False, known=known)
+
+
+def from_zero(walk: CorpusWalk, rate_hz: float | None = None) -> CorpusWalk:
+    """Return a walk whose times begin at zero, if wanted on an even grid."""
+    start_s = walk.t_s[0]
+    known = walk.known or tuple((c.side, c.begin_s, c.end_s) for c in find_clean(walk))
+    moved = tuple((side, begin_s - start_s, end_s - start_s) for side, begin_s, end_s in known)
+    t_s = walk.t_s - start_s
+    even_s = t_s if rate_hz is None else np.arange(0, t_s[-1], 1 / rate_hz)
+    legs = {
+        side: LegSamples(*(np.interp(even_s, t_s, np.asarray(row, float)) for row in leg[:3]))
+        for side, leg in walk.legs.items()
+    }
+    return replace(walk, t_s=even_s, legs=legs, known=moved, power_w_kg={}, events_s={})
 
 
 def write_table(path: Path, heads: list[list[str]], rows: list[np.ndarray], *, comma: str = ",",

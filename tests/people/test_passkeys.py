@@ -15,7 +15,7 @@ from django.urls import reverse
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.models import User
 from rehab.people.sign_in.factors.factors import Authenticator
-from tests.support.accounts import add_account, enter, is_in
+from tests.support.accounts import add_account, add_app, enter, is_in
 from tests.support.passkey import FLAG, SoftPasskey
 from tests.support.world import signed_in
 
@@ -177,3 +177,12 @@ def test_one_key_serves_one_account_once(key):
     """Stored twice, a copy would count by itself."""
     register(User.everywhere.get(username="rosa"), key)
     assert Authenticator.everywhere.count() == 1
+
+
+def test_a_recovery_code_replaces_a_lost_passkey_once():
+    _, codes = add_app(add_account())
+    for lets_in in (True, False):
+        client = browser()
+        enter(client)
+        client.post(SECOND_FACTOR, {"code": codes[0]})
+        assert is_in(client) == lets_in
