@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Dialog, Page, expect
 
 from tests.support.browsers import SIZES
 from tests.support.servers import Server, serve
@@ -253,7 +253,12 @@ def test_a_plan_is_short_answers_at_once_and_keeps_what_was_typed(server, browse
         page.click("button:has-text('Save')")
         expect(page.locator("[role=alert] a")).to_contain_text("give the days to it")
         asked: list[str] = []
-        page.on("dialog", lambda dialog: (asked.append(dialog.type), dialog.dismiss()))
+
+        def stay(dialog: Dialog) -> None:
+            asked.append(dialog.type)
+            dialog.dismiss()
+
+        page.on("dialog", stay)
         page.get_by_role("link", name="Back").click()  # not left unasked
         page.wait_for_timeout(500)
         assert asked == ["beforeunload"]

@@ -91,7 +91,7 @@ def test_a_study_is_planned_registered_started_and_closed_by_clicks(world):
     assert sent["Location"] == page
     assert [arm.code for arm in study.arms.all()] == ["A", "B", "C"]
     assert "punishment has worked worse" in text_of(lead.get(page))
-    assert lead.post(reverse("start-study", args=[study.pk])).url == page  # not before
+    assert lead.post(reverse("start-study", args=[study.pk]))["Location"] == page  # not before
     why = {"everybody": "A feasibility study."}
     for step, state in (("register", "registered"), ("start", "running"), ("close", "closed")):
         lead.post(reverse(f"{step}-study", args=[study.pk]), why)
