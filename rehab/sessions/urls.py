@@ -3,7 +3,6 @@
 from django.urls import path
 
 from rehab.sessions.pages import (
-    after_session,
     alarms,
     assessments,
     history,
@@ -11,6 +10,7 @@ from rehab.sessions.pages import (
     insight,
     monitor,
     paper,
+    questions,
     recording,
     replay,
     screen_size,
@@ -46,10 +46,10 @@ urlpatterns = [
     path("sessions/<int:session_id>/note/", monitor.write_note, name="write-note"),
     path("sessions/<int:session_id>/report/", paper.show_report, name="report"),
     path("sessions/<int:session_id>/details/", session.show_session, name="session"),
-    path("sessions/<int:session_id>/questions/", after_session.ask_questions, name="questions"),
+    path("sessions/<int:session_id>/questions/", questions.ask_questions, name="questions"),
     path(
         "sessions/<int:session_id>/questions/add/",
-        after_session.add_questionnaire,
+        questions.add_questionnaire,
         name="add-questionnaire",
     ),
     path("sessions/<int:session_id>/replay/", replay.show_replay, name="replay"),

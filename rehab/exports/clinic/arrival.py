@@ -21,7 +21,7 @@ from django.db.models import DateField, DateTimeField, TimeField
 from pyrage.x25519 import Identity
 
 from rehab.exports.clinic.departure import delete_rows, transaction_and_rest
-from rehab.exports.clinic.keys import reserve_keys
+from rehab.exports.clinic.primary_keys import reserve_keys
 from rehab.exports.clinic.rows import (
     ENCRYPTED,
     TOKENS,

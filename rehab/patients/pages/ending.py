@@ -17,7 +17,7 @@ from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time, format_duration
 from rehab.sessions.log import RobotEntry
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.pages.after_session import page_after
+from rehab.sessions.pages.questions import page_after
 from rehab.sessions.reports.patient_summary import describe_ending
 from rehab.stations.tablets import ENDING_STAYS_S
 from rehab.training.changes import OPEN_STATES, State
