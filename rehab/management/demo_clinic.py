@@ -50,12 +50,12 @@ class Course:
     noted: Mapping[int, str]
 
 
-# One who improves, one who is stuck, one who has not come for long, one who missed a visit, …
+# One who improves, one who is stuck, one who has not come for long, one who gets worse, …
 COURSES = (
     Course("demo", 0.027, 0, 2, {0: "New shoes today.", 6: "Tired after a short night."}),
     Course("poor", 0.0, 0, 3, {1: "Goal unchanged: works on her endurance first."}),
     Course("demo", 0.012, 11, None, {0: "Away with a cold next week."}),
-    Course("fatiguing", 0.012, 1, 0, {2: "Rests after each block help."}),
+    Course("fatiguing", -0.03, 1, 0, {2: "Rests after each block help."}),
     Course("dropout", 0.015, 2, -1, {0: "The sensor’s strap was loose."}),
     Course("good", 0.03, 1, 0, {}),
     Course("demo", 0.012, 3, 1, {3: "Walks without the handrail now."}),

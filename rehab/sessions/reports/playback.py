@@ -56,7 +56,13 @@ AUDIENCES = (Audience.PATIENT, Audience.MONITOR)
 # Folding finds again what these record.
 KINDS = [kind for kind in map(str, EVENTS) if kind not in [*RuleEntry, *PartEntry]]
 # The source is there from the first step on: what a log does not hold is not shown as a fault.
-PRESENCE: Message = {"source": True, "robot": False, "tablets": 0, "storage": ""}
+PRESENCE: Message = {
+    "source": True,
+    "source_trouble": "",
+    "robot": False,
+    "tablets": 0,
+    "storage": "",
+}
 
 
 def play_back(user: User, session: TrainingSession) -> Message:

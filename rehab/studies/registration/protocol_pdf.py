@@ -101,7 +101,7 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
     yield _text(gettext("Outcomes"), "Heading2")
     yield _table([(gettext("What"), gettext("Unit"), gettext("How")), *_outcome_rows(document)])
     if phase := document["visits"].get("days_to_follow_up") and _follow_up(document):
-        yield _text(f"{gettext('At the follow-up')}: {phase}")
+        yield _text(gettext("At the follow-up") + f": {phase}")
     yield _text(gettext("Harms"), "Heading2")
     yield _text(HARMS_FOLLOWED)
     if asked := document.get("facts"):
