@@ -34,7 +34,7 @@ def server_status(user: User) -> dict[str, Any]:
     ]
     if pending:
         alerts.append(
-            gettext("The database is %(count)s changes behind this version. Run %(command)s.")
+            gettext("The database lacks changes of this version: %(count)s. Run %(command)s.")
             % {"count": pending, "command": command("migrate")}
         )
     if free is not None and free < LOW_DISK:
@@ -49,7 +49,7 @@ def server_status(user: User) -> dict[str, Any]:
             gettext("Database"): connection.display_name,
             gettext("Its tables"): gettext("up to date")
             if not pending
-            else gettext("%(count)s changes are due") % {"count": pending},
+            else gettext("changes due: %(count)s") % {"count": pending},
             gettext("Free on the disk"): "–" if free is None else f"{free / 2**30:.1f} GB",
             gettext("Open to several clinics, by https"): gettext("yes")
             if settings.HOSTED

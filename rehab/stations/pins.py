@@ -70,7 +70,7 @@ def _lockout_error(left: timedelta) -> PinRefused:
     """Return the error that says how long a screen is still locked."""
     seconds = max(1, round(left.total_seconds()))
     if seconds < 60:
-        words = _("Wrong PIN. Wait %(count)s seconds.") % {"count": seconds}
+        words = _("Wrong PIN. Wait %(count)s s.") % {"count": seconds}
     else:
-        words = _("Wrong PIN. Wait %(count)s minutes.") % {"count": -(-seconds // 60)}
+        words = _("Wrong PIN. Wait %(count)s min.") % {"count": -(-seconds // 60)}
     return PinRefused(words, seconds)
