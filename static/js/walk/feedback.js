@@ -20,7 +20,6 @@ export function createFeedback(body) {
   const [label, key] = [".label", ".key"].map(find);
   const [time, part, bar, partWords] = [".time", ".part", ".part progress", ".part p"].map(find);
   const emblem = find(".emblem svg");
-  const goalBar = find(".neutral .bar");
   const signs = emblem.querySelectorAll("text");
   const name = find("header b").textContent.trim();
   let drawnNumber = -1;
@@ -44,8 +43,7 @@ export function createFeedback(body) {
     const step = session.last;
     setPhrase(phraseOf(step));
     emblem.dataset.emblem = step?.kind === "missing" ? "none" : (step?.emblem ?? "");
-    // The goal as a bar over the foot of a miss, under that of a hit.
-    goalBar.setAttribute("d", step?.close ? "" : step?.hit ? "M70 248H230" : "M70 52H230");
+    emblem.toggleAttribute("data-hit", Boolean(step?.hit && !step.close));
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
