@@ -5,6 +5,7 @@ in their places, and nothing is cut.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page
@@ -164,7 +165,7 @@ def test_the_frame_stays_from_step_to_step(server: Server, visit: Visit) -> None
             set_screen(page, screen)
             found = []
             for performance in (1.12, 0.83, None, 1.56, 0.3):
-                frames = {}
+                frames: dict[str, Any] = {}
                 for column in ("", "center", "right", "left"):
                     feet.walk(performance)  # for each, before the page says that none arrive
                     page.wait_for_function("n => document.body.dataset.step == n", arg=feet.number)
