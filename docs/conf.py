@@ -28,6 +28,7 @@ include_patterns = [
     "SECURITY.md",
 ]
 exclude_patterns = [
+    *(["docs/_modules"] if tags.has("pages") else []),  # noqa: F821  # what `make docs` left
     ".venv*",
     "node_modules",
     "dist",
