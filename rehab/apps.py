@@ -24,9 +24,9 @@ class RehabConfig(AppConfig):
         from rehab.people.audit.history import track_models
         from rehab.people.models import User
         from rehab.people.sign_in import lockout, step_up
-        from rehab.people.sign_in.devices import note_browser
         from rehab.people.sign_in.factors.factors import Authenticator
         from rehab.people.sign_in.first_start import forget_first_password
+        from rehab.people.sign_in.signed_in_browsers import note_browser
         from rehab.people.sign_in.tokens import revoke_with_account
         from rehab.sessions.feedback_text_updates import connect_signals
         from rehab.sessions.setup.default_protocols import install_defaults

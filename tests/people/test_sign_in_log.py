@@ -21,8 +21,8 @@ from rehab.people.audit.audit_log import (
 )
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in.devices import describe_browser
 from rehab.people.sign_in.factors import factors, totp
+from rehab.people.sign_in.signed_in_browsers import describe_browser
 from tests.support.programs import bearer_token
 from tests.support.world import NOW, World, build_world, client_of
 

@@ -19,7 +19,7 @@ from rehab.people.models import LANGUAGES
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
-from rehab.people.sign_in import devices, resets, sign_on, step_up
+from rehab.people.sign_in import resets, sign_on, signed_in_browsers, step_up
 from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import NewPasswordForm
 from rehab.people.web.language import language_of
@@ -102,7 +102,7 @@ def show_sign_ins(request: HttpRequest) -> HttpResponse:
     # Everybody reads what was done in the own name, also who reads no other line of the log.
     trace = AuditEntry.everywhere.filter(by=user, act__in=SIGN_IN_ACTS).order_by("-at", "-pk")
     context = {
-        "browsers": devices.browsers_of(user, request, timezone.now()),
+        "browsers": signed_in_browsers.browsers_of(user, request, timezone.now()),
         "trace": trace[:SHOWN],
     }
     return render(request, "people/sign_ins.html", context)

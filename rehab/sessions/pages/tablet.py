@@ -14,7 +14,7 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import public, tablet_of
 from rehab.people.networks import client_address
-from rehab.people.sign_in.devices import describe_browser
+from rehab.people.sign_in.signed_in_browsers import describe_browser
 from rehab.sessions.models import TrainingSession
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device

@@ -18,7 +18,7 @@ from rehab.people.audit.audit_log import Act, record
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
-from rehab.people.sign_in.devices import describe_browser
+from rehab.people.sign_in.signed_in_browsers import describe_browser
 from rehab.stations.https.authority import fingerprint, read_certificate
 from rehab.stations.https.certificate import (
     is_encrypting,

@@ -23,7 +23,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.sign_in import step_up
-from rehab.people.sign_in.devices import describe_browser
+from rehab.people.sign_in.signed_in_browsers import describe_browser
 from rehab.stations.builtin import first_station
 from rehab.stations.device_trust import NotTrusted
 from rehab.stations.https.certificate import network_address, secure_host

@@ -1,7 +1,6 @@
 """Studies: what is compared, in which versions, and who must not know or may look early."""
 
 from rehab.studies.models.arm import Arm
-from rehab.studies.models.marks import StudyMark, has_mark
 from rehab.studies.models.protocol import (
     METHODS,
     NOT,
@@ -12,6 +11,7 @@ from rehab.studies.models.protocol import (
     StudyState,
     StudyVersion,
 )
+from rehab.studies.models.study_mark import StudyMark, has_mark
 
 __all__ = [
     "METHODS",
