@@ -42,14 +42,10 @@ from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.steps import Side
 from tests.support.simulated_studies import figures_of, walk_study
-from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
+from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study, text_of
 from tests.support.world import NOW, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-def text_of(response) -> str:
-    return str(response.content.decode())
 
 
 @pytest.mark.wide

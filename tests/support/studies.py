@@ -5,19 +5,22 @@ from __future__ import annotations
 from datetime import date, timedelta
 from typing import Any
 
+from django.test import Client
+
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
-from rehab.people.models import Patient
+from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.agreements import StudyConsent
 from rehab.studies.allocation.scheme import Secret
+from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Arm, Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.registration.lifecycle import register, start
 from rehab.studies.registration.sealing import seal
 from rehab.training.measures import A2
-from tests.support.world import NOW, World
+from tests.support.world import NOW, World, signed_in
 
 SEED = "the seed of tests"
 CONSENT = StudyConsent("1.0", NOW.date() - timedelta(days=1))
@@ -82,3 +85,22 @@ def enrolled(study: Study, patient: Patient, **settings: Any) -> Enrollment:
     options: dict[str, Any] = {"keep_data": True, "by": None, "now": NOW, "consent": CONSENT}
     options |= settings
     return enroll(study, patient, options.pop("levels", ()), **options)
+
+
+def text_of(response: Any) -> str:
+    """Return the words of an answer."""
+    return str(response.content.decode())
+
+
+def refusals(caplog) -> list[str]:
+    """Return what the studies' pages logged of refusals."""
+    return [
+        one.getMessage() for one in caplog.records if one.name.endswith("studies.pages.refusals")
+    ]
+
+
+def hide_from(study: Study, world: World) -> Client:
+    """Return a client of a new account that must not know the arms of ``study``."""
+    assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
+    give_mark(study, assessor, Task.ASSESSOR, None, NOW)
+    return signed_in(assessor)

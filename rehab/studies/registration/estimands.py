@@ -47,6 +47,11 @@ def summary(document: dict[str, Any]) -> str:
     return text
 
 
+def registered_outcomes(document: dict[str, Any]) -> list[str]:
+    """Return the slugs of a version's outcomes, the primary one first, each once."""
+    return list(dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])))
+
+
 def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the estimand of each registered outcome, the primary one first.
 
@@ -59,7 +64,7 @@ def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
     people = [*document.get("inclusion", ()), *(f"{NOT}{o}" for o in document.get("exclusion", ()))]
     if months := document["months_since_stroke_at_least"]:
         people.insert(0, f"{months} months or more since the stroke")
-    for slug in dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])):
+    for slug in registered_outcomes(document):
         yield {
             "outcome": slug,
             "population": "; ".join(people) or "every patient of the clinic who consents",

@@ -19,7 +19,13 @@ from rehab.studies.allocation.draws import RULE
 from rehab.studies.allocation.scheme import Method
 from rehab.studies.analysis.outcomes import define_outcomes, scale_of
 from rehab.studies.models import METHODS, OUTCOMES, SPENDINGS, Study, StudyVersion
-from rehab.studies.registration.estimands import HARMS_FOLLOWED, METHOD, POPULATIONS, summary
+from rehab.studies.registration.estimands import (
+    HARMS_FOLLOWED,
+    METHOD,
+    POPULATIONS,
+    registered_outcomes,
+    summary,
+)
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.outcome_changes import outcome_changes
 from rehab.studies.registration.size import size_of_document
@@ -118,7 +124,7 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
 def _outcome_rows(document: dict[str, Any]) -> Iterator[tuple[object, ...]]:
     meanings = {one["outcome"]: one["meaning"] for one in define_outcomes()}
     labels = dict(OUTCOMES)
-    for slug in dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])):
+    for slug in registered_outcomes(document):
         yield labels.get(slug, slug), gettext(scale_of(slug)), meanings.get(slug)
 
 
