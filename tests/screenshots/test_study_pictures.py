@@ -73,6 +73,7 @@ print(json.dumps({
     "study-new": "/studies/new/",
     "study-change": f"/studies/{draft.pk}/plan/",
     "study-draft": f"/studies/{draft.pk}/",
+    "study-register": f"/studies/{draft.pk}/register/",
     "study-power": f"/studies/{draft.pk}/power/",
     "study-running": f"/studies/{study.pk}/",
     "study-enroll": f"/studies/{study.pk}/enroll/",
@@ -84,8 +85,15 @@ print(json.dumps({
 }))
 """
 PAGES = (
-    *("studies", "study-new", "study-change", "study-draft", "study-power", "study-running"),
-    *("study-enroll", "study-participant", "study-closed", "study-results"),
+    *("studies", "study-new", "study-change", "study-draft", "study-register"),
+    *(
+        "study-power",
+        "study-running",
+        "study-enroll",
+        "study-participant",
+        "study-closed",
+        "study-results",
+    ),
     *("questions", "questions-asked"),
 )
 Pages = tuple[BrowserContext, dict[str, str]]

@@ -13,6 +13,7 @@ const HATCH = shape(
 export function drawLastStrides(svg, strides, count, performanceOf, span) {
   const [fullWidth, fullHeight] = fitViewBox(svg);
   const goal = fullHeight * 0.55;
+  if (goal < 30) return (svg.innerHTML = ""); // no room, as below the banners of a small screen
   const scale = (fullHeight * 0.95) / span;
   const dx = fullWidth / count;
   const width = dx * 0.68;
