@@ -22,6 +22,7 @@ from rehab.sessions import (  # noqa: F401
     ownership,
     seals,
 )
+from rehab.sessions.clinic_tests import ClinicTest
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
@@ -47,5 +48,6 @@ TRACKED = (
     FeedbackBand,
     Preset,
     Questionnaire,
+    ClinicTest,
     Leaderboard,
 )

@@ -30,6 +30,7 @@ HEADINGS = (
             "ComposedGesture": _("What the robot does, composed of moves."),
             "MeasureDefinition": _("What is trained: A2 and others, with their units."),
             "Questionnaire": _("Your own questions with scales, asked after a session."),
+            "ClinicTest": _("Your own assessment forms, beside the standard tests."),
         },
     ),
     (

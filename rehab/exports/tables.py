@@ -11,6 +11,7 @@ from rehab.exports.selection import Selection
 from rehab.exports.session_table import SESSIONS
 from rehab.exports.step_tables import FEEDBACK, STEPS
 from rehab.exports.table import Column, Table, Type
+from rehab.questionnaires.clinical_tests import CLINICAL_TESTS
 from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.assessments import Assessment, assessments_with
 from rehab.sessions.corrections import SessionCorrection
@@ -188,19 +189,27 @@ STUDY_VISITS = Table(
 
 
 def read_assessments(selection: Selection, session: TrainingSession) -> Iterator[Assessment]:
-    """Yield the results of standard tests that go with a session."""
+    """Yield the results of tests that go with a session."""
     yield from assessments_with(selection.user, session)
 
 
 ASSESSMENTS = Table(
     "assessments.csv",
-    _("results of standard tests, each with the session that it goes with"),
+    _("results of tests, each with the session that it goes with"),
     read_assessments,
     (
         Column.time("taken_at", "When it was taken.", "at"),
-        Column("test", "10mwt, 10mwt_fast, 6mwt, tug, 5sts, fac or berg.", "test"),
+        Column(
+            "test", f"{', '.join(CLINICAL_TESTS)}, or own-… for a form of the clinic's own.", "test"
+        ),
         Column.number("result", "the test's unit", "The result.", "value"),
         Column("unit", "Its unit; empty for points.", "definition.unit"),
+        Column(
+            "answers",
+            "Of a form of the clinic's own, what the result is the sum of: item=number, with ; "
+            "between them.",
+            lambda row: "; ".join(f"{text}={number:g}" for text, number in row.answers),
+        ),
         Column("device", "What the patient walked with.", "device"),
         Column("loinc", "Code in LOINC; empty where none fits.", "definition.loinc"),
     ),

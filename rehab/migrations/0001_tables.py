@@ -2314,20 +2314,13 @@ class Migration(migrations.Migration):
                 (
                     "test",
                     models.CharField(
-                        choices=[
-                            ("10mwt", "10-meter walk, comfortable"),
-                            ("10mwt_fast", "10-meter walk, fast"),
-                            ("6mwt", "6-minute walk"),
-                            ("tug", "Timed Up and Go"),
-                            ("5sts", "Five times sit to stand"),
-                            ("fac", "Functional ambulation (FAC)"),
-                            ("berg", "Berg Balance Scale"),
-                        ],
                         max_length=16,
                         verbose_name="test",
                     ),
                 ),
                 ("value", models.FloatField(verbose_name="result")),
+                ("answers", models.JSONField(blank=True, default=list, verbose_name="answers")),
+                ("remarks", models.TextField(blank=True, verbose_name="remarks")),
                 ("device", models.CharField(blank=True, max_length=64, verbose_name="walked with")),
                 (
                     "at",
@@ -2593,6 +2586,107 @@ class Migration(migrations.Migration):
                 "abstract": False,
                 "base_manager_name": "everywhere",
                 "default_manager_name": "everywhere",
+            },
+            managers=[
+                ("everywhere", django.db.models.manager.Manager()),
+            ],
+        ),
+        migrations.CreateModel(
+            name="ClinicTest",
+            fields=[
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "code",
+                    models.CharField(
+                        help_text="Names it in exports. Clinics of one study give it the same.",
+                        max_length=12,
+                        validators=[
+                            django.core.validators.RegexValidator(
+                                "^[a-z][a-z0-9]{1,11}\\Z", "2 to 12 small letters, digits."
+                            )
+                        ],
+                        verbose_name="short name",
+                    ),
+                ),
+                ("name", models.CharField(max_length=64, verbose_name="name")),
+                (
+                    "steps",
+                    models.TextField(
+                        blank=True,
+                        help_text="A line for each step.",
+                        max_length=2000,
+                        verbose_name="how it is done",
+                    ),
+                ),
+                (
+                    "items",
+                    models.TextField(
+                        help_text="A line each. A number in a range: “Knee bends | 0 | 2”. One that is asked back outside of what is usual: “Knee angle | 0 | 150 | 20 | 120”. A choice, which counts 0, 1, 2: “Tone | none, some, much”. A remark: “Shoes | text”. The result is the sum.",
+                        max_length=12000,
+                        verbose_name="items",
+                    ),
+                ),
+                (
+                    "unit",
+                    models.CharField(
+                        blank=True,
+                        help_text="Of the result. Empty: points.",
+                        max_length=16,
+                        verbose_name="unit",
+                    ),
+                ),
+                (
+                    "higher_is_better",
+                    models.BooleanField(default=True, verbose_name="a higher result is better"),
+                ),
+                (
+                    "least_change",
+                    models.FloatField(
+                        blank=True,
+                        help_text="Smaller changes are shown as no change. Empty: each one counts.",
+                        null=True,
+                        verbose_name="least change that counts",
+                    ),
+                ),
+                (
+                    "is_offered",
+                    models.BooleanField(
+                        default=True,
+                        help_text="Off: results stay, and no new ones are taken.",
+                        verbose_name="offered",
+                    ),
+                ),
+                (
+                    "fixed_at",
+                    models.DateTimeField(editable=False, null=True, verbose_name="fixed since"),
+                ),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="own_tests",
+                        to="rehab.clinic",
+                        verbose_name="clinic",
+                    ),
+                ),
+            ],
+            options={
+                "verbose_name": "test of the clinic’s own",
+                "verbose_name_plural": "tests of the clinic’s own",
+                "ordering": ["name"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+                "constraints": [
+                    models.UniqueConstraint(
+                        fields=("clinic", "code"), name="own_test_once_per_clinic"
+                    )
+                ],
             },
             managers=[
                 ("everywhere", django.db.models.manager.Manager()),
@@ -3272,53 +3366,6 @@ class Migration(migrations.Migration):
                 (
                     "primary_outcome",
                     models.CharField(
-                        choices=[
-                            ("score", "Score"),
-                            ("hit_rate", "Hit rate"),
-                            ("mean_performance", "Mean performance"),
-                            ("best_streak", "Best streak"),
-                            ("points_per_100_steps", "Points per 100 steps"),
-                            ("improvement_over_baseline", "Improvement over baseline"),
-                            ("steps", "Steps"),
-                            ("active_minutes", "Active minutes"),
-                            ("training_change", "Change in training"),
-                            ("early_change", "Early change (first 50 strides)"),
-                            ("late_change", "Late change (last 50 strides)"),
-                            ("catch_change", "Change in catch blocks"),
-                            ("washout_change", "Change in washout"),
-                            ("washout_loss", "From late training to washout"),
-                            ("after_effect", "After-effect (first 20 strides)"),
-                            ("baseline_change", "Change of the baseline since the first visit"),
-                            ("follow_up_change", "Change at the follow-up"),
-                            (
-                                "between_visits",
-                                "Early training of this visit less late training of the visit before",
-                            ),
-                            ("strides_to_success", "Strides until 80 % are hits"),
-                            ("savings", "Strides saved since the last visit"),
-                            ("percent_of_goal", "Real value of the goal"),
-                            ("absolute_error", "Distance from the goal"),
-                            ("variation", "Variation (CV)"),
-                            ("steadiness", "Variation about the trend"),
-                            ("lag_1", "Memory from stride to stride (lag 1)"),
-                            ("invalid_strides", "Invalid strides"),
-                            ("sus", "System usability (SUS)"),
-                            ("tlx", "Workload (NASA-TLX)"),
-                            ("10mwt_after", "10-meter walk, comfortable, after training"),
-                            ("10mwt_follow_up", "10-meter walk, comfortable, at the follow-up"),
-                            ("10mwt_fast_after", "10-meter walk, fast, after training"),
-                            ("10mwt_fast_follow_up", "10-meter walk, fast, at the follow-up"),
-                            ("6mwt_after", "6-minute walk, after training"),
-                            ("6mwt_follow_up", "6-minute walk, at the follow-up"),
-                            ("tug_after", "Timed Up and Go, after training"),
-                            ("tug_follow_up", "Timed Up and Go, at the follow-up"),
-                            ("5sts_after", "Five times sit to stand, after training"),
-                            ("5sts_follow_up", "Five times sit to stand, at the follow-up"),
-                            ("fac_after", "Functional ambulation (FAC), after training"),
-                            ("fac_follow_up", "Functional ambulation (FAC), at the follow-up"),
-                            ("berg_after", "Berg Balance Scale, after training"),
-                            ("berg_follow_up", "Berg Balance Scale, at the follow-up"),
-                        ],
                         max_length=32,
                         verbose_name="primary outcome",
                     ),

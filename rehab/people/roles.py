@@ -69,6 +69,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "ProtocolPhase": _SHARED,
     "Preset": _EDITED_BY_CARERS,
     "Questionnaire": _EDITED_BY_CARERS,
+    "ClinicTest": _EDITED_BY_CARERS,
     "QuestionnaireResponse": _VIEWED,
     "ComposedGesture": _EDITED_BY_CARERS,
     "GestureStep": _EDITED_BY_CARERS,

@@ -6,11 +6,13 @@ and least changes are from: docs/reference/questionnaires.md#walking-tests.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from math import isfinite
+from typing import Any
 
+from rehab.questionnaires.form_items import FormItem
 from rehab.training.measures import InvalidSetting
 from robot.marking import gettext_noop
 
@@ -18,17 +20,18 @@ LAP_TEST_S = 360.0  # six minutes
 
 
 class Way(StrEnum):
-    """How a test is taken: with a stopwatch, over a timed distance, by laps, or as a score."""
+    """How it is taken: by a stopwatch, a timed distance, laps, as a score, or as a form's sum."""
 
     STOPWATCH = "stopwatch"
     SPEED = "speed"
     LAPS = "laps"
     SCORE = "score"
+    FORM = "form"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClinicalTest:
-    """A standard test.
+    """A standard test, or one of a clinic's own.
 
     Attributes
     ----------
@@ -49,6 +52,8 @@ class ClinicalTest:
         From which change on it is more than chance, or matters to patients; None: unknown.
     levels
         The words of each score, from 0; empty where a score is a sum.
+    items
+        Of a form: what is asked.
     loinc
         Its code; "" where LOINC has none that fits.
     """
@@ -65,7 +70,18 @@ class ClinicalTest:
     norms: Sequence[tuple[int, float, float]] = ()
     least_change: float | None = None
     levels: Sequence[str] = ()
+    items: Sequence[FormItem] = ()
     loinc: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data; `from_json` reads it."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> ClinicalTest:
+        """Return what `to_json` wrote."""
+        items = [FormItem(**item) for item in data["items"]]
+        return cls(**{**data, "way": Way(data["way"]), "items": items})
 
     def check(self, value: float) -> None:
         """Raise InvalidSetting for a result that this test does not have."""
@@ -229,6 +245,18 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 gettext_noop("Walks alone on level ground"),
                 gettext_noop("Walks alone everywhere, including stairs"),
             ),
+        ),
+        ClinicalTest(
+            slug="fma_le",
+            label="Fugl-Meyer, lower extremity",
+            unit="",
+            places=0,
+            least=0,
+            most=34,
+            higher_is_better=True,
+            way=Way.SCORE,
+            steps=(gettext_noop("Use the clinic’s own form, and enter its total."),),
+            least_change=6,  # Pandian 2016
         ),
         ClinicalTest(
             slug="berg",

@@ -1,4 +1,4 @@
-"""Results of standard tests (`questionnaires.clinical_tests`) of a patient, and their course."""
+"""Results of standard tests and of a clinic's own (`clinic_tests`), and their course."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from typing import ClassVar
 
 from django.db import models
 from django.utils import timezone
+from django.utils.functional import cached_property
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
-from rehab.people.field_policy import personal_fields, retained
+from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicModel
 from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
+from rehab.sessions.clinic_tests import find_test, own_tests
 from rehab.sessions.formatting import MISSING, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
@@ -26,7 +28,11 @@ SPARK = (120, 32)  # the drawing of a course, in its own units
 
 
 class Assessment(ClinicModel):
-    """A result of a standard test. A wrong one is struck out, and stays stored."""
+    """A result of a test. A wrong one is struck out, and stays stored.
+
+    Of a clinic's own form ``answers`` has what it is the sum of, as pairs of item and number;
+    ``remarks`` what was written, also why an unusual number is right.
+    """
 
     scope = PatientScope(clinic="clinic", tells_condition=False)
 
@@ -36,12 +42,10 @@ class Assessment(ClinicModel):
     patient = models.ForeignKey(
         Patient, on_delete=models.PROTECT, related_name="assessments", verbose_name=_("patient")
     )
-    test = models.CharField(
-        _("test"),
-        max_length=16,
-        choices=[(test.slug, _(test.label)) for test in CLINICAL_TESTS.values()],
-    )
+    test = models.CharField(_("test"), max_length=16)
     value = models.FloatField(_("result"))
+    answers = models.JSONField(_("answers"), default=list, blank=True)
+    remarks = models.TextField(_("remarks"), blank=True)
     device = models.CharField(_("walked with"), max_length=MAX_DEVICE_LETTERS, blank=True)
     at = models.DateTimeField(_("when"), default=timezone.now)
     by = models.ForeignKey(
@@ -51,9 +55,10 @@ class Assessment(ClinicModel):
 
     personal = personal_fields(
         {
-            "clinic patient test value device at struck_at": retained(
+            "clinic patient test value answers device at struck_at": retained(
                 "a measurement under a pseudonym", shown=True, research=True
             ),
+            "remarks": erased("", shown=True, research=False),
             "by": retained("staff", shown=True, research=False),
         }
     )
@@ -67,12 +72,14 @@ class Assessment(ClinicModel):
         ]
 
     def __str__(self) -> str:
-        return f"{self.get_test_display()}: {format_result(self.definition, self.value)}"
+        return f"{gettext(self.definition.label)}: {format_result(self.definition, self.value)}"
 
-    @property
+    @cached_property
     def definition(self) -> ClinicalTest:
         """What it is a result of."""
-        return CLINICAL_TESTS[self.test]
+        test = find_test(self.test, self.clinic_id)
+        assert test is not None  # noqa: S101 - a test with results is not deleted
+        return test
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +159,7 @@ def format_result(test: ClinicalTest, value: float) -> str:
 
 
 def load_courses(user: User, patient: Patient) -> list[Course]:
-    """Return every test with a patient's results, in the order of the registry."""
+    """Return every test that is offered or has results of a patient, the clinic's own ones last."""
     found: defaultdict[str, list[Assessment]] = defaultdict(list)
     rows = Assessment.objects.visible_to(user).filter(patient=patient, struck_at=None)
     for row in rows.order_by("at", "pk"):
@@ -160,7 +167,9 @@ def load_courses(user: User, patient: Patient) -> list[Course]:
     age = patient.birth_year and clinic_time(timezone.now(), patient.clinic).year - (
         patient.birth_year
     )
-    return [Course(test, found[slug], test.find_norm(age)) for slug, test in CLINICAL_TESTS.items()]
+    tests = CLINICAL_TESTS | own_tests(patient.clinic_id, is_offered=True)
+    tests |= {slug: rows[0].definition for slug, rows in found.items() if slug not in tests}
+    return [Course(test, found[slug], test.find_norm(age)) for slug, test in tests.items()]
 
 
 def assessments_with(user: User, session: TrainingSession) -> models.QuerySet[Assessment]:

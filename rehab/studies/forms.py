@@ -19,11 +19,10 @@ from rehab.people.web.row_forms import ClinicForm
 from rehab.studies.allocation.blocks import MAX_BLOCK
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
 from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.arm_forms import save_arms
 from rehab.studies.arms import EARLY_MONTHS
-from rehab.studies.models import OUTCOMES, Study
+from rehab.studies.models import Study
 from rehab.studies.registration.lifecycle import check_secret
 from rehab.studies.registration.measurable import (
     SEVERAL_VISITS,
@@ -117,6 +116,7 @@ class StudyForm(ClinicForm, AssumedForm):
             "group. It is sealed, and not shown again."
         ),
     )
+    primary_outcome = forms.ChoiceField(label=_("primary outcome"))
     secondary_outcomes = forms.MultipleChoiceField(
         label=_("secondary outcomes"),
         required=False,
@@ -148,8 +148,9 @@ class StudyForm(ClinicForm, AssumedForm):
         super().__init__(*args, **options)
         study: Study = self.instance
         fields: dict[str, Any] = self.fields
-        fields["primary_outcome"].choices = [("", _("Choose")), *outcome_choices()]
-        fields["secondary_outcomes"].choices = outcome_choices()
+        choices = outcome_choices(study)
+        fields["primary_outcome"].choices = [("", _("Choose")), *choices]
+        fields["secondary_outcomes"].choices = choices
         for key, (name, of) in STORED.items():
             if key in study.assumed:
                 self.initial[name] = f"{of * study.assumed[key]:.10g}"
@@ -242,16 +243,16 @@ QUESTIONS = _("Questionnaires, after each visit")
 AT_FOLLOW_UP = _("At the follow-up, once its day is planned")
 
 
-def outcome_choices() -> list[tuple[Promise, list[tuple[str, Any]]]]:
+def outcome_choices(study: Study) -> list[tuple[Promise, list[tuple[str, Any]]]]:
     """Return the outcomes in groups, by what they need."""
     found: dict[Promise, list[tuple[str, Any]]] = {
         group: [] for group in (OF_VISIT, SEVERAL, QUESTIONS, TESTS, AT_FOLLOW_UP)
     }
-    for slug, label in OUTCOMES:
-        is_test, is_several = slug in CLINICAL_OUTCOMES, slug in SEVERAL_VISITS
-        group = TESTS if is_test else SEVERAL if is_several else OF_VISIT
+    for slug, outcome in study.outcomes.items():
+        group = TESTS if outcome.window else SEVERAL if slug in SEVERAL_VISITS else OF_VISIT
         group = QUESTIONS if slug in OF_QUESTIONS else group
-        found[AT_FOLLOW_UP if needs_follow_up(slug) else group].append((slug, label))
+        group = AT_FOLLOW_UP if needs_follow_up(outcome) else group
+        found[group].append((slug, study.outcome_label(slug)))
     return list(found.items())
 
 

@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.people.scope import Scope, ScopedModel
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
-from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, OF_QUESTIONS
+from rehab.studies.analysis.clinical_outcomes import is_of_test
+from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.models import Study
 from rehab.studies.simulation.power import PairPower, SimulatedDifference, simulate_from, summarize
 from rehab.studies.simulation.trial import Trial, walkable
@@ -95,7 +95,7 @@ class PowerRun(ScopedModel):
         return summarize(
             [SimulatedDifference(*row) for rows in self.found.values() for row in rows],
             self.study.margin,
-            higher_is_better=self.study.primary_outcome not in LOWER_IS_BETTER,
+            higher_is_better=self.study.outcomes[self.study.primary_outcome].higher_is_better,
         )
 
 
@@ -153,7 +153,7 @@ def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
     InvalidSetting
         For a study without an effect, or one that cannot be simulated.
     """
-    if study.primary_outcome in {*CLINICAL_OUTCOMES, *OF_QUESTIONS}:
+    if is_of_test(study.primary_outcome) or study.primary_outcome in OF_QUESTIONS:
         raise InvalidSetting(
             gettext(
                 "Simulated people take no clinical tests and answer no questions. Choose a primary "

@@ -127,11 +127,12 @@ ROWS: dict[str, tuple[Any, dict[str, Any]]] = {
     "assessments.csv": (
         Row(
             **text("at", "test", "value", "device"),
+            answers=[["Bends", 2.0], ["Angle", 30.5]],
             definition=Row(unit="<unit>", loinc="<loinc>"),
         ),
         {
             "taken_at": "<at>", "test": "<test>", "result": "<value>", "unit": "<unit>",
-            "device": "<device>", "loinc": "<loinc>",
+            "answers": "Bends=2; Angle=30.5", "device": "<device>", "loinc": "<loinc>",
         },
     ),
     "answers.csv": (

@@ -99,7 +99,7 @@ def is_silent(name: str) -> bool:
             "endpoint",
             "outboxmessage",
         ),
-        *("feedbacktype", "preset", "questionnaire"),
+        *("feedbacktype", "preset", "questionnaire", "clinictest"),
     }
     return name in SILENT or any(name.startswith(f"admin:rehab_{noun}_") for noun in bare)
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from datetime import timedelta
 
 import pytest
+from django.urls import reverse
 
 from rehab.exports.fhir.resources import Pseudonyms, make_bundle
+from rehab.patients.erasure import ErasureReason, erase
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment, assessments_with, load_courses
+from rehab.sessions.clinic_tests import ClinicTest
 from tests.support.walks import HIT, make_session, walk
 from tests.support.world import NOW, build_world, client_of
 
@@ -145,3 +148,86 @@ def test_fhir_has_it_with_its_loinc_code(world):
         "code": "m",
     }
     assert [code["system"] for code in found["berg"]["code"]["coding"]] == ["urn:garry:test"]
+
+
+FORM = "Bends | 0 | 2\nAngle | 0.0 | 150.0 | 20 | 120\nTone | none, some, much\nShoes | text"
+FILLED = {"item_0": "2", "item_1": "30,5", "item_2": "1", "item_3": "trainers"}
+
+
+@pytest.fixture
+def form(world):
+    ClinicTest.everywhere.all().delete()
+    return ClinicTest.everywhere.create(
+        clinic=world.clinic, code="knee", name="Knee of ours", items=FORM, higher_is_better=False
+    )
+
+
+def test_a_form_of_the_clinics_own_is_filled_and_summed_up(world, form):
+    page = take(world, "own-knee", **FILLED)
+    assert "Knee of ours" in page.content.decode()
+    (row,) = Assessment.everywhere.all()
+    assert (row.value, row.remarks) == (33.5, "Shoes: trainers")
+    assert row.answers == [["Bends", 2.0], ["Angle", 30.5], ["Tone", 1.0]]
+    take(world, "own-knee", **FILLED | {"item_1": "25"})
+    course = load_courses(world.people[Role.PT], world.patient)[-1]
+    assert (course.now, course.verdict) == ("28.0 / 154", 1)  # less is better
+
+
+@pytest.mark.parametrize(
+    ("answers", "cure"),
+    [
+        ({"item_0": "3"}, "Give 0 to 2."),
+        ({"item_0": "1.5"}, "Enter a whole number"),
+        ({"item_1": ""}, "required"),
+        ({"item_2": "3"}, "valid choice"),
+        ({"item_1": "130"}, "Outside the usual 20.0 to 120.0. Check it; if it is right, say why"),
+    ],
+)
+def test_an_answer_that_cannot_be_or_is_unusual_is_asked_back(world, form, answers, cure):
+    page = take(world, "own-knee", **FILLED | answers)
+    assert cure in page.content.decode()
+    assert not Assessment.everywhere.exists()
+
+
+def test_an_unusual_answer_is_taken_with_its_reason(world, form):
+    take(world, "own-knee", **FILLED | {"item_1": "130", "item_3": "", "why": "no cast today"})
+    (row,) = Assessment.everywhere.all()
+    assert (row.value, row.remarks) == (133.0, "no cast today")
+
+
+def test_a_form_with_results_stays_as_it_is_and_is_not_deleted(world, form):
+    client = client_of(world)
+    change = reverse("admin:rehab_clinictest_change", args=[form.pk])
+    items = FORM.replace("\n", "\r\n")  # as browsers send it
+    fields = {"code": "knee", "name": "Knee of ours", "items": f"{items}\r\nMore | 0 | 9"}
+    assert client.get(change.replace("change", "delete")).status_code == 200
+    assert client.post(change, fields | {"is_offered": "on"}).status_code == 302
+    take(world, "own-knee", **FILLED | {"item_4": "1"})
+    assert "Make a new one" in client.post(change, fields | {"items": items}).content.decode()
+    assert client.get(change.replace("change", "delete")).status_code == 403
+    assert client.post(change, fields).status_code == 302  # it is not offered any more
+    form.refresh_from_db()
+    assert (form.items.count("\n"), form.is_offered) == (4, False)
+    names = [one.test.slug for one in load_courses(world.people[Role.PT], world.patient)]
+    assert names[-1] == "own-knee"  # with its result
+    Assessment.everywhere.all().delete()
+    names = [one.test.slug for one in load_courses(world.people[Role.PT], world.patient)]
+    assert "own-knee" not in names
+
+
+def test_a_form_that_cannot_be_read_is_refused_with_the_line(world):
+    fields = {"code": "tone", "name": "Tone", "items": "Tone | none"}
+    page = client_of(world).post(reverse("admin:rehab_clinictest_add"), fields)
+    assert "“Tone | none” cannot be read" in page.content.decode()
+
+
+def test_erasing_a_patient_takes_the_remarks_of_forms(world, form):
+    take(world, "own-knee", **FILLED)
+    erase(world.patient, next(iter(ErasureReason)), world.people[Role.LEAD], NOW)
+    (row,) = Assessment.everywhere.all()
+    assert (row.value, row.remarks) == (33.5, "")
+
+
+def test_nobody_takes_another_clinics_form(world, form):
+    other = build_world("other")
+    assert take(other, "own-knee", **FILLED).status_code == 404

@@ -6,26 +6,29 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
+from django.core.exceptions import ValidationError
 from django.urls import reverse
 
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment
+from rehab.sessions.clinic_tests import ClinicTest
 from rehab.sessions.questionnaires import QuestionnaireResponse, ask
 from rehab.sessions.setup.protocols import Protocol
-from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, define_outcomes
+from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.power_runs import build_trial
 from rehab.studies.registration.estimands import estimands
-from rehab.studies.registration.lifecycle import close
+from rehab.studies.registration.lifecycle import close, register
+from rehab.studies.registration.protocol_pdf import write_pdf
 from rehab.studies.results.results import read_results
 from rehab.studies.results.tables import outcome_rows
 from rehab.training.measures import InvalidSetting
-from tests.support.studies import enrolled, new_patient, running_study
+from tests.support.studies import draft_study, enrolled, new_patient, running_study
 from tests.support.trials import walk_visit
-from tests.support.world import NOW, World, client_of, signed_in
+from tests.support.world import NOW, World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 PLAN = {
@@ -125,9 +128,10 @@ def test_unit_direction_and_window_are_registered(world):
     (first, *_others) = estimands(study.versions.get().document)
     assert "assessor" in first["variable"]
     assert "higher is better" in first["variable"]
-    units = {row["outcome"]: row["unit"] for row in define_outcomes()}
-    assert (units["10mwt_after"], units["tug_after"], units["berg_after"]) == ("m/s", "s", "points")
-    assert {"tug_after", "5sts_follow_up"} <= LOWER_IS_BETTER
+    units = [OUTCOMES[slug].unit for slug in ("10mwt_after", "tug_after", "berg_after")]
+    assert units == ["m/s", "s", "points"]
+    better = [OUTCOMES[slug].higher_is_better for slug in ("tug_after", "fma_le_follow_up")]
+    assert better == [False, True]
     page = client_of(world, Role.LEAD).get(reverse("study", args=[study.pk]))
     assert b"10-meter walk, comfortable, after training" in page.content
 
@@ -158,3 +162,61 @@ def test_an_assessor_takes_a_test_and_sees_no_arm(trial):
     assert b"feedback positive" not in client.get(url).content
     assert client.post(url, {"meters": "10", "measured": "12.5"}).status_code == 302
     assert Assessment.everywhere.get(patient=one.patient).value == pytest.approx(0.8)
+
+
+@pytest.fixture
+def form(world: World):
+    ClinicTest.everywhere.all().delete()
+    items = "Bends | 0 | 20\nTone | none, some, much\nShoes | text"
+    return ClinicTest.everywhere.create(
+        clinic=world.clinic, code="knee", name="Knee of ours", items=items, higher_is_better=False
+    )
+
+
+def test_a_form_of_the_clinics_own_is_an_outcome_and_fixed_by_its_registration(world, form):
+    study = running_study(world, **PLAN | {"primary_outcome": "own-knee_after"})
+    document = study.versions.get().document
+    assert [one["slug"] for one in document["tests"]] == ["own-knee"]
+    form.refresh_from_db()
+    assert form.fixed_at is not None
+    form.items = "Bends | 0 | 30"
+    with pytest.raises(ValidationError, match="Make a new one"):
+        form.full_clean()
+    (first, *_others) = estimands(document)
+    assert first["variable"].startswith("Knee of ours, after training: Last result of an assessor")
+    assert first["variable"].endswith("lower is better. The result is the sum of: Bends; Tone.")
+    page = client_of(world, Role.LEAD).get(reverse("study", args=[study.pk]))
+    assert b"Knee of ours, after training" in page.content
+    assert write_pdf(study)
+
+    assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
+    give_mark(study, assessor, Task.ASSESSOR, None, NOW - timedelta(days=20))
+    people = [enrolled(study, new_patient(world, number)) for number in range(1, 7)]
+    for number, one in enumerate(people):
+        walk_visit(one)
+        less = 6 if one.allocation.group == "B" else 2
+        take(one, assessor, BEFORE, 15, "own-knee")
+        take(one, assessor, AFTER, 15 - less - number % 2, "own-knee")
+    close(study, None, NOW)
+    results = read_results(study, NOW)
+    (pair,) = results.find("own-knee_after").differences
+    assert pair.difference.estimate == pytest.approx(-4, abs=1.1)
+    rows = [row for row in outcome_rows(results) if row["outcome"] == "own-knee_after"]
+    assert {(row["unit"], row["status"]) for row in rows} == {("points", "primary")}
+    page = client_of(world, Role.LEAD).get(reverse("study-results", args=[study.pk]))
+    assert b"Knee of ours, after training" in page.content
+
+
+def test_a_form_that_was_deleted_is_not_registered(world, form):
+    study = draft_study(world, **PLAN | {"primary_outcome": "own-knee_after"})
+    form.delete()
+    study = Study.everywhere.get(pk=study.pk)
+    with pytest.raises(InvalidSetting, match="own-knee_after.*is not there any more"):
+        register(study, None, NOW)
+
+
+def test_a_form_is_chosen_among_the_outcomes_of_its_clinic_alone(world, form):
+    page = client_of(world, Role.LEAD).get(reverse("new-study"))
+    assert b'value="own-knee_follow_up"' in page.content
+    page = client_of(build_world("other"), Role.LEAD).get(reverse("new-study"))
+    assert b"own-knee" not in page.content

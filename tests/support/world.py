@@ -36,6 +36,7 @@ from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.assessments import Assessment
+from rehab.sessions.clinic_tests import ClinicTest
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
@@ -339,6 +340,9 @@ def build_world(name: str) -> World:
         ),
         Questionnaire.everywhere.create(
             clinic=clinic, name=mark(name, Questionnaire), items="Zqtiredqz | zq | zq | 5"
+        ),
+        ClinicTest.everywhere.create(
+            clinic=clinic, code="zqform", name=mark(name, ClinicTest), items="Zqbendsqz | 0 | 2"
         ),
         QuestionnaireResponse.everywhere.create(
             session=session,

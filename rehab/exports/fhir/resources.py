@@ -178,7 +178,9 @@ def _walk_resources(
         loinc = [{"system": LOINC, "code": test.loinc}] if test.loinc else []
         coded = {"coding": [*loinc, own], "text": test.label}
         address = names.address("Observation", "test", session.pk, row.pk)
-        yield address, _observe(coded, format_moment(row.at + shift), row.value, test.unit) | of
+        observed = _observe(coded, format_moment(row.at + shift), row.value, test.unit) | of
+        parts = [{"code": {"text": t}, "valueQuantity": {"value": n}} for t, n in row.answers]
+        yield address, observed | ({"component": parts} if parts else {})
     yield from set_goal(session, names)
     for answers in QuestionnaireResponse.objects.visible_to(user).filter(session=session):
         address = names.address("QuestionnaireResponse", "answers", session.pk, answers.pk)

@@ -21,9 +21,6 @@ from rehab.studies.analysis.designs import Observation
 from rehab.studies.analysis.sequential import ALPHA, levels
 
 CLOSE = 1e-9  # relative difference to the tables that rounding explains
-LOWER_IS_BETTER = {
-    *("strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides"),
-}
 
 
 class Trial:
@@ -42,6 +39,8 @@ class Trial:
         self.primary = first["primary_outcome"]
         self.plan = last.get("analysis", {})
         self.planned = last["participants"] * len(folders)
+        better = {row["outcome"]: row["better"] for row in read(folders[0] / "definitions.csv")}
+        self.higher_is_better = better[self.primary] == "higher"
         self.rows: list[dict[str, str]] = []
         for number, folder in enumerate(folders):
             for row in read(folder / "outcomes.csv"):
@@ -107,7 +106,7 @@ class Trial:
         is_primary, margin = slug == self.primary, self.plan.get("margin")
         answer = None
         if is_primary and margin and self.level is not None:
-            better, confidence = slug not in LOWER_IS_BETTER, 1 - self.level
+            better, confidence = self.higher_is_better, 1 - self.level
             answer = one.is_not_inferior(margin, higher_is_better=better, confidence=confidence)
         missing = one.missing
         return {

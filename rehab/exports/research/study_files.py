@@ -21,7 +21,6 @@ from rehab.exports.research.dates import shift_of
 from rehab.people.models import User
 from rehab.studies import analysis
 from rehab.studies.agreements import agreement_rows
-from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment
 from rehab.studies.record.adverse_events import listing_rows
@@ -65,7 +64,7 @@ def study_files(
     yield f"{folder}/protocol.json", [write_json(study, has_dates=not shift_dates)]
     rows = participant_rows(user, study, shift_dates=shift_dates)
     yield f"{folder}/participants.csv", write_csv(PARTICIPANTS, rows)
-    definitions = define_outcomes()
+    definitions = [one.to_row() for one in study.outcomes.values()]
     yield f"{folder}/definitions.csv", [write_table(definitions)]
     results = read_results(study, now) if study.state == StudyState.CLOSED else None
     if results is not None:

@@ -1,4 +1,4 @@
-"""Admin of presets and of a clinic's own questionnaires."""
+"""Admin of presets and of a clinic's own questionnaires and tests."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin
 from rehab.people.web.row_forms import ClinicForm
+from rehab.sessions.clinic_tests import ClinicTest
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.option import Group, Option
 from rehab.sessions.setup.options import ANSWERS, OPTIONS, options_of, preset_options
@@ -24,6 +25,19 @@ class QuestionnaireAdmin(ScopedAdmin):
 
     list_display = ("name", "language", "source")
     search_fields = ("name", "items")
+
+
+@admin.register(ClinicTest)
+class ClinicTestAdmin(ScopedAdmin):
+    """A clinic's own tests; one with results stays as it is, and is not deleted."""
+
+    list_display = ("name", "code", "is_offered", "fixed_at")
+    actions = None  # nothing is deleted without its own check
+
+    def has_delete_permission(self, request: HttpRequest, obj: ClinicTest | None = None) -> bool:
+        """Return whether nothing was measured by a test yet."""
+        is_free = obj is None or obj.fixed_at is None
+        return is_free and super().has_delete_permission(request, obj)
 
 
 class PresetForm(ClinicForm):

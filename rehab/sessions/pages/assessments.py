@@ -1,7 +1,8 @@
-"""Standard tests of a patient: the list with each course, and a page for each test."""
+"""Tests of a patient: the list with each course, and a page for each test."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from django import forms
@@ -15,22 +16,20 @@ from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.people.access import for_roles, get_patient, user_of
-from rehab.people.ranges import NumberField
+from rehab.people.ranges import NumberField, WholeNumberField, range_message
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
-from rehab.questionnaires.clinical_tests import (
-    CLINICAL_TESTS,
-    LAP_TEST_S,
-    ClinicalTest,
-    Way,
-    to_speed,
-)
+from rehab.questionnaires.clinical_tests import LAP_TEST_S, ClinicalTest, Way, to_speed
+from rehab.questionnaires.form_items import MAX_LETTERS, FormItem, total
 from rehab.sessions.assessments import Assessment, format_result, load_courses
+from rehab.sessions.clinic_tests import fix_tests
+from rehab.sessions.formatting import format_number
 from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
 from rehab.training.measures import InvalidSetting
 
 USUAL_METERS = 10.0
+STORED = ("value", "answers", "remarks", "device")  # of a form, in the row
 
 
 class AssessmentForm(forms.Form):
@@ -40,31 +39,7 @@ class AssessmentForm(forms.Form):
         super().__init__(*args, **options)
         self.label_suffix = ""
         self.test = test
-        if test.way is Way.SPEED:
-            self.fields["meters"] = NumberField(
-                label=_("Timed distance, m"),
-                initial=f"{USUAL_METERS:g}",
-                least=1,
-                most=100,
-                unit="m",
-            )
-            self.fields["measured"] = NumberField(label=_("Time, s"), least=0.5, most=600, unit="s")
-        elif test.levels:
-            levels = [
-                (str(level), f"{level} · {_(words)}") for level, words in enumerate(test.levels)
-            ]
-            self.fields["measured"] = forms.ChoiceField(
-                label=_("Category"), choices=levels, widget=forms.RadioSelect
-            )
-        else:
-            labels = {
-                Way.LAPS: _("Distance, m"),
-                Way.STOPWATCH: _("Time, s"),
-                Way.SCORE: _("Total"),
-            }
-            self.fields["measured"] = NumberField(
-                label=labels[test.way], least=test.least, most=test.most, unit=test.unit
-            )
+        self.fields.update(_fields_of(test))
         self.fields["device"] = forms.CharField(
             label=_("Walking aid, orthosis, help (if any)"),
             required=False,
@@ -74,6 +49,8 @@ class AssessmentForm(forms.Form):
     def clean(self) -> dict[str, Any]:
         """Return the data with the ``value`` of the result. Refuses what the test cannot have."""
         data: dict[str, Any] = super().clean() or {}
+        if self.test.items:
+            return data if self.errors else data | self._sum_up(data)
         measured, meters = data.get("measured"), data.get("meters")
         if measured is None or (self.test.way is Way.SPEED and meters is None):
             return data
@@ -83,6 +60,67 @@ class AssessmentForm(forms.Form):
         except InvalidSetting as problem:
             raise ValidationError(format_refusal(problem)) from problem
         return data | {"value": value}
+
+    def _sum_up(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return value, answers and remarks of a form. Asks unusual numbers back."""
+        given = [(item, data[f"item_{n}"]) for n, item in enumerate(self.test.items)]
+        why = data.get("why", "")
+        if not why:
+            for number, (item, answer) in enumerate(given):
+                if item.is_unusual(answer):
+                    self.add_error(f"item_{number}", _ask_back(item))
+        remarks = [f"{item.text}: {words}" for item, words in given if item.is_text and words]
+        counted = [(item.text, float(answer)) for item, answer in given if not item.is_text]
+        return {
+            "value": total(self.test.items, [answer for _text, answer in counted]),
+            "answers": counted,
+            "remarks": "\n".join((*remarks, *filter(None, [why]))),
+        }
+
+
+def _fields_of(test: ClinicalTest) -> dict[str, forms.Field]:
+    """Return the fields of what a test measures."""
+    if test.items:
+        fields = {f"item_{n}": _field_of(item) for n, item in enumerate(test.items)}
+        if any(item.usual for item in test.items):
+            label = _("If a number is unusual: why it is right")
+            fields["why"] = forms.CharField(label=label, required=False, max_length=MAX_LETTERS)
+        return fields
+    if test.way is Way.SPEED:
+        meters = NumberField(label=_("Timed distance, m"), least=1, most=100, unit="m")
+        meters.initial = f"{USUAL_METERS:g}"
+        return {
+            "meters": meters,
+            "measured": NumberField(label=_("Time, s"), least=0.5, most=600, unit="s"),
+        }
+    if test.levels:
+        return {"measured": _choose(_("Category"), [_(words) for words in test.levels])}
+    labels = {Way.LAPS: _("Distance, m"), Way.STOPWATCH: _("Time, s"), Way.SCORE: _("Total")}
+    label = labels[test.way]
+    return {"measured": NumberField(label=label, least=test.least, most=test.most, unit=test.unit)}
+
+
+def _field_of(item: FormItem) -> forms.Field:
+    if item.is_text:
+        return forms.CharField(label=item.text, required=False, max_length=MAX_LETTERS)
+    if item.words:
+        return _choose(item.text, item.words)
+    kind = NumberField if item.places else WholeNumberField
+    words = range_message(item.least, item.most)
+    return kind(label=item.text, least=item.least, most=item.most, help_text=words)
+
+
+def _choose(label: Any, words: Sequence[Any]) -> forms.ChoiceField:
+    """Return a choice that counts from 0."""
+    levels = [(str(level), f"{level} · {word}") for level, word in enumerate(words)]
+    return forms.ChoiceField(label=label, choices=levels, widget=forms.RadioSelect)
+
+
+def _ask_back(item: FormItem) -> str:
+    low, high = item.usual or (0.0, 0.0)
+    return gettext(
+        "Outside the usual %(low)s to %(high)s. Check it; if it is right, say why below."
+    ) % {"low": format_number(low, item.places), "high": format_number(high, item.places)}
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -101,10 +139,11 @@ def list_assessments(request: HttpRequest, patient_id: int) -> HttpResponse:
 def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
     """Take a test: what to do, the stopwatch, and the result."""
     user = user_of(request)
-    patient, test = get_patient(user, patient_id), CLINICAL_TESTS.get(slug)
-    if test is None:
+    patient = get_patient(user, patient_id)
+    course = next((each for each in load_courses(user, patient) if each.test.slug == slug), None)
+    if course is None:
         raise Http404
-    (course,) = [each for each in load_courses(user, patient) if each.test is test]
+    test = course.test
     last = course.last
     form = AssessmentForm(
         request.POST or None, test=test, initial={"device": last.device if last else ""}
@@ -114,11 +153,11 @@ def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
             clinic_id=patient.clinic_id,
             patient=patient,
             test=slug,
-            value=form.cleaned_data["value"],
-            device=form.cleaned_data["device"],
+            **{name: form.cleaned_data[name] for name in STORED if name in form.cleaned_data},
             at=timezone.now(),
             by=user,
         )
+        fix_tests(patient.clinic_id, [slug])
         messages.success(
             request,
             gettext("%(test)s of %(name)s: %(result)s")
@@ -134,7 +173,7 @@ def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
         "test": test,
         "course": course,
         "form": form,
-        "has_timer": test.way is not Way.SCORE,
+        "has_timer": test.way not in {Way.SCORE, Way.FORM},
         "lap_test_s": LAP_TEST_S if test.way is Way.LAPS else 0,
     }
     return render(request, "sessions/assess.html", context)

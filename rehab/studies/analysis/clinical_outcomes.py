@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 
-from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
+from rehab.questionnaires.clinical_tests import ClinicalTest
 from robot.marking import gettext_noop
 
 # Ours: a result tells of a visit for so many days after it, a baseline for so many before.
@@ -19,44 +19,26 @@ VISITS = {AFTER: "the last training visit of an arm", FOLLOW_UP: "the follow-up"
 SLUGS = {AFTER: "after", FOLLOW_UP: "follow_up"}
 
 
-@dataclass(frozen=True, slots=True)
-class ClinicalOutcome:
-    """A clinical test in a window: ``AFTER`` or ``FOLLOW_UP``."""
-
-    test: ClinicalTest
-    window: str
-
-    @property
-    def slug(self) -> str:
-        """The outcome's, for programs."""
-        return f"{self.test.slug}_{SLUGS[self.window]}"
-
-    @property
-    def label(self) -> str:
-        """The outcome's, for people."""
-        return f"{self.test.label}, {self.window}"
-
-    @property
-    def unit(self) -> str:
-        """Of the change."""
-        return self.test.unit or "points"
-
-    @property
-    def meaning(self) -> str:
-        """How it is computed, and which way is better."""
-        better = "higher" if self.test.higher_is_better else "lower"
-        return (
-            f"Last result of an assessor of the study from the day of {VISITS[self.window]} to "
-            f"{DAYS_AFTER} days later (at the first visit, from the session's begin), before the "
-            f"next visit's day, less the last one of the {DAYS_BEFORE} days before the first "
-            f"session began; {better} is better."
-        )
+def slug_of(test: str, window: str) -> str:
+    """Return the outcome's slug of a test's in a window."""
+    return f"{test}_{SLUGS[window]}"
 
 
-CLINICAL_OUTCOMES = {
-    one.slug: one
-    for one in (ClinicalOutcome(t, window) for t in CLINICAL_TESTS.values() for window in SLUGS)
-}
+def is_of_test(slug: str) -> bool:
+    """Return whether an outcome's slug is of a clinical test; a further channel's has a colon."""
+    return ":" not in slug and slug.endswith(tuple(f"_{end}" for end in SLUGS.values()))
+
+
+def meaning_of(test: ClinicalTest, window: str) -> str:
+    """Return how a test's outcome is computed, and which way is better."""
+    better = "higher" if test.higher_is_better else "lower"
+    items = "; ".join(item.text for item in test.items if not item.is_text)
+    return (
+        f"Last result of an assessor of the study from the day of {VISITS[window]} to "
+        f"{DAYS_AFTER} days later (at the first visit, from the session's begin), before the "
+        f"next visit's day, less the last one of the {DAYS_BEFORE} days before the first "
+        f"session began; {better} is better." + (items and f" The result is the sum of: {items}.")
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +74,7 @@ def clinical_baselines(results: Iterable[ClinicalResult], first: datetime) -> di
         for one in results
         if one.at < first and (first - one.at).days < DAYS_BEFORE
     }
-    return {
-        slug: before[one.test.slug]
-        for slug, one in CLINICAL_OUTCOMES.items()
-        if one.test.slug in before
-    }
+    return {slug_of(test, window): value for test, value in before.items() for window in SLUGS}
 
 
 def clinical_changes(
@@ -116,17 +94,12 @@ def clinical_changes(
     for number, visit in enumerate(days):
         ends = days[number + 1].day if number + 1 < len(days) else date.max
         last = {
-            one.test: one.value
+            slug_of(one.test, visit.window): one.value
             for one in results
-            if one.at >= first
+            if visit.window is not None
+            and one.at >= first
             and visit.day <= one.day < ends
             and (one.day - visit.day).days <= DAYS_AFTER
         }
-        found.append(
-            {
-                slug: last[one.test.slug] - baselines[slug]
-                for slug, one in CLINICAL_OUTCOMES.items()
-                if one.window == visit.window and one.test.slug in last and slug in baselines
-            }
-        )
+        found.append({slug: last[slug] - baselines[slug] for slug in last if slug in baselines})
     return found

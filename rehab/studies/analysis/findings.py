@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
+from rehab.studies.analysis.clinical_outcomes import is_of_test
 from rehab.studies.analysis.comparison import Difference, Interval, carry_over, compare
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import BOUNDS
@@ -122,7 +122,7 @@ def observations(participants: Sequence[Participant], slug: str) -> list[Observa
         Of the outcome, or `CHANNEL` and a channel's name.
     """
     found = [one for participant in participants for one in participant.observe(slug)]
-    if slug in CLINICAL_OUTCOMES:
+    if is_of_test(slug):
         return found
     if len({one.measure for one in participants if one.baseline is not None}) > 1:
         return [replace(one, baseline=None) for one in found]

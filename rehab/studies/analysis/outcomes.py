@@ -7,15 +7,18 @@ the baseline under the channel's name.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
 from rehab.studies.analysis import walk_figures as figures
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
+from rehab.studies.analysis.clinical_outcomes import SLUGS, meaning_of, slug_of
 from rehab.studies.analysis.walk_figures import ENDS, FIRST_AFTER, SUCCESS, WINDOW, History
 from rehab.studies.analysis.walks import Walk
 from rehab.training.summary.metrics import METRICS
 from robot.marking import gettext_noop
+
+OWN, FIRST = "this visit's own baseline", "in percent of the first visit's baseline"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,17 +32,39 @@ class Outcome:
     meaning
         How it is computed, as the registered document and the codebook define it.
     compute
-        Returns it of a session with what came before; None where there is none.
+        Of strides: returns it of a session with what came before it; None where there is none.
+    window
+        Of a clinical test, whose ``label`` it has: ``AFTER`` or ``FOLLOW_UP``.
+    higher_is_better
+        Whether a higher figure is the better one.
     """
 
     slug: str
     label: str
     unit: str
     meaning: str
-    compute: Callable[[Walk, History], float | None]
+    compute: Callable[[Walk, History], float | None] | None = None
+    window: str = ""
+    higher_is_better: bool = True
+
+    @property
+    def name(self) -> str:
+        """What people call it, in English."""
+        return f"{self.label}, {self.window}" if self.window else self.label
+
+    @property
+    def scale(self) -> str:
+        """Its unit with what it is a percentage of."""
+        of = next((one for one in (OWN, FIRST) if one in self.meaning), "")
+        return f"% of {of.removeprefix('in percent of ')}" if of else self.unit
+
+    def to_row(self) -> dict[str, str]:
+        """Return it as a codebook has it."""
+        better = "higher" if self.higher_is_better else "lower"
+        row = {"outcome": self.slug, "label": self.name, "unit": self.unit}
+        return row | {"better": better, "meaning": self.meaning}
 
 
-OWN, FIRST = "this visit's own baseline", "in percent of the first visit's baseline"
 # What the strides themselves show; with what every session stores of itself, all of `OUTCOMES`.
 OF_STRIDES: dict[str, Outcome] = {
     outcome.slug: outcome
@@ -120,6 +145,7 @@ OF_STRIDES: dict[str, Outcome] = {
             "steps",
             f"Judged strides until {WINDOW} in a row had {SUCCESS:.0%} hits; all where none had.",
             figures.to_success,
+            higher_is_better=False,
         ),
         Outcome(
             "savings",
@@ -141,6 +167,7 @@ OF_STRIDES: dict[str, Outcome] = {
             "%",
             "Mean of |shown / goal - 1| of the judged strides.",
             figures.error,
+            higher_is_better=False,
         ),
         Outcome(
             "variation",
@@ -148,6 +175,7 @@ OF_STRIDES: dict[str, Outcome] = {
             "%",
             "Sample standard deviation of the strides with feedback, in percent of their mean.",
             figures.cv,
+            higher_is_better=False,
         ),
         Outcome(
             "steadiness",
@@ -156,6 +184,7 @@ OF_STRIDES: dict[str, Outcome] = {
             "Standard deviation of the strides with feedback about their straight line, in percent "
             f"of {OWN}.",
             figures.steadiness,
+            higher_is_better=False,
         ),
         Outcome(
             "lag_1",
@@ -170,6 +199,7 @@ OF_STRIDES: dict[str, Outcome] = {
             "%",
             "Share of the trained leg's strides that are not valid.",
             figures.invalid,
+            higher_is_better=False,
         ),
     )
 }
@@ -186,7 +216,7 @@ OF_QUESTIONS = {
     "sus": (gettext_noop("System usability (SUS)"), "points"),
     "tlx": (gettext_noop("Workload (NASA-TLX)"), "points"),
 }
-# How each outcome is computed; of sessions, with the visit's own baseline.
+# How those that are not of strides are computed, with the visit's own baseline.
 MEANINGS = {
     "score": "Points of the session; none where the feedback type has no points.",
     "hit_rate": "Hits / judged strides with feedback.",
@@ -201,35 +231,37 @@ MEANINGS = {
     "higher is better.",
     "tlx": "Raw NASA-TLX after the session, 0 to 100; none where a scale was skipped; lower is "
     "better.",
-} | {slug: one.meaning for slug, one in (OF_STRIDES | CLINICAL_OUTCOMES).items()}
-LOWER_IS_BETTER = frozenset(
-    {"strides_to_success", "absolute_error", "variation", "steadiness", "invalid_strides", "tlx"}
-    | {slug for slug, one in CLINICAL_OUTCOMES.items() if not one.test.higher_is_better}
-)
-BOUNDS = {"hit_rate": (0.0, 1.0), "invalid_strides": (0.0, 100.0)}  # where intervals are cut
-# Slug to label and unit of all that may be registered.
-OUTCOMES: dict[str, tuple[str, str]] = {
-    **{slug: (one.label, one.unit) for slug, one in (OF_SESSIONS | OF_STRIDES).items()},
-    **OF_QUESTIONS,
-    **{slug: (one.label, one.unit) for slug, one in CLINICAL_OUTCOMES.items()},
 }
+BOUNDS = {"hit_rate": (0.0, 1.0), "invalid_strides": (0.0, 100.0)}  # where intervals are cut
 
 
-def define_outcomes() -> list[dict[str, str]]:
-    """Return name, unit and meaning of every outcome that may be registered."""
-    return [
-        {"outcome": slug, "label": label, "unit": unit, "meaning": MEANINGS[slug]}
-        for slug, (label, unit) in OUTCOMES.items()
-    ]
+def outcomes_with(tests: Iterable[ClinicalTest]) -> dict[str, Outcome]:
+    """Return all that may be registered, by slug. ``tests``: of the clinic's own."""
+    found = (*_of_walks(), *_of_tests([*CLINICAL_TESTS.values(), *tests]))
+    return {one.slug: one for one in found}
 
 
-def scale_of(slug: str) -> str:
-    """Return the unit of an outcome or a further channel with what it is a percentage of."""
-    if slug not in OUTCOMES:
-        return f"% of {OWN}"
-    meaning = MEANINGS[slug]
-    of = (OWN in meaning and OWN) or (FIRST in meaning and FIRST.removeprefix("in percent of "))
-    return f"% of {of}" if of else OUTCOMES[slug][1]
+def _of_walks() -> Iterator[Outcome]:
+    figures = {slug: (one.label, one.unit) for slug, one in OF_SESSIONS.items()} | OF_QUESTIONS
+    for slug, (label, unit) in figures.items():
+        yield Outcome(slug, label, unit, MEANINGS[slug], higher_is_better=slug != "tlx")
+    yield from OF_STRIDES.values()
+
+
+def _of_tests(tests: Iterable[ClinicalTest]) -> Iterator[Outcome]:
+    for test in tests:
+        for window in SLUGS:
+            yield Outcome(
+                slug_of(test.slug, window),
+                test.label,
+                test.unit or "points",
+                meaning_of(test, window),
+                window=window,
+                higher_is_better=test.higher_is_better,
+            )
+
+
+OUTCOMES = outcomes_with(())  # what every clinic has
 
 
 def compute_outcomes(walk: Walk, history: History, metrics: dict[str, float]) -> dict[str, float]:
@@ -244,7 +276,7 @@ def compute_outcomes(walk: Walk, history: History, metrics: dict[str, float]) ->
     """
     figures = {slug: value for slug, value in metrics.items() if slug in OUTCOMES}
     for slug, outcome in OF_STRIDES.items():
-        value = outcome.compute(walk, history)
+        value = outcome.compute and outcome.compute(walk, history)
         if value is not None:
             figures[slug] = value
     return figures

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
+from rehab.studies.analysis.clinical_outcomes import is_of_test
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import compute_outcomes
@@ -61,7 +61,7 @@ class ParticipantVisit:
     @property
     def is_walked(self) -> bool:
         """Whether it gave anything beside clinical tests."""
-        return bool(self.outcomes.keys() - CLINICAL_OUTCOMES.keys())
+        return not all(map(is_of_test, self.outcomes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +107,7 @@ class Participant:
 
     def observe(self, slug: str) -> Iterator[Observation]:
         """Yield an outcome of each visit that was due, also where it is missing."""
-        is_test = slug in CLINICAL_OUTCOMES
-        baseline = self.clinical_baselines.get(slug) if is_test else self.baseline
+        baseline = self.clinical_baselines.get(slug) if is_of_test(slug) else self.baseline
         for visit in self.visits if self.is_analyzed else ():
             if visit.is_due:
                 value = visit.outcomes.get(slug)

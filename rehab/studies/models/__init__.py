@@ -4,19 +4,18 @@ from rehab.studies.models.arm import Arm
 from rehab.studies.models.protocol import (
     METHODS,
     NOT,
-    OUTCOMES,
     SCHEDULE_FIELDS,
     SPENDINGS,
     Study,
     StudyState,
     StudyVersion,
+    outcome_label,
 )
 from rehab.studies.models.study_mark import StudyMark, has_mark
 
 __all__ = [
     "METHODS",
     "NOT",
-    "OUTCOMES",
     "SCHEDULE_FIELDS",
     "SPENDINGS",
     "Arm",
@@ -25,4 +24,5 @@ __all__ = [
     "StudyState",
     "StudyVersion",
     "has_mark",
+    "outcome_label",
 ]

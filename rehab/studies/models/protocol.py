@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from django.core.validators import RegexValidator
 from django.db import models
 from django.utils import timezone
-from django.utils.text import format_lazy
+from django.utils.functional import cached_property
+from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import ACCOUNT_DELETED, AppendOnlyModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
+from rehab.sessions.clinic_tests import own_tests
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
 from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
-from rehab.studies.analysis import outcomes
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES
+from rehab.studies.analysis.outcomes import Outcome, outcomes_with
 from rehab.studies.arms import EARLY_MONTHS, ArmRule, check_arms, check_channels
 
-OUTCOMES = [
-    (slug, format_lazy("{}, {}", _(of_test.test.label), _(of_test.window)) if of_test else _(label))
-    for slug, (label, _unit) in outcomes.OUTCOMES.items()
-    for of_test in [CLINICAL_OUTCOMES.get(slug)]
-]
 NOT = "not: "  # begins a criterion of exclusion among those that have to hold
 SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
 SPENDINGS = {
@@ -38,6 +35,15 @@ METHODS = {
     Method.MINIMIZATION: _("Minimization"),
     Method.LIST: _("A list of our own"),
 }
+
+
+def outcome_label(outcomes: Mapping[str, Outcome], slug: str) -> str:
+    """Return what an outcome is called, translated; one that is not known by its slug."""
+    one = outcomes.get(slug)
+    if one is None:
+        return slug
+    label = gettext(one.label)
+    return f"{label}, {gettext(one.window)}" if one.window else label
 
 
 class StudyState(models.TextChoices):
@@ -130,7 +136,7 @@ class Study(ClinicModel):
     goal_percent = models.FloatField(
         _("goal (% of baseline)"), default=100, validators=between(50, 200, "%")
     )
-    primary_outcome = models.CharField(_("primary outcome"), max_length=32, choices=OUTCOMES)
+    primary_outcome = models.CharField(_("primary outcome"), max_length=32)
     secondary_outcomes = models.JSONField(_("secondary outcomes"), default=list, blank=True)
     margin = models.FloatField(
         _("margin of non-inferiority"),
@@ -183,6 +189,15 @@ class Study(ClinicModel):
     def is_draft(self) -> bool:
         """Whether everything may still be changed."""
         return self.state == StudyState.DRAFT
+
+    @cached_property
+    def outcomes(self) -> dict[str, Outcome]:
+        """All that may be registered, by slug: also the tests of the clinic's own."""
+        return outcomes_with(own_tests(self.clinic_id).values())
+
+    def outcome_label(self, slug: str) -> str:
+        """Return what an outcome is called, translated."""
+        return outcome_label(self.outcomes, slug)
 
     @property
     def inclusion_criteria(self) -> list[str]:

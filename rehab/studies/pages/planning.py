@@ -26,12 +26,11 @@ from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
-from rehab.studies.analysis.outcomes import define_outcomes
 from rehab.studies.arm_forms import build_arm_forms, save_arms
 from rehab.studies.arms import MAX_ARMS
 from rehab.studies.blinding import MARKABLE, Task, give_mark, must_not_know_arms, take_mark
 from rehab.studies.forms import StudyForm, save_draft
-from rehab.studies.models import OUTCOMES, Study, StudyMark, StudyState
+from rehab.studies.models import Study, StudyMark, StudyState
 from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import may_monitor
@@ -100,7 +99,7 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
         "arms": arms,
         "wrong": [field for one in (form, *arms.forms) for field in one if field.errors],
         "study": study if study_id else None,
-        "outcomes": define_outcomes(),
+        "outcomes": [(study.outcome_label(slug), one) for slug, one in study.outcomes.items()],
     }
     return render(request, "studies/form.html", context)
 
@@ -162,7 +161,7 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         **({} if blind else compare_arms(study)),
         "participants": (people := _participants(study, user, blind=blind)),
         "has_simulated": any(one["has_simulated"] for one in people),
-        "primary": dict(OUTCOMES)[first_primary(study)],
+        "primary": study.outcome_label(first_primary(study)),
         "plan": () if blind else _plan(study),
         "changes": outcome_changes(study),
         "versions": study.versions.all(),

@@ -91,8 +91,8 @@ def show_power(request: HttpRequest, study_id: int) -> HttpResponse:
         "form": form,
         "size": (size_of_study(study) or ("", ""))[1],
         "runs": [{"run": run, "works": run.is_working(now), "power": run.power} for run in runs],
-        "outcome": outcome_label(study.primary_outcome),
-        "unit": outcome_unit(study.primary_outcome),
+        "outcome": outcome_label(study, study.primary_outcome),
+        "unit": outcome_unit(study, study.primary_outcome),
     }
     return render(request, "studies/power.html", context)
 

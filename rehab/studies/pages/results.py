@@ -61,9 +61,9 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
         "blinded_size": results.blinded_size,
         "carry_over": [
             {
-                "outcome": outcome_label(slug),
+                "outcome": outcome_label(results.study, slug),
                 "label": name_pair(results, one.group, one.reference),
-                "difference": _format_interval(one.difference, outcome_unit(slug)),
+                "difference": _format_interval(one.difference, outcome_unit(results.study, slug)),
                 "p": _format_p(one.p),
             }
             for slug in results.registered
@@ -93,10 +93,10 @@ def _inline(svg: str) -> str:
 
 def _describe(results: Results, slug: str) -> dict[str, Any]:
     """Return an outcome as the page's table has it."""
-    found, unit = results.find(slug), outcome_unit(slug)
+    found, unit = results.find(slug), outcome_unit(results.study, slug)
     registered = results.registered.get(slug)
     return {
-        "label": outcome_label(slug),
+        "label": outcome_label(results.study, slug),
         "unit": unit,
         "status": registered.status_text if registered else "",
         "arms": [

@@ -12,7 +12,6 @@ from rehab.sessions.log import RobotEntry
 from rehab.studies.agreements import WITHDRAWN
 from rehab.studies.analysis.comparison import Difference, Interval
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
-from rehab.studies.analysis.outcomes import OUTCOMES, scale_of
 from rehab.studies.analysis.participants import ArmFlow, Attendance
 from rehab.studies.guesses import guess_rows
 from rehab.studies.models import Arm, Study
@@ -221,7 +220,8 @@ def _shares(values: Iterable[str], name: str) -> str:
 
 def _estimates(results: Results, slug: str) -> str:
     """Return an outcome's numbers, means and differences, with 95 % intervals."""
-    found, label, unit = results.find(slug), OUTCOMES[slug][0], scale_of(slug)
+    found, outcome = results.find(slug), results.study.outcomes[slug]
+    label, unit = outcome.name, outcome.scale
     means = (
         f"{one.arm} {one.participants} people ({_by_visit(results, slug, one.arm)}), adjusted mean "
         f"{_text(one.mean)}"

@@ -13,7 +13,9 @@ from typing import Any
 
 from rehab.feedback.models import FeedbackType
 from rehab.questionnaires.instrument import Instrument
+from rehab.sessions.clinic_tests import own_tests
 from rehab.sessions.questionnaires import find_instrument
+from rehab.studies.analysis.clinical_outcomes import SLUGS, slug_of
 from rehab.studies.models import Arm, Study
 from rehab.studies.registration.size import read_assumed
 from rehab.training.goals import GoalRule
@@ -70,6 +72,13 @@ def describe(study: Study) -> dict[str, Any]:
             arm.baseline()  # raises InvalidSetting where a follow-up could not be walked
     if study.window_days is not None:
         document["visits"]["window_days"] = study.window_days
+    named = {study.primary_outcome, *study.secondary_outcomes}
+    tests = [
+        test.to_json()
+        for slug, test in own_tests(study.clinic_id).items()
+        if any(slug_of(slug, window) in named for window in SLUGS)
+    ]
+    document |= {"tests": tests} if tests else {}
     planned = {name: getattr(study, name) for name in ANALYSIS if getattr(study, name)}
     if read_assumed(planned) is None:
         planned.pop("assumed", None)

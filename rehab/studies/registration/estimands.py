@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rehab.studies.analysis.outcomes import OUTCOMES, define_outcomes
+from rehab.questionnaires.clinical_tests import ClinicalTest
+from rehab.studies.analysis.outcomes import Outcome, outcomes_with
 from rehab.studies.models import NOT
 
 SUMMARY = {
@@ -47,6 +48,11 @@ def summary(document: dict[str, Any]) -> str:
     return text
 
 
+def outcomes_of(document: dict[str, Any]) -> dict[str, Outcome]:
+    """Return all that a version may name as outcome, with the own tests as they were registered."""
+    return outcomes_with(ClinicalTest.from_json(one) for one in document.get("tests", ()))
+
+
 def registered_outcomes(document: dict[str, Any]) -> list[str]:
     """Return the slugs of a version's outcomes, the primary one first, each once."""
     return list(dict.fromkeys((document["primary_outcome"], *document["secondary_outcomes"])))
@@ -60,7 +66,7 @@ def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
     document
         Of a study's version.
     """
-    meanings = {row["outcome"]: row["meaning"] for row in define_outcomes()}
+    outcomes = outcomes_of(document)
     people = [*document.get("inclusion", ()), *(f"{NOT}{o}" for o in document.get("exclusion", ()))]
     if months := document["months_since_stroke_at_least"]:
         people.insert(0, f"{months} months or more since the stroke")
@@ -69,7 +75,7 @@ def estimands(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
             "outcome": slug,
             "population": "; ".join(people) or "every patient of the clinic who consents",
             "treatments": [f"{arm['code']}: {arm['name']}" for arm in document["arms"]],
-            "variable": f"{OUTCOMES[slug][0]}: {meanings[slug]}" if slug in OUTCOMES else slug,
+            "variable": f"{one.name}: {one.meaning}" if (one := outcomes.get(slug)) else slug,
             "intercurrent_events": dict(EVENTS),
             "summary": summary(document),
         }

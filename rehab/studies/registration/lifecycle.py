@@ -10,6 +10,7 @@ from django.utils.translation import gettext
 
 from rehab.people.audit import seals
 from rehab.people.models import Patient, User
+from rehab.sessions.clinic_tests import fix_tests
 from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
@@ -60,6 +61,7 @@ def _add_version(
     study: Study, by: User | None, now: datetime, reason: str = "", **more: Any
 ) -> StudyVersion:
     document = describe(study)
+    fix_tests(study.clinic_id, [test["slug"] for test in document.get("tests", ())])
     number = study.versions.count() + 1
     return StudyVersion.everywhere.create(
         study=study,

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 from django.utils.translation import gettext
 
-from rehab.studies.analysis.clinical_outcomes import CLINICAL_OUTCOMES, FOLLOW_UP
-from rehab.studies.analysis.outcomes import OF_QUESTIONS
+from rehab.studies.analysis.clinical_outcomes import FOLLOW_UP
+from rehab.studies.analysis.outcomes import OF_QUESTIONS, Outcome
 from rehab.studies.models import Study
-from rehab.studies.models.protocol import OUTCOMES
 from rehab.training.phases import PHASE_KINDS
 from rehab.training.valences import find_valence
 
@@ -36,15 +35,14 @@ WITH_FEEDBACK = {
 }
 
 
-def needs_follow_up(slug: str) -> bool:
+def needs_follow_up(outcome: Outcome) -> bool:
     """Return whether an outcome is found at the follow-up alone."""
-    of_test = CLINICAL_OUTCOMES.get(slug)
-    return slug == "follow_up_change" or (of_test is not None and of_test.window == FOLLOW_UP)
+    return outcome.slug == "follow_up_change" or outcome.window == FOLLOW_UP
 
 
 def find_unmeasurable(study: Study, slug: str) -> Iterator[str]:
     """Yield why a study could not find an outcome, each with its cure. Raises InvalidSetting."""
-    label = dict(OUTCOMES).get(slug, slug)
+    label = study.outcome_label(slug)
     for why in _reasons(study, slug):
         yield gettext("“%(outcome)s” %(why)s") % {"outcome": label, "why": why}
 
@@ -52,7 +50,10 @@ def find_unmeasurable(study: Study, slug: str) -> Iterator[str]:
 def _reasons(study: Study, slug: str) -> Iterator[str]:
     """Yield why a study could not find an outcome, and what to do."""
     arms = list(study.arms.select_related("measure", "protocol"))
-    if needs_follow_up(slug) and study.follow_up_days is None:
+    if slug not in study.outcomes:
+        yield gettext("is not there any more: choose another outcome.")
+        return
+    if needs_follow_up(study.outcomes[slug]) and study.follow_up_days is None:
         yield gettext(
             "needs a follow-up, and none is planned: give the days to it, or choose another "
             "outcome."

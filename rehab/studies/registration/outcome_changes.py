@@ -7,14 +7,14 @@ reported first, with the change beside it (CONSORT 2025, item 10).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
 from itertools import pairwise
 from typing import Any
 
 from django.utils.translation import gettext, ngettext
 
-from rehab.studies.models import OUTCOMES, Study
+from rehab.studies.models import Study
 from rehab.studies.participants import StudyEvent
 
 
@@ -70,6 +70,8 @@ class OutcomeChange:
         Slugs: of the primary outcomes, and of secondary ones that came and went.
     participants_before, looks_before
         How many had been enrolled, and how often results had been looked at (days and people).
+    study
+        Whose version it is.
     """
 
     version: int
@@ -81,17 +83,22 @@ class OutcomeChange:
     removed: tuple[str, ...]
     participants_before: int
     looks_before: int
+    study: Study
+
+    def to_row(self) -> dict[str, Any]:
+        """Return its columns, as files have them."""
+        return {name: getattr(self, name) for name in CHANGE_COLUMNS}
 
     def __str__(self) -> str:
-        parts = []
+        parts, name = [], self.study.outcome_label
         if self.primary_before != self.primary_after:
-            change = {"before": _name(self.primary_before), "after": _name(self.primary_after)}
+            change = {"before": name(self.primary_before), "after": name(self.primary_after)}
             parts.append(gettext("the primary outcome “%(before)s” became “%(after)s”") % change)
         if self.added:
-            added = ", ".join(map(_name, self.added))
+            added = ", ".join(map(name, self.added))
             parts.append(gettext("secondary outcomes added: %(names)s") % {"names": added})
         if self.removed:
-            removed = ", ".join(map(_name, self.removed))
+            removed = ", ".join(map(name, self.removed))
             parts.append(gettext("secondary outcomes removed: %(names)s") % {"names": removed})
         people = ngettext(
             "%(count)d participant", "%(count)d participants", self.participants_before
@@ -111,8 +118,7 @@ class OutcomeChange:
         }
 
 
-def _name(slug: str) -> str:
-    return str(dict(OUTCOMES).get(slug, slug))
+CHANGE_COLUMNS = tuple(one.name for one in fields(OutcomeChange) if one.name != "study")
 
 
 def registered_outcomes(study: Study) -> tuple[RegisteredOutcome, ...]:
@@ -160,6 +166,7 @@ def _changes(study: Study) -> Iterator[OutcomeChange]:
             tuple(sorted(was - now)),
             study.enrollments.filter(enrolled_at__lte=after.at).count(),
             looks.count(),
+            study,
         )
 
 

@@ -25,7 +25,7 @@ def write_json(study: Study, *, has_dates: bool = True) -> str:
         "registered_at": study.registered_at,
         "closed_at": study.closed_at,
         "draw_rule": RULE,
-        "outcome_changes": [asdict(change) for change in outcome_changes(study)],
+        "outcome_changes": [change.to_row() for change in outcome_changes(study)],
         "versions": [
             {
                 "number": version.number,

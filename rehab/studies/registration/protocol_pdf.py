@@ -17,12 +17,12 @@ from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, T
 from rehab.sessions.formatting import format_schedule
 from rehab.studies.allocation.draws import RULE
 from rehab.studies.allocation.scheme import Method
-from rehab.studies.analysis.outcomes import define_outcomes, scale_of
-from rehab.studies.models import METHODS, OUTCOMES, SPENDINGS, Study, StudyVersion
+from rehab.studies.models import METHODS, SPENDINGS, Study, StudyVersion, outcome_label
 from rehab.studies.registration.estimands import (
     HARMS_FOLLOWED,
     METHOD,
     POPULATIONS,
+    outcomes_of,
     registered_outcomes,
     summary,
 )
@@ -122,10 +122,11 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
 
 
 def _outcome_rows(document: dict[str, Any]) -> Iterator[tuple[object, ...]]:
-    meanings = {one["outcome"]: one["meaning"] for one in define_outcomes()}
-    labels = dict(OUTCOMES)
+    outcomes = outcomes_of(document)
     for slug in registered_outcomes(document):
-        yield labels.get(slug, slug), gettext(scale_of(slug)), meanings.get(slug)
+        one = outcomes.get(slug)
+        unit, meaning = (one.scale, one.meaning) if one else ("", None)
+        yield outcome_label(outcomes, slug), unit and gettext(unit), meaning
 
 
 def _follow_up(document: dict[str, Any]) -> str:
@@ -191,10 +192,12 @@ def _feedback_text(feedback: dict[str, Any]) -> str:
 
 def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
     """Return what is planned beside the arms: name and value, without what is left open."""
-    outcomes, visits, allocation = dict(OUTCOMES), document["visits"], document["allocation"]
+    visits, allocation = document["visits"], document["allocation"]
+    primary, *others = (
+        outcome_label(outcomes_of(document), slug) for slug in registered_outcomes(document)
+    )
     factors = (f"{row['name']}: {', '.join(row['levels'])}" for row in allocation["factors"])
     months = document["months_since_stroke_at_least"]
-    secondary = ", ".join(str(outcomes[slug]) for slug in document["secondary_outcomes"])
     analysis, crossed = document.get("analysis", {}), document["design"] == "crossover"
     rows = [
         (gettext("Participants"), document["participants"]),
@@ -211,8 +214,8 @@ def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
         (gettext("Days to the follow-up"), visits.get("days_to_follow_up")),
         (Study._meta.get_field("window_days").verbose_name, visits.get("window_days")),
         (gettext("Goal (% of baseline)"), f"{document['goal_percent_of_baseline']:g}"),
-        (gettext("Primary outcome"), outcomes[document["primary_outcome"]]),
-        (gettext("Secondary outcomes (others are exploratory)"), secondary),
+        (gettext("Primary outcome"), primary),
+        (gettext("Secondary outcomes (others are exploratory)"), ", ".join(others)),
         (Study._meta.get_field("margin").verbose_name, analysis.get("margin")),
         (Study._meta.get_field("spending").verbose_name, SPENDINGS.get(analysis.get("spending"))),
         (Study._meta.get_field("planned_sd").verbose_name, analysis.get("planned_sd")),

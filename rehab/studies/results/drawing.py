@@ -9,14 +9,13 @@ from typing import Any
 from django.utils.translation import gettext, ngettext
 
 from rehab.people.web.csv_tables import CsvWriter
-from rehab.studies.analysis.outcomes import OUTCOMES as DEFINED
 from rehab.studies.analysis.participants import CHANNEL, by_arm
 from rehab.studies.figures.flow import Box, draw_flow
 from rehab.studies.figures.forest import ForestRow, draw_forest
 from rehab.studies.figures.learning import CurveLabels, PhaseLabel, draw_curves
 from rehab.studies.figures.people import draw_people
 from rehab.studies.guesses import guess_rows
-from rehab.studies.models import OUTCOMES
+from rehab.studies.models import Study
 from rehab.studies.results.results import Results
 from rehab.studies.results.tables import (
     carry_over_rows,
@@ -35,16 +34,14 @@ from rehab.studies.results.tables import (
 LONG = 18  # letters of a name of which two fit on a line
 
 
-def outcome_label(slug: str) -> str:
+def outcome_label(study: Study, slug: str) -> str:
     """Return an outcome's name, translated; a further channel's is its own."""
-    if slug.startswith(CHANNEL):
-        return slug.removeprefix(CHANNEL)
-    return str(dict(OUTCOMES)[slug])
+    return study.outcome_label(slug.removeprefix(CHANNEL))
 
 
-def outcome_unit(slug: str) -> str:
+def outcome_unit(study: Study, slug: str) -> str:
     """Return an outcome's unit, translated; "" for ratios."""
-    unit = "%" if slug.startswith(CHANNEL) else DEFINED[slug][1]
+    unit = "%" if slug.startswith(CHANNEL) else study.outcomes[slug].unit
     return gettext(unit) if unit else ""
 
 
@@ -73,7 +70,8 @@ def _phases(results: Results) -> list[PhaseLabel]:
 def draw_primary(results: Results) -> str:
     """Return every participant's primary outcome, by arm."""
     slug = results.primary
-    label, unit = outcome_label(slug), outcome_unit(slug)
+    study = results.study
+    label, unit = outcome_label(study, slug), outcome_unit(study, slug)
     values = by_arm(results.participants, list(results.arms), slug)
     axis = f"{label} ({unit})" if unit else label
     crossed = results.study.crossover
@@ -93,7 +91,7 @@ def draw_exploratory(results: Results) -> str:
 def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
     rows = []
     for slug in slugs:
-        label, registered = outcome_label(slug), results.registered.get(slug)
+        label, registered = outcome_label(results.study, slug), results.registered.get(slug)
         status = registered.status_text if registered else ""
         rows.append(ForestRow(f"{label} ({status})" if status else label))
         is_first = slug == results.primary

@@ -17,7 +17,6 @@ from rehab.studies.analysis.comparison import Difference, holm
 from rehab.studies.analysis.curves import Point
 from rehab.studies.analysis.designs import MIN_PARTICIPANTS
 from rehab.studies.analysis.findings import Departure, OutcomeResult
-from rehab.studies.analysis.outcomes import LOWER_IS_BETTER, OUTCOMES
 from rehab.studies.analysis.participants import (
     CHANNEL,
     ArmFlow,
@@ -129,7 +128,7 @@ class Results:
     def registered(self) -> dict[str, RegisteredOutcome]:
         """The registered outcomes by their slugs, the primary one first."""
         hidden = TELL_THE_TYPE if self.is_interim else frozenset()
-        known = (one for one in self.outcomes if one.slug in OUTCOMES)
+        known = (one for one in self.outcomes if one.slug in self.study.outcomes)
         return {one.slug: one for one in known if one.slug not in hidden}
 
     @cached_property
@@ -138,7 +137,9 @@ class Results:
         if self.is_interim:
             return ()
         found = {slug for one in self.participants for v in one.visits for slug in v.outcomes}
-        rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
+        rest = [
+            slug for slug in self.study.outcomes if slug in found and slug not in self.registered
+        ]
         rest += sorted(slug for slug in found if slug.startswith(CHANNEL))
         known = distinct(self.participants, [*self.registered, *rest])
         return tuple(slug for slug in rest if slug in known)
@@ -234,7 +235,7 @@ class Results:
         margin, level = self.study.margin, self.level
         if slug != self.primary or margin is None or level is None:
             return None
-        better = slug not in LOWER_IS_BETTER
+        better = self.study.outcomes[slug].higher_is_better
         return one.is_not_inferior(margin, higher_is_better=better, confidence=1 - level)
 
     @property

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any
 
 from rehab.studies.analysis.comparison import Difference
 from rehab.studies.analysis.findings import OutcomeResult, has_departed, observations
-from rehab.studies.analysis.outcomes import scale_of
+from rehab.studies.analysis.outcomes import OWN
 from rehab.studies.analysis.participants import ParticipantVisit
-from rehab.studies.registration.outcome_changes import OutcomeChange
+from rehab.studies.registration.outcome_changes import CHANGE_COLUMNS
 from rehab.studies.results.results import Results
 
 INTERVAL = "low_95", "high_95"
@@ -38,7 +38,7 @@ HEADERS: dict[str, tuple[str, ...]] = {
         *INTERVAL,
     ),
     "looks": ("participants", "planned", "spending", "level"),
-    "changes": tuple(one.name for one in fields(OutcomeChange)),
+    "changes": CHANGE_COLUMNS,
     "occurrences": ("participant", "group", "visit", "kind", "what", "value"),
     "guesses": ("guesser", "group", "do_not_know", "index", "estimate", *INTERVAL),
     "adverse_events": (
@@ -86,9 +86,9 @@ def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
 
 def _status(results: Results, slug: str) -> dict[str, Any]:
     """Return an outcome's unit, as what it was registered, and in which versions."""
-    one = results.registered.get(slug)
+    one, outcome = results.registered.get(slug), results.study.outcomes.get(slug)
     return {
-        "unit": scale_of(slug),
+        "unit": outcome.scale if outcome else f"% of {OWN}",
         "status": "exploratory" if one is None else one.status,
         "since_version": one and one.since,
         "dropped_in_version": one and one.dropped_in,
@@ -201,7 +201,7 @@ def screening_rows(results: Results) -> Iterator[dict[str, Any]]:
 def change_rows(results: Results) -> Iterator[dict[str, Any]]:
     """Yield one row for each version that changed outcomes."""
     for one in results.changes:
-        row = asdict(one)
+        row = one.to_row()
         yield row | {name: " ".join(row[name]) for name in ("added", "removed")}
 
 
