@@ -8,7 +8,8 @@ import pytest
 from django.urls import reverse
 
 from rehab.exports.fhir.resources import Pseudonyms, make_bundle
-from rehab.patients.erasure import ErasureReason, erase
+from rehab.patients.erasure import erase
+from rehab.people.models import ErasureReason
 from rehab.people.roles import Role
 from rehab.sessions.assessments import Assessment, assessments_with, load_courses
 from rehab.sessions.clinic_tests import ClinicTest
