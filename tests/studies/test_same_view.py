@@ -35,7 +35,7 @@ pytestmark = pytest.mark.django_db
 # They have a new secret, code or animal each time, or tell of this very look.
 OTHERWISE_EACH_TIME = (
     *("admin:logout", "admin:rehab_patient_add", "api:openapi-view", "add-app"),
-    *("own-sign-ins", "tablet"),
+    *("own-sign-ins", "problem-report", "tablet"),
 )
 INTERIM = "researcher who may look"
 EXPORTS = ("prepare-research", "advance-research", "download-research")
