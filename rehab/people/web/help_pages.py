@@ -28,7 +28,7 @@ PAGES = {
     "the-robot": "incident rehab_composedgesture",
     "what-to-do-when-": "correct",
     "progress": "history take-home family-links",
-    "standard-tests": "assessments assess",
+    "standard-tests": "assessments assess rehab_clinictest",
     "caseload": "caseload",
     "insight": "insight",
     "pair-the-tablet": "pair",
