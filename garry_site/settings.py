@@ -31,7 +31,7 @@ VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are 
 # --- where and how it runs ----------------------------------------------------------------------
 
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
-DEMO = flag("GARRY_DEMO", False, "a demonstration: only invented patients (set by garry demo)")
+DEMO = text("GARRY_DEMO", "", "password of a demonstration of invented patients (by garry demo)")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
 DATA_DIR = Path(
     text(

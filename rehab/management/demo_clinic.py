@@ -12,7 +12,7 @@ from rehab.boards.models import Leaderboard
 from rehab.patients.visits import plan_visit
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.models.choices import DEMO_NAMES
-from rehab.people.roles import Role
+from rehab.people.roles import DEMO_ACCOUNTS
 from rehab.sessions.corrections import add_note
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.headless import simulate_strides
@@ -34,7 +34,6 @@ VISITS, STRIDES = 15, 170  # of each patient; of a visit
 BASELINE, TRAINED = 30, 110  # strides of these
 REST = timedelta(days=7) / 3  # from visit to visit
 GOAL = 0.9  # of the usual walk: about half of the strides reach it
-ACCOUNTS = {"lead": Role.LEAD, "pt": Role.PT, "researcher": Role.RESEARCHER}
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +82,7 @@ def fill_clinic(password: str, now: datetime) -> Clinic:
     clinic = Clinic.everywhere.create(name="Demo clinic")
     people = {
         name: User.everywhere.create_user(name, password=password, role=role, clinic=clinic)
-        for name, role in ACCOUNTS.items()
+        for name, role in DEMO_ACCOUNTS.items()
     }
     patients = [
         Patient.everywhere.create(

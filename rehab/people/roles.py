@@ -17,6 +17,10 @@ class Role(TextChoices):
     RESEARCHER = "researcher", _("Researcher")
 
 
+# The accounts of a demonstration (garry demo).
+DEMO_ACCOUNTS = {"lead": Role.LEAD, "pt": Role.PT, "researcher": Role.RESEARCHER}
+
+
 class Right(Flag):
     """What a role may do with the visible rows of a model."""
 

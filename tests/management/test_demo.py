@@ -8,6 +8,7 @@ from io import StringIO
 import pytest
 from django.core.exceptions import ValidationError
 from django.core.management import CommandError, call_command
+from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels.shared_panels import BoardViewer
@@ -51,7 +52,7 @@ def test_a_demonstration_has_weeks_of_history(few):
 @pytest.mark.parametrize("is_demo", [True, False], ids=["demonstration", "clinic"])
 def test_what_is_simulated_counts_in_a_demonstration_and_nowhere_else(settings, few, is_demo):
     clinic = demo_clinic.fill_clinic("look-around", NOW)
-    settings.DEMO = is_demo
+    settings.DEMO = "look-around" if is_demo else ""
     user, now = User.everywhere.get(username="pt"), clinic_time(NOW, clinic)
     cases = load_caseload(user, now)
     assert {flag for case in cases for flag in case.flags} == (set(Flag) if is_demo else set())
@@ -78,10 +79,18 @@ def test_it_refuses_real_names(settings, name, code):
     clinic = build_world("amber").clinic
     patient = Patient(clinic=clinic, nickname=name, code=code, paretic_side="left")
     patient.full_clean()
-    settings.DEMO = True
+    settings.DEMO = "look-around"
     with pytest.raises(ValidationError, match="demonstration"):
         patient.full_clean()
     Patient(clinic=clinic, nickname="Fern", code="demo-9", paretic_side="left").full_clean()
+
+
+def test_its_sign_in_page_tells_the_password_and_no_other_does(settings, client):
+    page = client.get(reverse("sign-in")).content.decode()
+    assert "demonstration" not in page
+    settings.DEMO = "gufo-pepa-rozo"
+    page = client.get(reverse("sign-in")).content.decode()
+    assert "Sign in as lead, pt, researcher; the password is gufo-pepa-rozo." in page
 
 
 def test_it_never_fills_another_database(settings):

@@ -16,8 +16,9 @@ from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 from django.utils import timezone
 
-from rehab.management.demo_clinic import ACCOUNTS, fill_clinic
+from rehab.management.demo_clinic import fill_clinic
 from rehab.people.random_codes import random_words
+from rehab.people.roles import DEMO_ACCOUNTS
 from rehab.people.sign_in.first_start import prepare_database
 
 STOP_S = 20
@@ -45,13 +46,13 @@ class Command(BaseCommand):
             if not settings.DEMO:
                 raise CommandError("This fills a demonstration's own database: run garry demo.")
             prepare_database()
-            fill_clinic(sys.stdin.readline().strip(), timezone.now())
+            fill_clinic(settings.DEMO, timezone.now())
             return
         if settings.HOSTED:
             raise CommandError("A hosted server has patients. Run the demonstration elsewhere.")
         folder, password = settings.DATA_DIR / "demo", random_words(3)
-        environment = _environment(folder)
-        self.stdout.write(f"Sign in as {', '.join(ACCOUNTS)}; the password is {password}.")
+        environment = _environment(folder, password)
+        self.stdout.write(f"Sign in as {', '.join(DEMO_ACCOUNTS)}; the password is {password}.")
         signal.signal(signal.SIGTERM, _interrupt)
         ended = None
         while ended is None:
@@ -59,9 +60,7 @@ class Command(BaseCommand):
                 shutil.rmtree(folder)
             self.stdout.write("Making the clinic with weeks of history: half a minute …")
             self.stdout.flush()  # at once, also into a file
-            made = _run(environment, "demo", "--fill")
-            made.communicate(f"{password}\n".encode())
-            if made.returncode:
+            if _run(environment, "demo", "--fill").wait():
                 raise CommandError("The clinic could not be made; the cause is above.")
             served = _run(environment, "serve", "--host", host, "--port", str(port))
             try:
@@ -73,19 +72,19 @@ class Command(BaseCommand):
         raise SystemExit(ended)
 
 
-def _environment(folder: Path) -> dict[str, str]:
+def _environment(folder: Path, password: str) -> dict[str, str]:
     """Return the variables of the demonstration's server: its own folder, and nothing of ours."""
     own = ("GARRY_DATABASE_URL", "GARRY_SECRET_KEY", "GARRY_BACKUP_KEYS")
     rest = {name: value for name, value in os.environ.items() if name not in own}
-    return rest | {"GARRY_DATA_DIR": str(folder), "GARRY_DEMO": "1"}
+    return rest | {"GARRY_DATA_DIR": str(folder), "GARRY_DEMO": password}
 
 
 def _run(environment: dict[str, str], *command: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [sys.executable, "-m", "garry_site", *command],
         env=environment,
-        stdin=subprocess.PIPE,
         cwd=settings.BASE_DIR,
+        stdin=subprocess.DEVNULL,
         start_new_session=True,  # a Ctrl-C is ours to pass on
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from django.conf import settings
 from django.contrib import messages
 from django.contrib.auth import logout
 from django.contrib.auth.views import LoginView
@@ -18,7 +19,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import public
 from rehab.people.models import User
-from rehab.people.roles import Role
+from rehab.people.roles import DEMO_ACCOUNTS, Role
 from rehab.people.sign_in import flow, sign_on
 from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import FactorForm, SignInForm
@@ -44,8 +45,10 @@ class SignIn(LoginView):
     authentication_form = SignInForm
 
     def get_context_data(self, **given: Any) -> dict[str, Any]:
-        """Return what the page shows, with the button of the hospital's sign-on."""
-        return super().get_context_data(sign_on=sign_on.button_text(), **given)
+        """Return what the page shows: the hospital's sign-on, a demonstration's password."""
+        return super().get_context_data(
+            sign_on=sign_on.button_text(), demo=settings.DEMO, accounts=DEMO_ACCOUNTS, **given
+        )
 
     def form_valid(self, form: Any) -> HttpResponse:
         """Sign in, or go on to the second factor."""

@@ -40,6 +40,8 @@ class AssessmentForm(forms.Form):
         self.label_suffix = ""
         self.test = test
         self.fields.update(_fields_of(test))
+        if not self.is_bound:
+            self.fields.pop("why", None)  # it is asked once a number is unusual
         self.fields["device"] = forms.CharField(
             label=_("Walking aid, orthosis, help (if any)"),
             required=False,
