@@ -29,7 +29,7 @@ METHODS = {
 }
 CONCEALED = (
     "Seed, block sizes or list are encrypted on the server, their SHA-256 is registered before the "
-    "first participant; a group is drawn when a person is enrolled, and shown to nobody."
+    "first participant; a group is drawn once a person is enrolled, and nobody knows it before."
 )
 EXPORTABLE = (
     "GARRY's export: outcomes of each visit under codes, their definitions, the protocol with all "
