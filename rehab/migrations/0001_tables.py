@@ -2650,6 +2650,7 @@ class Migration(migrations.Migration):
                         blank=True,
                         help_text="Smaller changes are shown as no change. Empty: each one counts.",
                         null=True,
+                        validators=[django.core.validators.MinValueValidator(0)],
                         verbose_name="least change that counts",
                     ),
                 ),

@@ -11,6 +11,7 @@ from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
+from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.web.refusals import format_refusal
 from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest, Way
@@ -58,6 +59,7 @@ class ClinicTest(ClinicModel):
         _("least change that counts"),
         null=True,
         blank=True,
+        validators=between(0),
         help_text=_("Smaller changes are shown as no change. Empty: each one counts."),
     )
     is_offered = models.BooleanField(

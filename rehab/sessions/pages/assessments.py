@@ -151,6 +151,7 @@ def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
         request.POST or None, test=test, initial={"device": last.device if last else ""}
     )
     if request.method == "POST" and form.is_valid():
+        fix_tests(patient.clinic_id, [slug])
         row = Assessment.everywhere.create(
             clinic_id=patient.clinic_id,
             patient=patient,
@@ -159,7 +160,6 @@ def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
             at=timezone.now(),
             by=user,
         )
-        fix_tests(patient.clinic_id, [slug])
         messages.success(
             request,
             gettext("%(test)s of %(name)s: %(result)s")
