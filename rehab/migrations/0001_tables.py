@@ -261,6 +261,7 @@ class Migration(migrations.Migration):
                             ("lead", "Clinic lead"),
                             ("pt", "Physical therapist"),
                             ("researcher", "Researcher"),
+                            ("sponsor", "Sponsor of studies"),
                         ],
                         max_length=16,
                         verbose_name="role",
@@ -3098,6 +3099,7 @@ class Migration(migrations.Migration):
                             ("lead", "Clinic lead"),
                             ("pt", "Physical therapist"),
                             ("researcher", "Researcher"),
+                            ("sponsor", "Sponsor of studies"),
                         ],
                         max_length=16,
                         verbose_name="role",
@@ -4555,7 +4557,7 @@ class Migration(migrations.Migration):
         migrations.AddConstraint(
             model_name="user",
             constraint=models.CheckConstraint(
-                condition=models.Q(("role__in", ["host", "lead", "pt", "researcher"])),
+                condition=models.Q(("role__in", ["host", "lead", "pt", "researcher", "sponsor"])),
                 name="user_role_is_known",
             ),
         ),

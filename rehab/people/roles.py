@@ -15,6 +15,7 @@ class Role(TextChoices):
     LEAD = "lead", _("Clinic lead")
     PT = "pt", _("Physical therapist")
     RESEARCHER = "researcher", _("Researcher")
+    SPONSOR = "sponsor", _("Sponsor of studies")
 
 
 # The accounts of a demonstration (garry demo).
@@ -41,8 +42,8 @@ _SHARED = _EDITED_BY_CARERS | {Role.HOST: Right.ALL}
 _OF_A_LEAD = {Role.LEAD: Right.ALL, Role.PT: Right.VIEW}
 
 # Model name → role → rights. What is not listed is not allowed. A host runs the server and
-# sees accounts and shared settings, never a patient. A researcher sees pseudonyms only. Sessions,
-# steps and events are a log: nobody edits them in place.
+# sees accounts and shared settings, never a patient. A researcher sees pseudonyms only, a sponsor
+# the figures of studies. Sessions, steps and events are a log: nobody edits them in place.
 RIGHTS: dict[str, dict[Role, Right]] = {
     "Clinic": {Role.HOST: Right.EDIT, Role.LEAD: Right.VIEW | Right.CHANGE},
     "User": {Role.HOST: Right.EDIT, Role.LEAD: Right.EDIT},
@@ -89,7 +90,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "SessionSeal": {},
     "SessionCorrection": _VIEWED | dict.fromkeys(_CARERS, Right.VIEW | Right.ADD),
     # Changed by their pages alone, which know how far a study is.
-    "Study": _VIEWED,
+    "Study": _VIEWED | {Role.SPONSOR: Right.VIEW},
     "StudyVersion": _VIEWED,
     "Arm": _VIEWED,
     "StudyMark": _VIEWED_BY_CARERS,
@@ -122,8 +123,8 @@ PERSONS = frozenset({"Patient", "User"})
 
 
 def may_see_names(role: str) -> bool:
-    """Return whether a role may learn who patients and staff are: a researcher never does."""
-    return role != Role.RESEARCHER
+    """Return whether a role may learn who patients and staff are."""
+    return role not in {Role.RESEARCHER, Role.SPONSOR}
 
 
 def is_hidden_beside(role: str, model_name: str) -> bool:

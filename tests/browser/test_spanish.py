@@ -149,7 +149,7 @@ def test_a_language_that_is_changed_in_mid_session_changes_the_page_whole(
         feet.walk(1.1)
         expect(tablet.locator("body")).to_have_attribute("data-look", "feedback")
         is_english(tablet)
-        desk.click("a.av")  # back to the patient
+        desk.click("[aria-label='Back']")
         desk.goto(f"{desk.url}screen/")
         desk.select_option("[name=language]", "es")
         desk.click("main form button.primary")

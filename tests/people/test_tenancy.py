@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from garry_site import urls as site_urls
 from rehab.people.audit.audit_log import AuditEntry
-from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
+from rehab.people.roles import Right, Role, is_hidden_beside, may_see_names, rights_of
 from rehab.people.scope import CrossClinicReference, Scope, ScopedManager, UnscopedQuery
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
@@ -188,4 +188,4 @@ def test_pages_and_admin_never_ask_for_rows_of_everywhere():
 @pytest.mark.parametrize("role", Role)
 def test_only_a_researcher_does_not_see_persons_beside_rows(role):
     hidden = {name for name in ("Patient", "User", "Station") if is_hidden_beside(role, name)}
-    assert hidden == ({"Patient", "User"} if role == Role.RESEARCHER else set())
+    assert hidden == (set() if may_see_names(role) else {"Patient", "User"})

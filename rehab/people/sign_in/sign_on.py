@@ -32,7 +32,7 @@ WAIT_S = 5.0
 CLOCK_ERROR_S = 60.0  # between this computer and the hospital's
 LOGOUT_EVENT = "http://schemas.openid.net/event/backchannel-logout"  # Back-Channel Logout 1.0, 2.4
 ALGORITHMS = ["RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512"]
-STRONGEST_FIRST = (Role.LEAD, Role.PT, Role.RESEARCHER)
+STRONGEST_FIRST = (Role.LEAD, Role.PT, Role.RESEARCHER, Role.SPONSOR)
 # Keys of the browser session.
 PURPOSE = "sign_on"
 ID_TOKEN = "sign_on_token"  # noqa: S105  # asked for at the sign-out

@@ -127,7 +127,7 @@ class ApiToken(TokenModel):
     role = models.CharField(
         _("role"),
         max_length=16,
-        choices=[choice for choice in Role.choices if choice[0] != Role.HOST],
+        choices=[one for one in Role.choices if one[0] not in {Role.HOST, Role.SPONSOR}],
         help_text=_(
             "The account's own role, or one that sees less: a researcher's token never "
             "reads a nickname or code."

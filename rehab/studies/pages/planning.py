@@ -53,7 +53,7 @@ def get_study(user: User, study_id: int) -> Study:
     return get_object_or_404(Study.objects.visible_to(user).select_related("clinic"), pk=study_id)
 
 
-@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, Role.SPONSOR, patients=False)
 @require_safe
 def list_studies(request: HttpRequest) -> HttpResponse:
     """List the clinic's studies; only leads see drafts."""

@@ -76,8 +76,8 @@ def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
             for name, draw in FIGURES.items()
             if is_shown(results, name)
         },
-        "registered": [_describe(results, slug) for slug in results.registered],
-        "exploratory": [_describe(results, slug) for slug in results.exploratory],
+        "registered": [describe_outcome(results, slug) for slug in results.registered],
+        "exploratory": [describe_outcome(results, slug) for slug in results.exploratory],
         "groups": group_labels(study),
         "guesses": []
         if results.is_interim
@@ -91,7 +91,7 @@ def _inline(svg: str) -> str:
     return mark_safe(svg)  # noqa: S308 (drawn by `figures`, which escapes every text)
 
 
-def _describe(results: Results, slug: str) -> dict[str, Any]:
+def describe_outcome(results: Results, slug: str) -> dict[str, Any]:
     """Return an outcome as the page's table has it."""
     found, unit = results.find(slug), outcome_unit(results.study, slug)
     registered = results.registered.get(slug)
