@@ -139,7 +139,7 @@ messages: setup ## Collect the pages' words into locale/ and compile the transla
 	$(PYTHON) manage.py compilemessages --ignore $(VENV) --verbosity 0
 
 docs: setup ## Make the documentation's site, into dist/docs
-	$(SPHINX) -d .sphinx_cache/all . dist/docs
+	$(SPHINX) -W -d .sphinx_cache/all . dist/docs
 	echo 'The site: dist/docs/docs/index.html'
 
 check-release: setup ## Build the package and try it without this repository, and an upgrade to it

@@ -12,7 +12,8 @@ from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.kinetics import compute_ankle_moment
 from rehab.gait.strides import Flag, GaitInputError, RejectionReason, Stride
 from rehab.gait.two_legs import TwoLegDetector
-from rehab.gait.wearables import WearableDetector, WearableStride
+from rehab.gait.wearables.detector import WearableDetector
+from rehab.gait.wearables.strides import WearableStride
 
 __all__ = [
     "Finding",

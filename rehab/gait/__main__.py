@@ -31,7 +31,8 @@ from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError, Stride
-from rehab.gait.wearables import Place, WearableDetector
+from rehab.gait.wearables import Place
+from rehab.gait.wearables.detector import WearableDetector
 
 LOOK_AHEAD_S = 0.05
 

@@ -32,7 +32,7 @@ from rehab.training.valences import VALENCES
 
 VISITS, STRIDES = 15, 170  # of each patient; of a visit
 BASELINE, TRAINED = 30, 110  # strides of these
-REST = timedelta(days=7) / 3  # from visit to visit
+EACH_WEEK = 3  # visits, all at the same hour
 GOAL = 0.9  # of the usual walk: about half of the strides reach it
 
 
@@ -99,7 +99,8 @@ def fill_clinic(password: str, now: datetime) -> Clinic:
     local = clinic_time(now, clinic)
     for number, (patient, course) in enumerate(zip(patients, COURSES, strict=False)):
         for back in reversed(range(VISITS)):
-            began = now - timedelta(days=course.last, minutes=45 * (number + 1)) - back * REST
+            days = course.last + back * 7 // EACH_WEEK
+            began = now - timedelta(days=days, minutes=45 * (number + 1))
             _walk(patient, course, number, back, began, people["pt"])
         if course.planned is not None:
             day = local.date() + timedelta(days=course.planned)

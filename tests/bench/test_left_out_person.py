@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from rehab.gait.wearables import Place, WearableDetector, axis, swings
+from rehab.gait import WearableDetector
+from rehab.gait.wearables import Place, axis, swings
 from rehab.gait.wearables.strides import OFFSETS_S, STRIDE_MIN_S
 from tests.support.worn_sensors import (
     STARTS_S,

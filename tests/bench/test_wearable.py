@@ -9,7 +9,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from rehab.gait.wearables import WearableDetector, WearableStride
+from rehab.gait import WearableDetector, WearableStride
 from tests.support.data import signals
 from tests.support.other_walkers import OTHERS
 from tests.support.simulated_leg import random_mounting

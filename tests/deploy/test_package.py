@@ -115,22 +115,22 @@ def test_programs_beside_the_server_start(garry, program, tmp_path):
 
 def test_its_plug_in_of_pytest_tries_what_packages_add(garry, tmp_path):
     python = [str(garry.with_name("python")), "-m"]
-    own = tmp_path / "test_own.py"
-    own.write_text("def test_own():\n    pass\n")
+    folder = garry.parents[2]  # holds the environment, as people often have it
+    (folder / "test_own.py").write_text("def test_own():\n    pass\n")
     packages = [tmp_path / name for name in ("garry-wagon", "garry-metronome")]
-    for folder in packages:
-        shutil.copytree(ROOT / "examples" / folder.name, folder)
+    for package in packages:
+        shutil.copytree(ROOT / "examples" / package.name, package)
     built = ["--no-deps", "--no-build-isolation", *map(str, packages)]
     for what in (["--require-hashes", "-r", str(ROOT / "locks/test.txt")], built):
         installed = run([*python, "pip", "install", "-q", *what], tmp_path, tmp_path)
         assert installed.returncode == 0, installed.stderr
-    tried = run([*python, "pytest", "-v", "--garry", str(own)], tmp_path, tmp_path)
+    tried = run([*python, "pytest", "-v", "--garry"], folder, tmp_path)
     assert tried.returncode == 0, tried.stdout + tried.stderr
     for told in ("test_own", "[wagon]", "[peek]", "[metronome]", "[beat_error]"):
         assert told in tried.stdout
-    names = [folder.name for folder in packages]
+    names = [package.name for package in packages]
     gone = run([*python, "pip", "uninstall", "-q", "-y", *names], tmp_path, tmp_path)
     assert gone.returncode == 0, gone.stderr
-    tried = run([*python, "pytest", "-v", "--garry", str(own)], tmp_path, tmp_path)
+    tried = run([*python, "pytest", "-v", "--garry"], folder, tmp_path)
     assert tried.returncode == 0, tried.stdout + tried.stderr
     assert "[wagon]" not in tried.stdout

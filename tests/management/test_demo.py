@@ -43,6 +43,9 @@ def test_a_demonstration_has_weeks_of_history(few):
     sessions = TrainingSession.everywhere.filter(clinic=clinic)
     assert sessions.count() == 3 * len(demo_clinic.COURSES)
     assert {one.state for one in sessions} == {"finished"}
+    assert len({(one.patient_id, one.created_at.time()) for one in sessions}) == len(
+        demo_clinic.COURSES
+    )  # each at an hour of their own
     assert max(one.ended_at for one in sessions) < NOW
     assert Step.everywhere.filter(session__in=sessions, hit=True).exists()
     assert SessionMetric.everywhere.filter(session__in=sessions, slug="score").exists()

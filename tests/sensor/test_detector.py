@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rehab.gait.wearables import WearableDetector
+from rehab.gait import WearableDetector
 from tests.support.node import run_node
 from tests.support.simulated_leg import (
     Floats,

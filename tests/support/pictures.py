@@ -40,6 +40,7 @@ PICTURES = {
     "therapist": Picture("therapist-laptop", "sessions/monitor.html"),
     "past-sessions": Picture("past-sessions-laptop", "sessions/history.html"),
     "scores": Picture("scores-points-laptop", "boards/scores.html"),
+    "caseload": Picture("demo-caseload-laptop", "patients/caseload.html"),
     "pairing": Picture("pairing-tablet-portrait", "sessions/tablet.html"),
     "leave": Picture("walk-leave-tablet-landscape", "sessions/walk.html"),
     "walking": Picture("walk-positive-hit-tablet-portrait", "sessions/walk.html"),
@@ -82,10 +83,12 @@ def take() -> None:
     if shutil.which("pngquant") is None:
         sys.exit("Pictures are made smaller by pngquant. Cure: apt-get install pngquant")
     screenshots = {picture.screenshot for picture in PICTURES.values()}
-    wanted = " or ".join(f"[{name}]" for name in screenshots if not name.startswith("walk-"))
+    own = ("walk-", "demo-")  # what has a file of its own
+    wanted = " or ".join(f"[{name}]" for name in screenshots if not name.startswith(own))
     for file, choice in (
         ("test_pictures.py", f"test_picture and ({wanted})"),
         ("test_walk_pictures.py", "test_pictures_of_a_walk"),
+        ("test_demo_pictures.py", "laptop"),
     ):
         command = [sys.executable, "-m", "pytest", "-q", "-m", "screenshots", "-k", choice]
         subprocess.run([*command, f"tests/screenshots/{file}"], cwd=ROOT, check=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, hilbert, sosfiltfilt
 
-from rehab.gait.wearables import WearableDetector, WearableStride
+from rehab.gait import WearableDetector, WearableStride
 from tests.support.data import signals
 
 Floats = NDArray[np.float64]
