@@ -126,7 +126,8 @@ def test_a_robot_away_from_home_says_so_and_is_let_go_on_by_a_person(server, bro
             "It is standing still: away from its place."
         )
         expect(page.locator("[data-show=robot-cure]")).to_have_text(
-            "Carry it back to its mark, facing as before. Put it on its mark, nobody near it, then:"
+            "Carry it back to its mark, facing as before."
+            " Put it on its mark with nobody near it, then:"
         )
         page.get_by_role("button", name="Let it move").click()
         hear(robot, "arm")

@@ -243,7 +243,7 @@ export class RobotPanel {
   #describeCure() {
     if (this.#isBack) return this.#describeBattery();
     const parts = [this.#cureOf(this.#isHeld ? this.#stopReason : this.#status?.reason), this.#describeBattery()];
-    if (this.#isHeld) parts.push(_("Put it on its mark, nobody near it, then:"));
+    if (this.#isHeld) parts.push(_("Put it on its mark with nobody near it, then:"));
     return parts.filter(Boolean).join(" ");
   }
 
