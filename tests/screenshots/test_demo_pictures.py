@@ -14,7 +14,7 @@ pytestmark = pytest.mark.browser
 
 FOLDER = ROOT / "screenshots"
 PAGES = {"demo-start": "/start/", "demo-caseload": "/caseload/", "demo-insight": "/insight/"}
-DEMO = {"GARRY_DEMO": "1"}
+DEMO = {"GARRY_DEMO": "look-around"}
 
 
 @pytest.fixture(scope="module")
@@ -22,11 +22,11 @@ def looking_around(tmp_path_factory):
     """A browser that is signed in at a demonstration."""
     folder, fill = tmp_path_factory.mktemp("data"), [sys.executable, "manage.py", "demo", "--fill"]
     environment = clean_environment(folder, 8000) | DEMO
-    subprocess.run(fill, cwd=ROOT, env=environment, input=b"look-around\n", check=True)
+    subprocess.run(fill, cwd=ROOT, env=environment, check=True)
     with serve(folder, settings=DEMO) as server, chromium() as browser:
         page = browser.new_context(base_url=server.url, reduced_motion="reduce").new_page()
         page.goto("/start/")
-        sign_in(page, "look-around", "lead")
+        sign_in(page, DEMO["GARRY_DEMO"], "lead")
         page.wait_for_selector("text=Caseload")
         FOLDER.mkdir(exist_ok=True)
         yield page
