@@ -15,7 +15,6 @@ from rehab.studies.models import Study
 from rehab.studies.record.known import UNMASKED, know
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.problems import find_doubts
-from rehab.studies.registration.size import size_of_study
 from rehab.studies.results.results import Results
 
 INDENT = "    "
@@ -25,8 +24,7 @@ NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 SAID_BLINDED = "a marked assessor, or other words: “{said}” is not so, no assessor is marked"
 # Words that say that assessors are blinded, up to three words apart.
 ASSESSOR, BLINDED = r"\b(?:assessor|rater)\w*", r"\b(?:blind|mask)\w*"
-NO_CRITERIA = "who may take part (age, diagnosis, abilities): no criteria are registered"
-TOO_FEW = "why {planned} are planned where the formula asks for {needed}"
+IN_DOUBT = {"everybody"}  # asked only of a plan that lets a reviewer ask
 NEAR = r"\W+(?:(?!not\b)\w+\W+){0,3}?"
 SAYS_BLINDED = re.compile(f"{ASSESSOR}{NEAR}{BLINDED}|{BLINDED}{NEAR}{ASSESSOR}", re.IGNORECASE)
 # List; then one line for each item: number | words | what answers it.
@@ -181,7 +179,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
     """
     answers = study.facts | know(study, results)  # what happened, not what was planned
     is_unmasked, said_blinded = UNMASKED in answers["masked"], ""
-    further = _further(study)
+    doubts = find_doubts(study)
     if is_unmasked and _names_assessor(answers.get("blinding", "")):
         said_blinded = answers.pop("blinding")  # a report tells one truth: GARRY's
     for name, items in ITEMS.items():
@@ -194,14 +192,13 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
             if number != SUMMARY:
                 said |= {s: said.get(s, number) for s in known if s not in REPEATED}
             asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
-            asked = [slug for slug in asked if slug != "everybody"]  # asked below, where it lacks
+            asked = [slug for slug in asked if slug in doubts or slug not in IN_DOUBT]
             lacking = [
                 SAID_BLINDED.format(said=said_blinded)
                 if said_blinded and slug == "blinding"
-                else str(ASKED[slug])
+                else doubts.get(slug, str(ASKED[slug])).rstrip(".")
                 for slug in asked
             ]
-            lacking += [further[slug] for slug in named if slug in further]
             if slugs == "-" or not (given or lacking):
                 lacking = [BY_HAND]
             if "masked" in named and is_unmasked and _says_blinded(given):
@@ -215,16 +212,6 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
                 "answer": " ".join([*(f"{one.rstrip('.')}." for one in given[:-1]), *given[-1:]]),
                 "still asked": "; ".join(lacking),
             }
-
-
-def _further(study: Study) -> dict[str, str]:
-    """Return what a plan leaves open though it could be registered, by the slug of its answer."""
-    found, doubts = {}, find_doubts(study)
-    sized = size_of_study(study)
-    if sized is not None and "size" in doubts:
-        planned, needed = study.participants, sized[0].enrolled
-        found["participants"] = TOO_FEW.format(planned=planned, needed=needed)
-    return found | ({"eligibility": NO_CRITERIA} if "everybody" in doubts else {})
 
 
 def _names_assessor(who_is_blinded: str) -> bool:
