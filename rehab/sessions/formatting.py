@@ -6,7 +6,7 @@ from datetime import date, datetime
 from zoneinfo import ZoneInfo
 
 from django.utils.formats import date_format, number_format
-from django.utils.translation import gettext, gettext_noop
+from django.utils.translation import gettext, gettext_noop, ngettext
 
 from rehab.people.models import Clinic
 from rehab.training.changes import STATE_LABELS, State
@@ -87,7 +87,10 @@ def format_schedule(schedule: Schedule) -> str:
         case ScheduleKind.BANDWIDTH:
             return gettext("beyond ± %(band)d %%") % values
         case ScheduleKind.FADED:
-            return gettext("fading to every %(steps)d steps") % values
+            return (
+                ngettext("fading to every step", "fading to every %(steps)d steps", values["steps"])
+                % values
+            )
         case ScheduleKind.SUMMARY:
             return gettext("summary of %(steps)d steps") % values
 

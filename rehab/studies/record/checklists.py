@@ -24,7 +24,7 @@ NO_ASSESSOR = "another word for “assessor-blinded”: no assessor is marked"
 SAID_BLINDED = "a marked assessor, or other words: “{said}” is not so, no assessor is marked"
 # Words that say that assessors are blinded, up to three words apart.
 ASSESSOR, BLINDED = r"\b(?:assessor|rater)\w*", r"\b(?:blind|mask)\w*"
-DOUBTED = {"size": "participants", "everybody": "eligibility"}  # at which answer
+IN_DOUBT = {"everybody"}  # asked only of a plan that lets a reviewer ask
 NEAR = r"\W+(?:(?!not\b)\w+\W+){0,3}?"
 SAYS_BLINDED = re.compile(f"{ASSESSOR}{NEAR}{BLINDED}|{BLINDED}{NEAR}{ASSESSOR}", re.IGNORECASE)
 # List; then one line for each item: number | words | what answers it.
@@ -179,7 +179,7 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
     """
     answers = study.facts | know(study, results)  # what happened, not what was planned
     is_unmasked, said_blinded = UNMASKED in answers["masked"], ""
-    doubts = {DOUBTED[slug]: words for slug, words in find_doubts(study).items()}
+    doubts = find_doubts(study)
     if is_unmasked and _names_assessor(answers.get("blinding", "")):
         said_blinded = answers.pop("blinding")  # a report tells one truth: GARRY's
     for name, items in ITEMS.items():
@@ -192,14 +192,13 @@ def checklist_rows(study: Study, results: Results | None) -> Iterator[dict[str, 
             if number != SUMMARY:
                 said |= {s: said.get(s, number) for s in known if s not in REPEATED}
             asked = [slug for slug in named if slug in ASKED and not answers.get(slug)]
-            asked = [slug for slug in asked if slug != "everybody"]  # it is doubted, or not asked
+            asked = [slug for slug in asked if slug in doubts or slug not in IN_DOUBT]
             lacking = [
                 SAID_BLINDED.format(said=said_blinded)
                 if said_blinded and slug == "blinding"
-                else str(ASKED[slug])
+                else doubts.get(slug, str(ASKED[slug])).rstrip(".")
                 for slug in asked
             ]
-            lacking += [doubts[slug] for slug in named if slug in doubts]
             if slugs == "-" or not (given or lacking):
                 lacking = [BY_HAND]
             if "masked" in named and is_unmasked and _says_blinded(given):

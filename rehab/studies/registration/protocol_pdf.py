@@ -8,7 +8,7 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 from django.utils.text import capfirst
-from django.utils.translation import gettext
+from django.utils.translation import gettext, ngettext
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import getSampleStyleSheet
 from reportlab.lib.units import mm
@@ -165,7 +165,9 @@ def _phase_text(phase: dict[str, Any]) -> str:
     strides, seconds = phase["strides"], phase["seconds"]
     parts = [phase["name"]]
     if strides:
-        parts.append(gettext("%(count)d strides") % {"count": strides})
+        parts.append(
+            ngettext("%(count)d stride", "%(count)d strides", strides) % {"count": strides}
+        )
     if seconds:
         parts.append(f"{seconds:g} s")
     if phase["feedback"]:
