@@ -132,9 +132,12 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
 
 
 def steer_the_robot(server: Server, walk: Walk, monitor: Page) -> None:
+    more = monitor.locator(".controls summary")  # its panel lies before the robot's
+    more.click()
     pressed(monitor, "data-levels", "0.5")
     monitor.get_by_label("Celebrate later").click()
     expect(monitor.locator("[data-show=threshold]")).to_have_text("95 %")
+    more.click()
 
 
 def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, browser):
