@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import http.client
 import ssl
 import threading
 import time
@@ -158,6 +159,8 @@ def test_each_device_is_limited_by_itself_behind_one_address(tmp_path: Path, sho
                 return int(answer.status)
         except urllib.error.HTTPError as answer:
             return answer.code
+        except http.client.RemoteDisconnected:  # who stalls on a busy machine is dropped
+            return 0
 
     with (
         run_haproxy(tmp_path / "haproxy", *ports) as (_, secure, tls),
