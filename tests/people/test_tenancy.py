@@ -121,7 +121,9 @@ def test_the_audit_log_names_no_patient_of_another_clinic(worlds):
 WHO = ["stranger", "pt of amber"]
 WHO_ELSE = ["host", "switched off", "pt of birch", "lead of amber", "lead of birch"]
 WHO_ELSE += [
-    f"{role} of {clinic}" for role in ("researcher", "device") for clinic in ("amber", "birch")
+    f"{role} of {clinic}"
+    for role in ("researcher", "sponsor", "device")
+    for clinic in ("amber", "birch")
 ]
 
 
@@ -146,7 +148,7 @@ def test_no_route_shows_a_clinic_to_others(worlds, who):
         "pt of amber",
         *(
             pytest.param(f"{role} of amber", marks=pytest.mark.long)
-            for role in ("lead", "researcher", "device")
+            for role in ("lead", "researcher", "sponsor", "device")
         ),
     ],
 )

@@ -62,6 +62,8 @@ def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
         return model.__name__ in HOST_SEES
     if actor.clinic != clinic:
         return False
+    if actor.role == "sponsor":
+        return model.__name__ == "Study"
     if model.__name__ in {"ApiToken", "AuditEntry"}:
         return actor.role == "lead"
     if actor.role == "researcher":  # the world's change is one of a patient
@@ -281,12 +283,15 @@ def what_leaks(
 
 
 def may_read_mark(actor: Actor, model: type[Model], world: World) -> bool:
-    """The own clinic and its stations may stand beside a session that an actor may read.
+    """What may stand beside a session or a study's figures that an actor may read.
 
     The mark of accounts is in the reader's own name as well: `identities` tells them apart.
     """
-    beside = {"User", "Station", "Clinic"}
-    if actor.role == "researcher" and actor.clinic == world.name and model.__name__ in beside:
+    beside = {
+        "researcher": {"User", "Station", "Clinic"},
+        "sponsor": {"User", "Clinic", "Arm"},  # of a closed study
+    }.get(actor.role, set())
+    if actor.clinic == world.name and model.__name__ in beside:
         return True
     return may_read(actor, model, world.name)
 

@@ -208,7 +208,7 @@ def build_world(name: str) -> World:
             role=role,
             clinic=clinic,
         )
-        for role in (Role.LEAD, Role.PT, Role.RESEARCHER)
+        for role in (Role.LEAD, Role.PT, Role.RESEARCHER, Role.SPONSOR)
     }
     station = Station.everywhere.create(clinic=clinic, name=mark(name, Station))
     device = Device(
