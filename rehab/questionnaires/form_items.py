@@ -79,7 +79,7 @@ def _read_item(line: str) -> FormItem:
     if words and len(line) <= MAX_LETTERS:
         if parts == [TEXT]:
             return FormItem(text=words, is_text=True)
-        choices = tuple(filter(None, map(str.strip, ",".join(parts).split(","))))
+        choices = tuple(filter(None, map(str.strip, "".join(parts[:1]).split(","))))
         if len(parts) == 1 and 2 <= len(choices) <= MAX_WORDS:
             return FormItem(text=words, most=len(choices) - 1, words=choices)
         numbers = [_read_number(part) for part in parts]

@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 
 import pytest
-from django.utils.translation import override
 
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.formatting import format_schedule
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
@@ -398,18 +396,3 @@ def test_a_taken_station_leads_to_its_session(pt, patient, station):
     page = pt.post(f"/patients/{patient.pk}/new/", choices(station)).content.decode()
     problem = re.search(r'<div class="wrong\b.*?</div>', page, re.DOTALL)[0]
     assert f'href="/sessions/{newest().pk}/monitor/"' in problem
-
-
-@pytest.mark.parametrize(
-    ("language", "words"),
-    [
-        ("en", "fading to every step"),
-        ("de", "seltener bis jeden Schritt"),
-        ("es", "cada vez menos, hasta cada paso"),
-        ("fr", "de plus en plus rare, jusqu’à chaque pas"),
-    ],
-)
-def test_a_schedule_that_comes_at_each_step_is_told_in_the_singular(language, words):
-    with override(language):
-        assert format_schedule(Schedule(ScheduleKind.FADED, 1)) == words
-        assert "3" in format_schedule(Schedule(ScheduleKind.FADED, 3))

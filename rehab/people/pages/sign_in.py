@@ -27,8 +27,8 @@ from rehab.people.sign_in.forms import FactorForm, SignInForm
 
 def landing_page(user: User) -> str:
     """Return the page to show after a sign-in that asked for none."""
-    pages = {Role.LEAD: "start", Role.PT: "start", Role.SPONSOR: "studies"}
-    return reverse(pages.get(Role(user.role), "admin:index"))
+    pages: dict[str, str] = {Role.LEAD: "start", Role.PT: "start", Role.SPONSOR: "studies"}
+    return reverse(pages.get(user.role, "admin:index"))
 
 
 def go_on(request: HttpRequest, user: User, next_url: str) -> HttpResponse:

@@ -195,9 +195,8 @@ def _feedback_text(feedback: dict[str, Any]) -> str:
 def plan_rows(document: dict[str, Any]) -> list[tuple[object, ...]]:
     """Return what is planned beside the arms: name and value, without what is left open."""
     visits, allocation = document["visits"], document["allocation"]
-    primary, *others = (
-        outcome_label(outcomes_of(document), slug) for slug in registered_outcomes(document)
-    )
+    outcomes = outcomes_of(document)
+    primary, *others = (outcome_label(outcomes, slug) for slug in registered_outcomes(document))
     factors = (f"{row['name']}: {', '.join(row['levels'])}" for row in allocation["factors"])
     months = document["months_since_stroke_at_least"]
     analysis, crossed = document.get("analysis", {}), document["design"] == "crossover"

@@ -36,7 +36,9 @@ LONG = 18  # letters of a name of which two fit on a line
 
 def outcome_label(study: Study, slug: str) -> str:
     """Return an outcome's name, translated; a further channel's is its own."""
-    return study.outcome_label(slug.removeprefix(CHANNEL))
+    if slug.startswith(CHANNEL):
+        return slug.removeprefix(CHANNEL)
+    return study.outcome_label(slug)
 
 
 def outcome_unit(study: Study, slug: str) -> str:
