@@ -27,7 +27,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         expect(pt.locator(".notes")).to_contain_text("belongs to Station 1")
         expect(tablet.locator("h1")).to_have_text("Ready.", timeout=PATIENCE_MS)
 
-        notes, patients = (pt.locator(one).bounding_box() for one in (".notes", ".list"))
+        notes, patients = (pt.locator(one).bounding_box() for one in (".notes li", ".list"))
         assert patients["y"] == pytest.approx(notes["y"] + notes["height"], abs=1)  # no gap
         pt.get_by_role("button", name="Try a demo").click()
         pt.click("text=Change something")
