@@ -16,6 +16,7 @@ from operator import attrgetter
 from rehab.people.models import User
 from rehab.sessions.log import ALARM_KINDS, FallSeverity, Remark, RobotEntry, SessionEvent
 from rehab.sessions.payloads import Message
+from rehab.training.changes import NotAllowed
 
 SHOWN_FOR = timedelta(days=30)  # on pages of the clinic; the list of incidents has all
 BY_PERSON = frozenset({"button"})  # reasons of a robot's stop that are a person's
@@ -87,6 +88,11 @@ class OpenAlarms:
     def has_fallen(self) -> bool:
         """Whether the patient fell and nobody has acknowledged it."""
         return bool(self._raised[Alarm.FALL])
+
+    def check_seen_to_fall(self) -> None:
+        """Raise NotAllowed where nothing may move: the patient fell, nobody acknowledged it."""
+        if self.has_fallen:
+            raise NotAllowed("First acknowledge the fall on the therapist’s page.")
 
     def describe(self) -> Message:
         """Return them as the therapist's page gets them."""

@@ -35,6 +35,11 @@ class StationRobots:
         for session in (live, *self._others_at_location_of(live)):
             session.robot_orders.stop(by, timezone.now(), details)
 
+    def check_arm(self, live: LiveSession) -> None:
+        """Raise NotAllowed while a patient at the robot's location lies there after a fall."""
+        for one in (live, *self._others_at_location_of(live)):
+            one.aggregate.alarms.check_seen_to_fall()
+
     async def arm(self, live: LiveSession, by: User) -> None:
         """Let the robot of a session move again, once that is committed."""
         there = (live, *self._others_at_location_of(live))

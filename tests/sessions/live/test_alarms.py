@@ -49,6 +49,28 @@ async def test_a_fall_is_told_everywhere_until_somebody_acknowledges_it(place, s
     assert (row.session_id, row.by) == (session.pk, place.pt)
 
 
+async def test_nothing_moves_before_a_fall_is_acknowledged(place, sourced):
+    session, _ = await sourced(place)
+    robot = await place.robot().open()
+    monitor = await place.monitor(session).open()
+    await monitor.say(FELL)
+    await until_open(monitor, "fall")
+    await monitor.say({"type": "robot", "order": "stop"})
+    await monitor.until(lambda event: event.get("stopped") is True)
+    assert (await monitor.change("pause"))["type"] == "done"
+    assert "acknowledge the fall" in (await monitor.change("resume"))["message"]
+    arm = {"type": "robot", "order": "arm"}
+    await monitor.say(arm)
+    assert "acknowledge the fall" in (await monitor.hear("error"))["message"]
+    assert not [frame for frame in robot.heard if frame["type"] == "arm"]
+
+    await monitor.say({"type": "remark", "what": "fall_acknowledged", "id": "a"})
+    await until_open(monitor)
+    await monitor.say(arm)
+    await robot.hear("arm")
+    assert (await monitor.change("resume"))["type"] == "done"
+
+
 async def test_a_withdrawn_fall_takes_back_no_earlier_one(place, sourced):
     session, _ = await sourced(place)
     monitor = await place.monitor(session).open()

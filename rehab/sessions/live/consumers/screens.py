@@ -35,7 +35,7 @@ from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
-from rehab.training.changes import ChangeKind, PauseReason
+from rehab.training.changes import ChangeKind, NotAllowed, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
@@ -163,7 +163,7 @@ class ScreenConsumer(Socket):
             case "change":
                 await self._change(message)
             case "robot":
-                self._order_robot(message)
+                await self._order_robot(message)
             case "remark":
                 await self._remark(message)
             case _:
@@ -219,7 +219,7 @@ class ScreenConsumer(Socket):
         with override(self.language):
             return format_refusal(problem)
 
-    def _order_robot(self, message: Message) -> None:
+    async def _order_robot(self, message: Message) -> None:
         """Stop the robot, let it move again, or drive it to its mark."""
         wanted = read_robot_order(message, self.audience, self.actor)
         if wanted is RobotOrder.DRIVE:
@@ -227,6 +227,11 @@ class ScreenConsumer(Socket):
             return
         live, actor = self._open_session(), self.actor
         if wanted is RobotOrder.ARM and isinstance(actor, User):
+            try:
+                self.runtime.robots.check_arm(live)
+            except NotAllowed as problem:
+                await self._refuse("", "refused", self._format_refusal(problem))
+                return
             # In a task, so that a stop meanwhile does not wait.
             self.start(self.runtime.robots.arm(live, actor))
         else:

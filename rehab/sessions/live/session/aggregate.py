@@ -128,11 +128,14 @@ class SessionAggregate:
     def change(self, change: Change, by: User | None, at: datetime) -> list[Row]:
         """Apply a change from the next step on and return the rows that record it.
 
-        Raises what ``SessionFold.change`` raises, and NotAllowed for what a study fixes (a log that
-        has it all the same is read as it is); the session is then as it was.
+        Raises what ``SessionFold.change`` raises, and NotAllowed for what a study fixes or while
+        nobody has seen to a fall (a log that has it all the same is read as it is); the session is
+        then as it was.
         """
         control = CONTROLS[change.kind]
         control.check_lock(self.fold.plan, change.value)
+        if change.kind == ChangeKind.RESUME:
+            self.alarms.check_seen_to_fall()
         old = control.value_for_log(self.fold)
         self.fold.change(change)
         event = SessionEvent(

@@ -68,6 +68,8 @@ class RobotOrders:
         if self._live.robot is not None:
             self._live.robot.outbox.queue({"type": "stop"})
         if self.is_stopped:
+            if self.unlogged_stop is None:  # a page that asks again is answered
+                self._live.feed.publish(robot_stopped_event(self._live.aggregate.fold, True))
             return
         self.is_stopped = True
         self.unlogged_stop = stop = RobotStop(by, at, data)
