@@ -1,7 +1,7 @@
 """Sends traces where OpenTelemetry is installed and its usual variables say where to.
 
 A trace has names, numbers and times: of a page its route, never its address, which may open a
-family's page; of a commit how much it stored (rehab/sessions/live/session/instruments.py). Nothing
+family's page; of a commit how much it stored (sessions/live/session/prometheus_metrics.py). Nothing
 of a patient.
 """
 

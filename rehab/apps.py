@@ -20,7 +20,7 @@ class RehabConfig(AppConfig):
         from rehab.exports.fhir.push import install_writer
         from rehab.models import TRACKED
         from rehab.patients import family
-        from rehab.people.audit import guards, sign_in_log
+        from rehab.people.audit import append_only_triggers, sign_in_log
         from rehab.people.audit.history import track_models
         from rehab.people.models import User
         from rehab.people.sign_in import lockout, step_up
@@ -33,7 +33,7 @@ class RehabConfig(AppConfig):
         from rehab.studies import signals as studies
 
         post_migrate.connect(install_defaults, sender=self)
-        post_migrate.connect(guards.install, sender=self)
+        post_migrate.connect(append_only_triggers.install, sender=self)
         connect_receivers()
         track_models(*TRACKED)
         sign_in_log.connect_receivers(Authenticator)

@@ -1,6 +1,6 @@
 """The models of all rooms, and the list of those with a change history."""
 
-from rehab.boards import changes, snapshots  # noqa: F401  (these register their models)
+from rehab.boards import cache_invalidation, snapshots  # noqa: F401  (these register their models)
 from rehab.boards.models import Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
@@ -16,10 +16,10 @@ from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions import (  # noqa: F401
     assessments,
     corrections,
-    incidents,
     log,
     models,
     ownership,
+    robot_incidents,
     seals,
 )
 from rehab.sessions.clinic_tests import ClinicTest

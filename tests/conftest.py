@@ -162,12 +162,12 @@ def _logs_can_be_flushed() -> Iterator[None]:
     """Lift the triggers of append-only logs where tests empty the tables after themselves."""
     from django.db import connection
 
-    from rehab.people.audit import guards
+    from rehab.people.audit import append_only_triggers
 
     flush = connection.ops.execute_sql_flush
 
     def flush_all(statements: list[str]) -> None:
-        with guards.lifted(connection.alias):
+        with append_only_triggers.lifted(connection.alias):
             flush(statements)
 
     with mock.patch.object(connection.ops, "execute_sql_flush", flush_all):

@@ -24,7 +24,7 @@ DENIAL = re.compile(
 )
 PLACES = [
     "rehab/gait/wearables",
-    "rehab/sources/intake/wearables.py",
+    "rehab/sources/intake/wearable_pipeline.py",
     "rehab/sources/ble",
     "templates/stations/sensor.html",
     "templates/patients/phone_trial.html",

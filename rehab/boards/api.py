@@ -10,7 +10,7 @@ from django.utils import timezone
 from ninja import Path, Query, Router, Schema
 
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.formatting import BoardPanel
+from rehab.boards.panels.panel_rows import BoardPanel
 from rehab.boards.panels.shared_panels import BoardViewer, make_session_panels
 from rehab.people.access import for_roles
 from rehab.people.roles import Role

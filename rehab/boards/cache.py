@@ -14,7 +14,7 @@ from threading import Lock
 
 from django.utils import timezone
 
-from rehab.boards.changes import read_changes
+from rehab.boards.cache_invalidation import read_changes
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients, find_group
 from rehab.boards.ranking.periods import period_of

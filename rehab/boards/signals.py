@@ -8,7 +8,7 @@ from typing import Any
 from django.db.models.signals import m2m_changed, post_save, pre_save
 from django.utils import timezone
 
-from rehab.boards.changes import record_changes
+from rehab.boards.cache_invalidation import record_changes
 from rehab.boards.models import Leaderboard
 from rehab.boards.snapshots import freeze_boards, update_snapshot, update_snapshots
 from rehab.people.models import Clinic, Patient

@@ -12,7 +12,7 @@ from datetime import datetime
 from django.db import models, transaction
 from django.db.models import Q, QuerySet
 
-from rehab.boards.changes import draw_token
+from rehab.boards.cache_invalidation import draw_token
 from rehab.boards.choices import Participants
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients, find_group

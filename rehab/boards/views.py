@@ -8,8 +8,8 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
-from rehab.boards.panels.formatting import BoardPanel
-from rehab.boards.panels.own_panels import make_own_panel
+from rehab.boards.panels.own_sessions_panel import make_own_panel
+from rehab.boards.panels.panel_rows import BoardPanel
 from rehab.boards.panels.shared_panels import make_session_panels, make_waiting_panels
 from rehab.people.access import actor_of, for_roles
 from rehab.people.consent.models import Purpose

@@ -24,7 +24,7 @@ from django.db.migrations.recorder import MigrationRecorder
 from pyrage.x25519 import Identity, Recipient
 
 from rehab.exports.encryption import decrypt, encrypt
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.models import User
 
 FORMAT = 1
@@ -146,7 +146,7 @@ def restore_backup(file: BinaryIO, identities: Sequence[Identity]) -> dict[str, 
             "that version, restore, and then update."
         )
     included_models = backup_models()
-    with transaction.atomic(), guards.lifted(connection.alias):
+    with transaction.atomic(), append_only_triggers.lifted(connection.alias):
         for model in included_models:  # migrations have created measures and protocols
             model._base_manager.all()._raw_delete(connection.alias)  # noqa: SLF001
         for row in serializers.deserialize("jsonl", lines):

@@ -26,9 +26,9 @@ from django.db.models import (
 from django.db.models.functions import Cast, Coalesce
 
 from rehab.people.models import User
-from rehab.sessions.conditions import CONDITIONS, RATED
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import CONDITIONS, RATED
 from rehab.training.steps import InvalidReason
 
 PAGE_ROWS = 2_000  # rows held in memory

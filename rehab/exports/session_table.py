@@ -13,9 +13,9 @@ from rehab.exports.selection import Selection
 from rehab.exports.table import Column, Table, Type
 from rehab.people.field_policy import Covariate, covariates
 from rehab.people.models import Patient
-from rehab.sessions.conditions import summarize_conditions
 from rehab.sessions.log import Remark
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import summarize_conditions
 from rehab.sessions.setup.option import AS_IS, Group, Option, OptionColumn
 from rehab.sessions.setup.options import exported_options
 from rehab.sessions.step_columns import MEASURE_UNIT

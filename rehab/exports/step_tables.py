@@ -13,9 +13,9 @@ from rehab.exports.selection import Selection
 from rehab.exports.table import Column, Table, Type
 from rehab.sessions.events.step import StepContext, patient_step
 from rehab.sessions.log import Step
+from rehab.sessions.log_fold import DamagedLog, fold_log, log_entries
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import Message
-from rehab.sessions.replay import DamagedLog, fold_log, log_entries
 from rehab.sessions.step_columns import MEASURE_UNIT, STEP_COLUMNS, StepColumn
 from rehab.training.changes import Change
 from rehab.training.fold import SessionFold

@@ -15,10 +15,10 @@ from rehab.questionnaires.clinical_tests import CLINICAL_TESTS
 from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.assessments import Assessment, assessments_with
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
 from rehab.training.scoring import RULES_VERSION

@@ -29,7 +29,7 @@ from rehab.gait.settings import check_mass
 from rehab.gait.setup.check import add_own, check_setup, compare_with_setup
 from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
-from rehab.gait.signals.frames import find_frame_problem
+from rehab.gait.signals.frame_clock import find_frame_problem
 from rehab.gait.strides import GaitInputError, Stride
 from rehab.gait.wearables import Place
 from rehab.gait.wearables.detector import WearableDetector

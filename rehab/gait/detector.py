@@ -15,7 +15,7 @@ from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.frames import FrameClock, read_frames
+from rehab.gait.signals.frame_clock import FrameClock, read_frames
 from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, LegSamples
 from rehab.gait.strides import Stride
 

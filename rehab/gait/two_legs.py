@@ -17,14 +17,14 @@ from rehab.gait.signals.filters import find_maximum
 from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, POSITION, LegSamples
 from rehab.gait.stances.analysis import Stance
 from rehab.gait.stances.limb import find_margin
-from rehab.gait.stances.plausibility import check_whole_foot
+from rehab.gait.stances.plausibility import (
+    check_carried_weight,
+    check_whole_foot,
+    is_alternating,
+    is_weight_supported,
+)
 from rehab.gait.strides import Flag, RejectionReason, Stride
 
-# Mean force of both plates over a cycle, by body weight (docs/reference/gait.md#bad-signals): a
-# handrail takes some of it, a harness up to half; nothing adds any, so that more means a wrong
-# mass, unit or plate.
-SUPPORTED_BELOW = 0.95
-WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
 # What is wrong where both feet are on a plate: then a step is no measure of the other leg's.
 UNLIKE_STEPS = {
     RejectionReason.CROSS_STEP,
@@ -35,7 +35,6 @@ UNLIKE_STEPS = {
     RejectionReason.WEIGHT,
 }
 LATEST_S = 2.5  # between two steps that are compared; later, somebody stood between them
-ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its change to running
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +118,7 @@ class TwoLegDetector(Detector):
             return False
         other = first or second
         return other is None or not (
-            other.begin_index >= this.begin_index and _end(other) <= _end(this)
+            other.begin_index >= this.begin_index and other.end <= this.end
         )
 
     def _compare_with_other_leg(
@@ -131,7 +130,7 @@ class TwoLegDetector(Detector):
         flags: list[Flag] = []
         since = max(this.begin_index, stride.index - leg.reliable_samples)
         known = _find_contacts(other, stride.index, since)
-        others = [c for c in known if c.begin_index < _end(this) and _end(c) > since]
+        others = [c for c in known if c.begin_index < this.end and c.end > since]
         first = others[0] if others else None
         second = others[1] if len(others) == 2 else None
         if self._is_overground:
@@ -139,7 +138,7 @@ class TwoLegDetector(Detector):
         if (
             is_whole
             and not self._is_alone(first, this, second)
-            and (first is None or second is None or not _is_alternating(first, this, second))
+            and (first is None or second is None or not is_alternating(first, this, second))
         ):
             if RejectionReason.LONG_STANCE not in stride.reasons:
                 reasons.append(RejectionReason.CROSS_STEP)
@@ -151,14 +150,10 @@ class TwoLegDetector(Detector):
         if ratio is None and second is not None:
             # No whole cycle was seen: a step is accurate enough to find a wrong mass.
             carried = _find_weight_ratio(this.begin_index, second.begin_index, plates, zeros_n)
-        if (
-            not self._is_overground
-            and carried is not None
-            and not WEIGHT_MIN <= carried <= WEIGHT_MAX
-        ):
-            reasons.append(RejectionReason.WEIGHT)
-        elif not self._is_overground and ratio is not None and ratio < SUPPORTED_BELOW:
-            flags.append(Flag.SUPPORTED)
+        if not self._is_overground:
+            reasons += check_carried_weight(carried)
+            if ratio is not None and is_weight_supported(ratio):
+                flags.append(Flag.SUPPORTED)
         length = None if first is None else _find_length(stride.stance, other, this.begin_index)
         is_seen = first is not None and first.is_onset_seen
         step = StepFigures(
@@ -220,20 +215,6 @@ def _find_weight_ratio(
     return load if math.isfinite(load) else None
 
 
-def _is_alternating(first: Contact, this: Contact, second: Contact) -> bool:
-    """Return whether the other foot left after this one came, and came before it left.
-
-    A foot that is alone on the floor for longer than in walking has the other one on its plate.
-    """
-    alone = second.begin_index - _end(first)
-    stance = _end(this) - this.begin_index
-    return first.begin_index < this.begin_index and 0 < alone < ALONE_MAX * stance
-
-
-def _end(contact: Contact) -> float:
-    return math.inf if contact.end_index is None else contact.end_index
-
-
 def _find_contacts(leg: LegDetector, index: int, since: int) -> list[Contact]:
     """Return a leg's contacts as they were known at sample ``index``, whatever came later.
 
@@ -252,7 +233,7 @@ def _find_contacts(leg: LegDetector, index: int, since: int) -> list[Contact]:
             if end is not None:
                 contact = replace(contact, end_index=None, end_s=None, known_index=None)  # noqa: PLW2901
         contacts.append(contact)
-        if _end(contact) <= since:
+        if contact.end <= since:
             break
     return contacts[::-1]
 

@@ -11,7 +11,7 @@ import django.utils.timezone
 from django.conf import settings
 from django.db import migrations, models
 
-import rehab.boards.changes
+import rehab.boards.cache_invalidation
 import rehab.feedback.translation
 import rehab.outbox.models
 import rehab.people.audit.history
@@ -1511,7 +1511,10 @@ class Migration(migrations.Migration):
                 ),
                 ("definition", models.TextField()),
                 ("results", models.JSONField()),
-                ("version", models.BigIntegerField(default=rehab.boards.changes.draw_token)),
+                (
+                    "version",
+                    models.BigIntegerField(default=rehab.boards.cache_invalidation.draw_token),
+                ),
                 (
                     "board",
                     models.OneToOneField(
@@ -4516,7 +4519,9 @@ class Migration(migrations.Migration):
                 (
                     "token",
                     models.BigIntegerField(
-                        default=rehab.boards.changes.draw_token, primary_key=True, serialize=False
+                        default=rehab.boards.cache_invalidation.draw_token,
+                        primary_key=True,
+                        serialize=False,
                     ),
                 ),
                 ("patient_key", models.BigIntegerField()),

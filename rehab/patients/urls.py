@@ -4,11 +4,11 @@ from django.urls import path
 
 from rehab.patients.pages import (
     caseload,
-    ending,
     family,
     first_steps,
     phone_trial,
     records,
+    session_end,
     start,
     visits,
 )
@@ -27,7 +27,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/details/", start.edit_patient, name="edit-patient"),
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
     path("patients/<int:patient_id>/screen/check/", start.check_screen, name="check-screen"),
-    path("sessions/<int:session_id>/ending/", ending.show_ending, name="ending"),
+    path("sessions/<int:session_id>/ending/", session_end.show_ending, name="ending"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),
     path("patients/<int:patient_id>/family/", family.show_links, name="family-links"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import date, datetime, time
+from datetime import date, datetime, time, timedelta
 from enum import StrEnum
 from typing import ClassVar
 
 from django.db import models
 from django.db.models import Count
+from django.utils.dateparse import parse_date, parse_time
+from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.field_policy import deleted, personal_fields
@@ -21,7 +23,13 @@ from rehab.sessions.reports.day.today import IS_OPEN, todays_sessions
 from rehab.training.changes import OPEN_STATES, State
 
 QUICK_VISIT_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
+MAX_AHEAD = timedelta(days=366)
+MAX_WEEKS = 26  # of visits that are planned at once
 QUARTER_MIN = 15
+
+
+class InvalidVisitDay(ValueError):
+    """A day or time that is no valid visit; the message says what to do."""
 
 
 class Visit(ClinicModel):
@@ -85,6 +93,30 @@ def plan_visit(patient: Patient, day: date, at: time | None) -> Visit:
         patient=patient, day=day, defaults={"clinic_id": patient.clinic_id, "at": at}
     )
     return visit
+
+
+def parse_weeks(given: str) -> int:
+    """Return for how many weeks a visit is planned. Raises InvalidVisitDay."""
+    if not (given.isascii() and given.isdecimal() and 1 <= int(given[:3]) <= MAX_WEEKS):
+        raise InvalidVisitDay(
+            gettext("Plan visits for 1 to %(most)s weeks at a time.") % {"most": MAX_WEEKS}
+        )
+    return int(given)
+
+
+def parse_day(day: str, at: str, today: date) -> tuple[date, time | None]:
+    """Return a day and an optional time. Raises InvalidVisitDay."""
+    try:
+        chosen, hour = parse_date(day), parse_time(at) if at else None
+    except ValueError:
+        chosen = hour = None
+    if chosen is None or (at and hour is None):
+        raise InvalidVisitDay(
+            gettext("Choose the day of the visit, and a time such as 10:30 if there is one.")
+        )
+    if not today <= chosen <= today + MAX_AHEAD:
+        raise InvalidVisitDay(gettext("Choose a day between today and a year from now."))
+    return chosen, hour
 
 
 def next_visit(patient_id: int, after: datetime) -> Visit | None:

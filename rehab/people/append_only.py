@@ -1,6 +1,7 @@
 """Rows that are only ever added: triggers in the database refuse every other change.
 
-A model says which changes its triggers let through; `rehab.people.audit.guards` installs them.
+A model says which changes its triggers let through; `people/audit/append_only_triggers.py` installs
+them.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from rehab.people.web.api_base import (
     responses,
 )
 from rehab.sessions.forms.initial import initial_choices
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession

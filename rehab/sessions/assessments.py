@@ -22,7 +22,7 @@ from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
 from rehab.sessions.clinic_tests import find_test, own_tests
 from rehab.sessions.formatting import MISSING, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
+from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS
 
 SPARK = (120, 32)  # the drawing of a course, in its own units
 

@@ -17,7 +17,7 @@ from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import SessionScope, TrainingSession
-from rehab.sessions.setup.walking import BELT_M_S, SUPPORT_PERCENT
+from rehab.sessions.setup.walking_conditions import BELT_M_S, SUPPORT_PERCENT
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS
 from rehab.training.summary.metrics import METRICS

@@ -20,7 +20,7 @@ from django.utils import timezone
 
 from rehab.people.append_only import Allowed, AppendOnlyModel
 from rehab.people.audit.moves import Translate, moves_of, original_keys, same_key
-from rehab.people.audit.sealing import with_floats
+from rehab.people.audit.row_digests import with_floats
 from rehab.people.field_policy import personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import Scope

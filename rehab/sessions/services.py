@@ -21,10 +21,10 @@ from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder
 from rehab.sessions.log import ALARM_KINDS, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import ask
-from rehab.sessions.setup.gestures import composed_gestures, silence_cue
+from rehab.sessions.setup.cue_gestures import composed_gestures, silence_cue
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import is_simulated
-from rehab.sessions.setup.walking import WalkingConditions
+from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.closeness import CloseSteps

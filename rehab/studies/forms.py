@@ -23,13 +23,13 @@ from rehab.studies.analysis.outcomes import OF_QUESTIONS
 from rehab.studies.arm_forms import save_arms
 from rehab.studies.arms import EARLY_MONTHS
 from rehab.studies.models import Study
+from rehab.studies.registration.allocation_secret import seal, unseal
 from rehab.studies.registration.lifecycle import check_secret
 from rehab.studies.registration.measurable import (
     SEVERAL_VISITS,
     needs_follow_up,
 )
 from rehab.studies.registration.problems import DECIDES, Problem, UnfitPlan, find_problems
-from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.registration.size import read_assumed
 from rehab.studies.size_form import STORED, AssumedForm
 from rehab.training.measures import InvalidSetting

@@ -10,7 +10,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import ACCOUNT_DELETED, Allowed, AppendOnlyModel
-from rehab.people.audit.sealing import ERASED, SealableModel
+from rehab.people.audit.row_digests import ERASED, SealableModel
 from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User

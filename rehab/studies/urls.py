@@ -2,7 +2,15 @@
 
 from django.urls import path
 
-from rehab.studies.pages import confirming, figures, participants, planning, power, record, results
+from rehab.studies.pages import (
+    confirming,
+    participants,
+    planning,
+    power,
+    record,
+    results,
+    sponsor_overview,
+)
 
 urlpatterns = [
     path("studies/", planning.list_studies, name="studies"),
@@ -42,7 +50,7 @@ urlpatterns = [
         results.download_results,
         name="study-results-file",
     ),
-    path("studies/<int:study_id>/figures/", figures.show_figures, name="study-figures"),
+    path("studies/<int:study_id>/figures/", sponsor_overview.show_figures, name="study-figures"),
     path("studies/<int:study_id>/record/", record.edit_facts, name="study-facts"),
     path(
         "studies/<int:study_id>/checklists.csv",

@@ -11,7 +11,7 @@ from django.utils.translation import gettext
 from rehab.people.models import User
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
-from rehab.sessions.setup.walking import WalkingConditions
+from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.stations.models import Station
 from rehab.studies.agreements import check_agreed
 from rehab.studies.models import StudyState

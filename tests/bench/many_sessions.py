@@ -90,7 +90,7 @@ def measure(count: int, patients: int) -> dict[str, float]:
     """Return what the first look at a board takes [s], and later ones [ms]."""
     from django.utils import timezone
 
-    from rehab.boards.changes import record_changes
+    from rehab.boards.cache_invalidation import record_changes
     from rehab.boards.models import Leaderboard
     from rehab.boards.panels.shared_panels import BoardViewer
     from rehab.people.models import Patient

@@ -37,22 +37,27 @@ PACKAGES = (
 UNMARKED = "not (bench or screenshots or browser or realtime or long)"
 
 
-class Tree:
-    """A copy of a checkout, in which one file at a time is another."""
+def take_snapshot(checkout: Path, folder: Path) -> None:
+    """Copy a checkout, which may change meanwhile."""
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=checkout, capture_output=True, text=True, check=True
+    )
+    ours = ["tests/bench/mutants.py", "tests/bench/mutation_probe.py"]
+    for name in {*listed.stdout.splitlines(), *ours}:
+        origin = ROOT if name in ours else checkout
+        if (origin / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(origin / name, folder / name)
+    (folder / "node_modules").symlink_to(checkout / "node_modules")
 
-    def __init__(self, checkout: Path, folder: Path) -> None:
-        self.checkout, self.folder, self.notes = checkout, folder / "tree", folder / "notes"
+
+class Tree:
+    """A copy of a snapshot, in which one file at a time is another."""
+
+    def __init__(self, snapshot: Path, folder: Path) -> None:
+        self.snapshot, self.folder, self.notes = snapshot, folder / "tree", folder / "notes"
         self.notes.mkdir(parents=True)
-        listed = subprocess.run(
-            ["git", "ls-files"], cwd=checkout, capture_output=True, text=True, check=True
-        )
-        ours = ["tests/bench/mutants.py", "tests/bench/mutation_probe.py"]
-        for name in {*listed.stdout.splitlines(), *ours}:
-            origin = ROOT if name in ours else checkout
-            if (origin / name).is_file():
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(origin / name, self.folder / name)
-        (self.folder / "node_modules").symlink_to(checkout / "node_modules")
+        shutil.copytree(snapshot, self.folder, symlinks=True)
 
     def run(self, *arguments: str, timeout_s: float, **notes: Path) -> str:
         """Run tests; return the end of what they print where one fails (or hangs), else ""."""
@@ -80,14 +85,14 @@ class Tree:
         for number, mutant in enumerate(chosen):
             places[mutant.file][mutant.node] = number
         for name, numbers in places.items():
-            source = (self.checkout / name).read_text()
+            source = (self.snapshot / name).read_text()
             (self.folder / name).write_text(probed(source, numbers))
         hits, passed = self.notes / "hits", self.notes / "passed"
         self.run(
             "-n", "2", "--dist", "worksteal", "tests", timeout_s=3600, HITS=hits, PASSED=passed
         )
         for name in places:
-            shutil.copy2(self.checkout / name, self.folder / name)
+            shutil.copy2(self.snapshot / name, self.folder / name)
         duration_s: dict[str, float] = {}
         for line in passed.read_text().splitlines():
             seconds, _, test = line.partition("\t")
@@ -105,7 +110,7 @@ class Tree:
     def mirror(self, file: str) -> str:
         """Return the folder of tests that mirrors a module's, or the innermost one around it."""
         folder = Path("tests", Path(file).parent.as_posix().removeprefix("rehab/"))
-        while not (self.checkout / folder).is_dir():
+        while not (self.snapshot / folder).is_dir():
             folder = folder.parent
         return f"{folder.as_posix()}/"
 
@@ -122,7 +127,7 @@ class Tree:
                     return (*failed.read_text().splitlines(), "(no end, or no start)")[0]
             return ""
         finally:
-            shutil.copy2(self.checkout / mutant.file, self.folder / mutant.file)
+            shutil.copy2(self.snapshot / mutant.file, self.folder / mutant.file)
 
 
 def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> list[str]:
@@ -146,15 +151,16 @@ def main() -> int:
     parser.add_argument("--only", choices=PACKAGES)
     parser.add_argument("--tree", type=Path, default=ROOT)
     args = parser.parse_args()
-    checkout = args.tree.resolve()
     chosen: list[Mutant] = []
-    for package in PACKAGES:
-        if args.only in (None, package):
-            made = mutants(checkout, package, random.Random(f"{args.seed} {package}"))
-            chosen += [next(made) for _ in range(args.each)]
     with tempfile.TemporaryDirectory(prefix="garry-mutants-") as folder:
+        snapshot = Path(folder, "snapshot")
+        take_snapshot(args.tree.resolve(), snapshot)
+        for package in PACKAGES:
+            if args.only in (None, package):
+                made = mutants(snapshot, package, random.Random(f"{args.seed} {package}"))
+                chosen += [next(made) for _ in range(args.each)]
         trees: SimpleQueue[Tree] = SimpleQueue()
-        first, second = (Tree(checkout, Path(folder) / name) for name in "ab")
+        first, second = (Tree(snapshot, Path(folder) / name) for name in "ab")
         tests = first.tests_of(chosen)
         trees.put(first)
         trees.put(second)

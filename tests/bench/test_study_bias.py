@@ -19,7 +19,7 @@ from scipy import stats
 
 from rehab.studies.allocation.groups import Group
 from rehab.studies.analysis.comparison import compare
-from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.design_matrix import Observation
 from rehab.studies.analysis.findings import observations
 from rehab.studies.analysis.participants import Participant, ParticipantVisit, by_arm
 from rehab.studies.simulation.example import PHASES

@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 from scipy.stats import binomtest
 
-from rehab.studies.analysis import comparison, designs
+from rehab.studies.analysis import comparison, design_matrix
 from rehab.studies.analysis.mixed_model import Floats
 from rehab.studies.analysis.participants import by_arm
 from rehab.studies.simulation.example import example_trial
@@ -92,7 +92,7 @@ def test_intervals_cover_the_effect_that_was_put_in():
 def difference_of(a: Floats, b: Floats) -> comparison.Interval:
     """Return the difference of two groups of people."""
     observed = [
-        designs.Observation(f"{arm}{number}", arm, 1, float(value))
+        design_matrix.Observation(f"{arm}{number}", arm, 1, float(value))
         for arm, values in (("A", a), ("B", b))
         for number, value in enumerate(values)
     ]

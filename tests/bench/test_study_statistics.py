@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats
 
 from rehab.studies.analysis.comparison import Difference, carry_over, compare, holm
-from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.design_matrix import Observation
 from rehab.studies.analysis.sample_size import Assumed, size_of
 from rehab.studies.analysis.sequential import blinded_size, levels
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rehab.boards import cache
 from rehab.boards.cache import read_lists
-from rehab.boards.changes import BoardChange, delete_old_changes
+from rehab.boards.cache_invalidation import BoardChange, delete_old_changes
 from rehab.boards.choices import DisplayMode, TieRule
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking import results

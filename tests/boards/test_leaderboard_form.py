@@ -9,7 +9,7 @@ from django.core.exceptions import ValidationError
 from django.urls import reverse, reverse_lazy
 
 from rehab.boards import cache
-from rehab.boards.changes import BoardChange
+from rehab.boards.cache_invalidation import BoardChange
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking import results
 from rehab.boards.validation import FIRST_DAY, LAST_DAY

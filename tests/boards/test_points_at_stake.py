@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.boards.ranking.sessions import CountedSession
+from rehab.boards.ranking.counted_sessions import CountedSession
 from rehab.training.summary.metrics import compute_metrics
 from rehab.training.valences import NEGATIVE
 from tests.support.clock import HERE

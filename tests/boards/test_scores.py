@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from rehab.boards.choices import CountedTypes
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.own_panels import Scale, make_board, scale_of
+from rehab.boards.panels.own_sessions_panel import Scale, make_board, scale_of
 from rehab.boards.ranking.anonymity import MAX_OWN, find_visible_own_rows
+from rehab.boards.ranking.counted_sessions import CountedSession
 from rehab.boards.ranking.results import own_results
-from rehab.boards.ranking.sessions import CountedSession
 from rehab.boards.ranking.standings import Standings
 from rehab.people.models import Patient
 from rehab.people.roles import Role

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.boards.panels.own_panels import make_own_panel
+from rehab.boards.panels.own_sessions_panel import make_own_panel
 from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.sessions.log import SessionMetric
 from tests.support.boards import board_of, patient_of, people_of, walk_down

@@ -21,7 +21,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
 from rehab.sessions.live.pulse import SILENT_S
-from rehab.sessions.live.session import instruments
+from rehab.sessions.live.session import prometheus_metrics
 from rehab.sessions.pages.server import metrics
 from rehab.sources import SOURCES
 from rehab.sources.arguments import make_parser as make_source_parser
@@ -146,7 +146,7 @@ def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
         writer=SimpleNamespace(backlog=0, trouble=Trouble.NONE),
     )
     monkeypatch.setattr(runtime, "peek", lambda: idle)
-    shown = generate_latest(instruments.REGISTRY).decode()
+    shown = generate_latest(prometheus_metrics.REGISTRY).decode()
     there = set(re.findall(r"^# TYPE (\w+)", shown, re.MULTILINE))
     board = json.loads((DEPLOY / "grafana" / "garry.json").read_text())
     asked = [target["expr"] for panel in board["panels"] for target in panel["targets"]]

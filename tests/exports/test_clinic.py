@@ -22,7 +22,7 @@ from rehab.exports.clinic.sealed_file import seal_everything
 from rehab.exports.clinic.tables import STAYS, clinic_paths, moving_models, moving_tables
 from rehab.exports.encryption import generate_key
 from rehab.patients.erasure import erase
-from rehab.people.audit import guards, seals
+from rehab.people.audit import append_only_triggers, seals
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.audit.moves import ClinicMove
 from rehab.people.models import Clinic, ErasureReason, Patient, User
@@ -32,8 +32,8 @@ from rehab.people.sign_in.factors.factors import Authenticator
 from rehab.people.sign_in.tokens import find_by_token
 from rehab.sessions import seals as session_seals
 from rehab.sessions.log import Step
+from rehab.sessions.log_fold import check_log
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import check_log
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Device
 from rehab.studies.participants import Enrollment
@@ -140,7 +140,7 @@ def test_seals_hold_over_several_moves_and_find_what_was_changed(world, file, ke
     clinic = Clinic.everywhere.get(name=name)
     assert ClinicMove.everywhere.filter(clinic=clinic).count() == 3  # with that of the world
     assert find_broken(clinic) == []
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         step = Step.everywhere.filter(session__clinic=clinic).first()
         Step.everywhere.filter(pk=step.pk).update(value=9.0)
     assert len(find_broken(clinic)) == 1

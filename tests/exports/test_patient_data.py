@@ -24,7 +24,7 @@ from rehab.exports.session_table import SESSIONS
 from rehab.exports.step_tables import STEPS
 from rehab.exports.tables import TABLES
 from rehab.patients.visits import plan_visit
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
@@ -168,7 +168,7 @@ def test_visits_boards_and_earlier_values_are_told(world):
 
 
 def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
-    with guards.lifted("default"), guards.lifted("default"):
+    with append_only_triggers.lifted("default"), append_only_triggers.lifted("default"):
         Step.everywhere.filter(number=4).update(value=0.1 + 0.2, time_s=1e-17, goal=1 / 3)
         Step.everywhere.filter(number=5).update(late=True)
     files = fetch(world)
@@ -196,7 +196,7 @@ def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
 def test_the_row_of_a_session_counts_the_strides_that_came_late_apart(world):
     session = walk(world.patient, "positive", [2.5, 1.5, 2.5, 1.5])
     steps = Step.everywhere.filter(session=session)
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         steps.filter(number__lte=2).update(valid=False, reasons=["odd", "late"])
         steps.filter(number=3).update(valid=False, reasons=["gap"])
     counts = {row["session"]: row["late_strides"] for row in rows_of(fetch(world)["sessions.csv"])}
@@ -243,7 +243,7 @@ def test_an_imported_session_without_steps_or_log_is_in_it(world):
     TrainingSession.everywhere.filter(pk=world.session.pk).update(
         legacy_id=7, protocol=None, trained_side=""
     )
-    with guards.lifted("default"), guards.lifted("default"):
+    with append_only_triggers.lifted("default"), append_only_triggers.lifted("default"):
         Step.everywhere.all().delete()
     row = rows_of(fetch(world)["sessions.csv"])[0]
     assert (row["imported"], row["protocol"], row["trained_side"]) == ("true", "", "")

@@ -14,8 +14,8 @@ import pytest
 from rehab.exports.research.package import Package
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.questionnaires import answer, ask, next_response
+from rehab.sessions.robot_incidents import RobotIncident
 from robot.black_box.recorder import Incident
 from robot.wire.incident import unpack
 from tests.support.recorded_stage import RecordedStage, read

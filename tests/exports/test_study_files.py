@@ -19,8 +19,8 @@ from rehab.people.roles import Role
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.enrolling import withdraw
 from rehab.studies.models import Study, StudyMark
+from rehab.studies.registration.allocation_secret import seal
 from rehab.studies.registration.lifecycle import close, revise
-from rehab.studies.registration.sealing import seal
 from tests.support.archives import rows_of
 from tests.support.studies import SEED, enrolled, new_patient, running_study
 from tests.support.walks import visit

@@ -9,7 +9,7 @@ from rehab.gait import GaitInputError, measure_strides
 from rehab.gait.__main__ import main
 from rehab.gait.recordings.readers import read_any_table, read_signals
 from rehab.gait.setup.check import check_setup
-from rehab.gait.signals.frames import find_frame_problem
+from rehab.gait.signals.frame_clock import find_frame_problem
 from tests.gait.c3d import write_c3d
 from tests.gait.walks import make_walk
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rehab.gait import LegSamples, Stride, TwoLegDetector
-from rehab.gait.signals.frames import FrameClock
+from rehab.gait.signals.frame_clock import FrameClock
 from tests.gait.faults.bench import open_walk
 from tests.gait.faults.spoil import lose, stall
 from tests.gait.faults.tally import count

@@ -262,7 +262,7 @@ USUAL = {  # what is only told, with the least and the largest of each person's 
     "lever": spread(units.LEVER_M, units.LEVER_SPREAD),
     "range": spread(units.ANGLE_RAD, units.ANGLE_SPREAD),
     "braking": BRAKING_S,
-    "alone": (0.0, two_legs.ALONE_MAX),
+    "alone": (0.0, plausibility.ALONE_MAX),
 }
 
 
@@ -290,8 +290,9 @@ RESTS_ON = {  # what each number of these modules rests on, that is no limit of 
         lag_watch.SLOPE_MOVED_S lag_watch.SCATTER_S lag_watch.SCATTER_WEIGHT continuity.SPIKES_SHARE
         checks.OWN_TOLERANCE_S one_leg.OFTEN""",
     "mechanics: plates carry a body, a foot is no longer than a shoe": """
-        two_legs.WEIGHT_MIN two_legs.WEIGHT_MAX two_legs.SUPPORTED_BELOW plausibility.LOAD_MIN
-        plausibility.LOAD_MAX checks.WEIGHT_ABOVE checks.CERTAIN_LOAD one_leg.GRAVITY_M_S2
+        plausibility.WEIGHT_MIN plausibility.WEIGHT_MAX plausibility.SUPPORTED_BELOW
+        plausibility.LOAD_MIN plausibility.LOAD_MAX
+        checks.WEIGHT_ABOVE checks.CERTAIN_LOAD one_leg.GRAVITY_M_S2
         limb.GRAVITY_M_S2 kinetics.COP_FORCE_N kinetics.COP_REACH_M contact_finder.STEP_PEAK
         contact_finder.CERTAIN contact_finder.BOUNCE_S contact_finder.STUCK_S
         contact_finder.SHORTEST_S one_leg.STRIDE_MAX_S two_legs.LATEST_S shapes.STANCE_S
@@ -330,7 +331,7 @@ MEASURED = """
     plausibility.MOMENT_DRIFT plausibility.ANGLE_RANGE_MIN plausibility.ANGLE_RANGE_MAX
     plausibility.PEAK_FROM plausibility.A2_MAX plausibility.REVERSED_SHARE units.STANCE_LOAD
     units.FORCE_SPREAD units.LEVER_M units.LEVER_SPREAD units.ANGLE_RAD units.ANGLE_SPREAD
-    lag_watch.BRAKING_S two_legs.ALONE_MAX"""
+    lag_watch.BRAKING_S plausibility.ALONE_MAX"""
 
 
 def find_numbers() -> set[str]:

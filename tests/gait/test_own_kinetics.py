@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, measure_strides
-from rehab.gait.recordings import ankle, c3d_plates
-from rehab.gait.recordings.ankle import JOINT_AHEAD_M, compute_ankle
+from rehab.gait.recordings import c3d_plates, inverse_dynamics
 from rehab.gait.recordings.columns import MARKED, find_layout, find_required, read_column_map
+from rehab.gait.recordings.inverse_dynamics import JOINT_AHEAD_M, compute_ankle
 from rehab.gait.recordings.markers import PLACES
 from rehab.gait.recordings.readers import read_any_table
 from rehab.gait.setup.check import check_setup
@@ -143,7 +143,7 @@ def test_against_a_model_whose_joint_is_the_malleolus(
     forward_n, up_n, moment_nm = raw[13:16]
     with np.errstate(divide="ignore", invalid="ignore"):
         cop_m = moment_nm / up_n
-    monkeypatch.setattr(ankle, "JOINT_AHEAD_M", ahead_m)
+    monkeypatch.setattr(inverse_dynamics, "JOINT_AHEAD_M", ahead_m)
     tip = toe if foot_from == "ankle" else malleolus + toe - heel
     leg = dict(zip(MARKED, (up_n, forward_n, cop_m, *malleolus, *knee, *tip), strict=True))
     legs = {"right": LegSamples(up_n, *compute_ankle(leg))}

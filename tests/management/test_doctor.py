@@ -8,7 +8,7 @@ from io import StringIO
 import pytest
 from django.core.management import call_command
 
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -65,7 +65,7 @@ def test_logs_are_looked_through_on_demand():
     assert status == 1
     assert f"session {session.pk} is another one by its checkpoint" in said
     TrainingSession.everywhere.filter(pk=session.pk).update(checkpoint=None)
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         Step.everywhere.filter(session=session, number=2).delete()
     assert f"session {session.pk} lacks steps" in ask(deep=True)[1]
 

@@ -24,7 +24,7 @@ from rehab.people.roles import Role
 from rehab.people.server_keys import Purpose, decrypt_text, encrypt_text, keys_of
 from rehab.people.sign_in.factors.factors import Authenticator
 from rehab.studies.models import Study
-from rehab.studies.registration.sealing import unseal
+from rehab.studies.registration.allocation_secret import unseal
 from tests.support.servers import ROOT, clean_environment, read_tables, run_python
 from tests.support.studies import SEED, running_study
 

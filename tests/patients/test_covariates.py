@@ -13,7 +13,7 @@ from rehab.people.models import ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.walking import WalkingConditions
+from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.training.measures import InvalidSetting
 from tests.support.world import NOW
 

@@ -16,7 +16,7 @@ from django.utils import timezone
 
 from rehab.management.commands.doctor import examine_seals
 from rehab.patients.retention import delete_old_logs
-from rehab.people.audit import audit_log, guards, history, seals
+from rehab.people.audit import append_only_triggers, audit_log, history, seals
 from rehab.people.audit.audit_log import Act, AuditEntry, Recent
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.audit.seals import LogSeal, find_broken, seal_logs
@@ -33,7 +33,7 @@ AUDIT, HISTORY, SEALS = (m._meta.db_table for m in (AuditEntry, HistoryEntry, Lo
 @pytest.fixture
 def logged(world: World) -> World:
     """A clinic with entries in both logs, and no seal but those that the test makes."""
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         LogSeal.everywhere.all().delete()
     for number in range(5):
         who = world.people[Role.PT]
@@ -119,7 +119,7 @@ def test_an_entry_is_counted_until_it_is_sealed(logged, monkeypatch, tmp_path):
 
 def break_into(sql: str) -> None:
     """Change a log as somebody may who has the database's password."""
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         assert run(sql)
 
 
@@ -144,7 +144,7 @@ def test_whole_chains_are_sealed_in_batches_and_hold(logged, monkeypatch):
     build_world("birch")
     total = sum(model.everywhere.count() for model in seals.sealed_models().values())
     own_seals = LogSeal.everywhere.count()  # birch's world has one of no rows
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         LogSeal.everywhere.all().delete()
     assert own_seals == 1
     assert seal_logs(LATER) == total
@@ -184,9 +184,9 @@ def test_doctor_finds_what_was_done_with_the_databases_password(logged, monkeypa
 
 def test_doctor_misses_a_trigger(logged):
     assert [one for one in examine_seals() if one.cure] == []
-    guards.remove("default")
+    append_only_triggers.remove("default")
     missing = [one.state for one in examine_seals() if "trigger" in one.state]
-    guards.install("default")
+    append_only_triggers.install("default")
     assert "the trigger garry_rehab_auditentry_delete is missing" in missing
 
 

@@ -12,7 +12,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.cache import clear_cache
-from rehab.boards.changes import BoardChange
+from rehab.boards.cache_invalidation import BoardChange
 from rehab.boards.models import Leaderboard
 from rehab.patients.erasure import erase
 from rehab.people.consent.models import Consent, Purpose

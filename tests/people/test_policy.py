@@ -23,7 +23,7 @@ from rehab.boards.snapshots import BoardSnapshot
 from rehab.checks import check_personal_fields
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.patients.erasure import erase
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.audit.audit_log import Act, record
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.field_policy import (
@@ -202,7 +202,7 @@ def test_what_is_erased_is_found_in_no_table_file_log_or_archive(tmp_path, caplo
     world = build_world("amber")
     fill_board(world)
     record(Act.VIEW, world.people[Role.PT], patient_id=world.patient.pk, now=NOW)
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         planted = plant(world)
     assert len(planted) >= 25
     before = found_in(planted, everything())

@@ -11,7 +11,7 @@ from django.utils import translation
 from rehab.patients.forms import PatientForm
 from rehab.people.ranges import NumberField, WholeNumberField, range_message
 from rehab.people.roles import Role
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.studies.models import Arm, Study
 from tests.support.world import NOW, World
 

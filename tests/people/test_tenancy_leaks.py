@@ -11,7 +11,7 @@ from django.http import HttpRequest, HttpResponse
 from django.urls import path, reverse
 from django.views.decorators.http import require_POST
 
-from rehab.boards.panels import formatting
+from rehab.boards.panels import panel_rows
 from rehab.boards.ranking import results
 from rehab.people.access import for_roles, public
 from rehab.people.audit import history_text
@@ -134,7 +134,7 @@ def test_a_public_page_with_patients_is_caught(worlds, settings):
 
 
 def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
-    for module in (results, formatting):
+    for module in (results, panel_rows):
         monkeypatch.setattr(module, "eligible_patients", lambda board: Patient.everywhere.all())
     leaks, _ = find_leaks(worlds, some_actors(worlds, "pt of amber"), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})

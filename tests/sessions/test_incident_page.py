@@ -10,8 +10,8 @@ from django.urls import reverse
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry, Recent
 from rehab.people.roles import Role
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.reports.incident import review_incident
+from rehab.sessions.robot_incidents import RobotIncident
 from robot.wire.incident import read_lines
 from tests.support.world import RECORDED, build_world, client_of
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.roles import Role
 from rehab.sessions.log import Step
-from rehab.sessions.reports.playback import play_back
+from rehab.sessions.reports.replay import play_back
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 def test_steps_that_came_too_late_are_as_quiet_as_they_were(world):
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         Step.everywhere.filter(session=world.session, number__in=(2, 4)).update(late=True)
     played = play_back(world.people[Role.PT], world.session)
     told = [patient for *_, patient, _ in played["moments"] if patient]

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import time_machine
 
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.roles import Role
@@ -118,7 +118,7 @@ def test_what_else_was_measured_stands_as_its_mean(world, patient):
     # The last two are of an invalid stride, and of the other leg.
     extras += [{"power": 2}, {"heart_rate": 1}, {"heart_rate": 1}]
     for number, extra in enumerate(extras, 1):
-        with guards.lifted("default"):
+        with append_only_triggers.lifted("default"):
             Step.everywhere.filter(session=session, number=number).update(extra=extra)
     assert "Also measured, mean heart_rate 102 · power 2.00 Notes" in read(world, session)
 

@@ -11,7 +11,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.protocols import Protocol
 from rehab.sessions.setup.recordings import check_upload, recordings_folder
 from rehab.sources.recording import read_recording
-from rehab.sources.recording.samples import is_sample
+from rehab.sources.recording.sample_recordings import is_sample
 from rehab.stations.models import Station
 from tests.support import samples
 

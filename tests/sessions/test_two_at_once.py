@@ -14,7 +14,7 @@ from django.urls import reverse
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.default_protocols import install_defaults
 from rehab.stations.models import Station

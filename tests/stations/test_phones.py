@@ -13,7 +13,7 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import WORN_LIFETIME, Device
 from rehab.stations.tokens import find_device

@@ -6,7 +6,7 @@ import pytest
 
 from rehab.sources import SOURCES
 from rehab.sources.arguments import make_parser
-from rehab.stations.programs import PROGRAMS
+from rehab.stations.sensor_programs import PROGRAMS
 
 SERVER = "http://192.168.7.2:8000"
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from rehab.studies.analysis import designs
+from rehab.studies.analysis import design_matrix
 from rehab.studies.analysis.comparison import Comparison, Interval, carry_over, compare, holm
-from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.design_matrix import Observation
 
 SEED = 38
 
@@ -106,7 +106,7 @@ def test_precision_is_that_of_the_observed_likelihood_where_visits_are_missing_b
     values, arms = two_arms(40, 2, np.random.default_rng(SEED))
     keep = np.ones((40, 2), bool)
     keep[1::2, 1] = values[1::2, 0] > 0  # the worse half of B
-    design = designs.parallel(observe(values, arms, keep=keep), ["A", "B"])
+    design = design_matrix.parallel(observe(values, arms, keep=keep), ["A", "B"])
     fitted, seen = design.fit, design.seen
     x, y = design.x[seen][:, :4], design.y[seen]  # of each arm at each visit: no baselines
     person = np.repeat(np.arange(40), 2).reshape(40, 2)[seen]
@@ -170,10 +170,10 @@ def test_a_published_data_set_with_four_visits_and_missing_ones_gives_what_r_doe
     assert found.means["B"].estimate == pytest.approx(25.040468376)
     assert found.means["G"].estimate == pytest.approx(22.619836091)
     assert one_difference(found).difference.estimate == pytest.approx(2.4206322850)
-    fitted = designs.parallel(observed, ["G", "B"]).fit
+    fitted = design_matrix.parallel(observed, ["G", "B"]).fit
     variances = [0.6361399, 2.946047, 4.2178056, 2.537326]
     assert fitted.variances == pytest.approx(variances, rel=1e-5)
-    weights = designs.parallel(observed, ["G", "B"]).weights
+    weights = design_matrix.parallel(observed, ["G", "B"]).weights
     apart = weights["B"] - weights["G"]
     assert float(apart @ fitted.plain @ apart) ** 0.5 == pytest.approx(0.7788313766)
 

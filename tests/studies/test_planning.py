@@ -15,8 +15,8 @@ from rehab.people.roles import Role
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study
+from rehab.studies.registration.allocation_secret import seal, unseal
 from rehab.studies.registration.document import digest_of
-from rehab.studies.registration.sealing import seal, unseal
 from tests.support.studies import (
     SEED,
     draft_study,

@@ -12,7 +12,7 @@ from django.db import IntegrityError, connection, transaction
 from django.db.models import ProtectedError
 
 from rehab.management.commands.doctor import examine_seals
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.audit.seals import LogSeal, find_broken, seal_logs
 from rehab.people.models import User
 from rehab.people.roles import Role
@@ -32,7 +32,7 @@ ALLOCATIONS, EVENTS, MARKS = (m._meta.db_table for m in (Allocation, StudyEvent,
 @pytest.fixture
 def study(world: World) -> Study:
     """A running study with a participant, a mark and an arm that was revealed."""
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         LogSeal.everywhere.all().delete()  # the world's, of no rows
     study = running_study(world)
     enrollment = enrolled(study, new_patient(world))
@@ -80,7 +80,7 @@ def test_doctor_and_closing_find_what_was_done_with_the_databases_password(world
     assert {seal.log for seal in LogSeal.everywhere.filter(clinic=world.clinic)} >= {
         *("Allocation", "StudyEvent", "StudyMark")
     }
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         assert run(sql)
     assert [one.state for one in examine_seals() if one.cure]
     close(study, None, LATER)
@@ -89,7 +89,7 @@ def test_doctor_and_closing_find_what_was_done_with_the_databases_password(world
 
 @pytest.mark.parametrize("sql", [sql for sql in SEEN if "DELETE" not in sql])
 def test_a_row_that_is_not_sealed_yet_is_looked_over_as_well(study, sql):
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         assert run(sql)
     assert [one for one in find_broken() if "was changed" in one]
     close(study, None, NOW)
@@ -109,7 +109,7 @@ def closing(study: Study) -> Any:
 
 def test_another_clinics_damage_is_not_this_studys(world, study):
     seal_logs(LATER)
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         LogSeal.everywhere.filter(clinic=None).update(digest="")
     close(study, None, LATER)
     assert "not as sealed" not in closing(study).about

@@ -18,9 +18,9 @@ from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import take_mark
 from rehab.studies.models import StudyMark, StudyState
 from rehab.studies.participants import Allocation
+from rehab.studies.registration.allocation_secret import seal, unseal
 from rehab.studies.registration.document import describe, digest_of
 from rehab.studies.registration.lifecycle import close, current_version, register, revise, start
-from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.visits import Place, seed_of, start_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import MEASURES, WORN_CHANNELS, InvalidSetting

@@ -26,8 +26,8 @@ from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Arm, Study
+from rehab.studies.registration.allocation_secret import seal
 from rehab.studies.registration.lifecycle import close, register, start
-from rehab.studies.registration.sealing import seal
 from rehab.studies.results.drawing import FIGURES, TABLES, write_table
 from rehab.studies.results.results import label_arms, read_results
 from rehab.studies.results.tables import HEADERS

@@ -12,8 +12,8 @@ import django
 def read(session_id: int) -> dict[str, Any]:
     """Return a session's step numbers, and whether folding its log again gives the verdicts."""
     from rehab.sessions.log import Step
+    from rehab.sessions.log_fold import log_entries
     from rehab.sessions.models import TrainingSession
-    from rehab.sessions.replay import log_entries
     from rehab.training.changes import Change
     from rehab.training.fold import SessionFold
 

@@ -22,8 +22,8 @@ from hypothesis.stateful import (
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
+from rehab.sessions.log_fold import log_entries
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import log_entries
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase

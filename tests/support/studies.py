@@ -17,8 +17,8 @@ from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Arm, Study
 from rehab.studies.participants import Enrollment
+from rehab.studies.registration.allocation_secret import seal
 from rehab.studies.registration.lifecycle import register, start
-from rehab.studies.registration.sealing import seal
 from rehab.training.measures import A2
 from tests.support.world import NOW, World, signed_in
 

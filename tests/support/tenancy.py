@@ -21,9 +21,9 @@ from rehab.exports.fhir.api import TYPES as FHIR_TYPES
 from rehab.patients.family import FamilyLink
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.stations.models import Device, Station
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment

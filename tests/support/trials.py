@@ -20,7 +20,7 @@ from django.utils import timezone
 from rehab.boards.cache import clear_cache
 from rehab.patients import family
 from rehab.patients.family import give_link
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.people.consent import models as consents
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
@@ -31,11 +31,11 @@ from rehab.people.sign_in.browser_sessions import digest_of
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.stations.models import Station
 from rehab.stations.tablets import COOKIE
 from rehab.stations.tokens import find_device
@@ -44,7 +44,7 @@ from rehab.studies.blinding import Task, give_mark
 from rehab.studies.enrolling import withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.record.adverse_events import AdverseEvent
-from rehab.studies.registration.sealing import seal
+from rehab.studies.registration.allocation_secret import seal
 from rehab.studies.visits import Place, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side
@@ -180,7 +180,9 @@ class Trial:
 
     def exchange(self) -> None:
         """Let each participant have walked what the other one has."""
-        with guards.lifted("default"):  # once: PostgreSQL locks each trigger until the end
+        with append_only_triggers.lifted(
+            "default"
+        ):  # once: PostgreSQL locks each trigger until the end
             self._exchange()
         clear_cache()
 

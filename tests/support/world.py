@@ -11,7 +11,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model, Q
 from django.test import Client
 
-from rehab.boards.changes import BoardChange
+from rehab.boards.cache_invalidation import BoardChange
 from rehab.boards.models import Leaderboard
 from rehab.boards.snapshots import BoardSnapshot
 from rehab.feedback.models import FeedbackBand, FeedbackType
@@ -38,13 +38,13 @@ from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.assessments import Assessment
 from rehab.sessions.clinic_tests import ClinicTest
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
 from rehab.sessions.live.session.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.sessions.seals import SessionSeal, seal_sessions
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset

@@ -13,8 +13,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.choices import CountedTypes, PeriodKind
 from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.counted_sessions import read_sessions
 from rehab.boards.ranking.periods import period_of
-from rehab.boards.ranking.sessions import read_sessions
 from rehab.sessions.models import TrainingSession
 
 # Settings that leave sessions out, as they would leave none out; and what they do, in words.

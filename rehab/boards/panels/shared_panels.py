@@ -14,7 +14,7 @@ from rehab.boards.cache import read_lists, read_standings
 from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
 from rehab.boards.models import Leaderboard
 from rehab.boards.panels.emptiness import explain_nothing
-from rehab.boards.panels.formatting import (
+from rehab.boards.panels.panel_rows import (
     BoardPanel,
     Total,
     date_rows,
@@ -24,10 +24,10 @@ from rehab.boards.panels.formatting import (
     to_percent,
 )
 from rehab.boards.ranking.anonymity import count_participants, find_visible_rows, has_too_few
+from rehab.boards.ranking.counted_sessions import is_kept, read_sessions
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
-from rehab.boards.ranking.sessions import is_kept, read_sessions
 from rehab.boards.ranking.standings import RankedRow, Standings
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.formatting import clinic_time

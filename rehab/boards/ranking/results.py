@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from rehab.boards.choices import Aggregation
 from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.counted_sessions import CountedSession, is_kept, read_sessions
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import period_of
-from rehab.boards.ranking.sessions import CountedSession, is_kept, read_sessions
 from rehab.sessions.models import TrainingSession
 
 # The most that one day adds to a sum, so that no board tempts a patient to overdo it.

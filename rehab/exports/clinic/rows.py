@@ -15,7 +15,7 @@ from django.db.models import Model, Q, QuerySet
 
 from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables
 from rehab.people.audit.moves import ClinicMove, Translate, same_key
-from rehab.people.audit.sealing import with_floats
+from rehab.people.audit.row_digests import with_floats
 from rehab.people.commands import command
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from rehab.studies.analysis.comparison import Difference, carry_over, compare, holm
-from rehab.studies.analysis.designs import Observation
+from rehab.studies.analysis.design_matrix import Observation
 from rehab.studies.analysis.sequential import ALPHA, levels
 
 CLOSE = 1e-9  # relative difference to the tables that rounding explains

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -34,3 +35,8 @@ class Contact:
     end_s: float | None = None
     peak_n: float = 0.0
     known_index: int | None = None
+
+    @property
+    def end(self) -> float:
+        """The index at which the foot left; infinite until then."""
+        return math.inf if self.end_index is None else self.end_index

@@ -14,7 +14,6 @@ from typing import Any, BinaryIO, NamedTuple, TextIO, cast
 
 import numpy as np
 
-from rehab.gait.recordings.ankle import add_computed
 from rehab.gait.recordings.columns import (
     CHANNELS,
     OVERGROUND,
@@ -23,6 +22,7 @@ from rehab.gait.recordings.columns import (
     ColumnMap,
     SignalColumn,
 )
+from rehab.gait.recordings.inverse_dynamics import add_computed
 from rehab.gait.recordings.table import Table
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples

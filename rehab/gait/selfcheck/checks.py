@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike
 from rehab.gait.offline import make_detector
 from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.selfcheck.lag import find_deceleration_peak
-from rehab.gait.selfcheck.one_leg import check_force, check_strides
+from rehab.gait.selfcheck.leg_checks import check_force, check_strides
 from rehab.gait.selfcheck.shapes import KNEE_LEAD, find_likeness, find_stances, make_profile
 from rehab.gait.selfcheck.unloaded import find_moment_zero, find_other_load
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
 from rehab.gait.stances.lag_watch import BRAKING_S, find_pace
+from rehab.gait.stances.plausibility import SUPPORTED_BELOW
 from rehab.gait.strides import Stride
-from rehab.gait.two_legs import SUPPORTED_BELOW
 
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
 OWN_TOLERANCE_S = 0.003  # against the same person's earlier check

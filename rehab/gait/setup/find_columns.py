@@ -37,7 +37,7 @@ from rehab.gait.setup.names import Label, find_side, names_another, read_label, 
 from rehab.gait.setup.units import CHANNEL_UNITS, MOMENT_UNITS, find_unit, is_in_units
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.frames import find_frame_problem
+from rehab.gait.signals.frame_clock import find_frame_problem
 from rehab.gait.stances.plausibility import MOMENT_MIN
 from rehab.gait.strides import GaitInputError
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rehab.gait.contacts.contact import Contact
 from rehab.gait.signals.filters import (
     Floats,
     find_last,
@@ -28,9 +29,15 @@ STANCE_MAX_S = 4.0  # 0.15 m/s after a stroke: strides of 3.4 to 5 s with 75-80 
 CUT_S = 0.02
 CUT_SHARE = 0.5
 FORCE_MAX = 2.0  # of body weight; 1.0-1.14 (six people), fast walking reaches 1.5
-# Mean force of one plate over a cycle, by body weight, where the other plate is not known: half of
-# what two may carry (``two_legs``) and, as the sound leg carries more after a stroke (60 ± 7 % when
-# standing, PMC4777057), rather more than half of the weight. Pounds for kilograms give 0.23.
+# Mean force of both plates over a cycle, by body weight (docs/reference/gait.md#bad-signals): a
+# handrail takes some of it, a harness up to half; nothing adds any, so that more means a wrong
+# mass, unit or plate.
+SUPPORTED_BELOW = 0.95
+WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
+ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its change to running
+# The same of one plate, where the other plate is not known: half of what two may carry and, as the
+# sound leg carries more after a stroke (60 ± 7 % when standing, PMC4777057), rather more than half
+# of the weight. Pounds for kilograms give 0.23.
 LOAD_MIN, LOAD_MAX = 0.25, 0.75
 # Nm/kg. Healthy people reach 0.8-2.0 (docs/reference/gait.md#usual-values), after a stroke 0.3; a
 # fast runner 3.5.
@@ -95,6 +102,28 @@ def check_force(
 def check_load(load: float) -> list[RejectionReason]:
     """Return what is wrong with the mean force of one plate over a cycle, by body weight."""
     return [RejectionReason.WEIGHT] if load < LOAD_MIN or load > LOAD_MAX else []  # neither, if NaN
+
+
+def check_carried_weight(ratio: float | None) -> list[RejectionReason]:
+    """Check the mean force of both plates, by body weight; None where it is not known."""
+    is_possible = ratio is None or WEIGHT_MIN <= ratio <= WEIGHT_MAX
+    return [] if is_possible else [RejectionReason.WEIGHT]
+
+
+def is_weight_supported(ratio: float) -> bool:
+    """Return whether a handrail or harness takes part of the weight that both plates carry."""
+    return WEIGHT_MIN <= ratio < SUPPORTED_BELOW
+
+
+def is_alternating(first: Contact, this: Contact, second: Contact) -> bool:
+    """Return whether the other foot left after this one came, and came before it left.
+
+    A foot that is alone on the floor for longer than in walking has the other one on its plate.
+    ``first``, ``second``: the other foot's contacts around this one.
+    """
+    alone = second.begin_index - first.end
+    stance = this.end - this.begin_index
+    return first.begin_index < this.begin_index and 0 < alone < ALONE_MAX * stance
 
 
 def check_whole_foot(peak_n: float, weight_n: float) -> list[RejectionReason]:

@@ -24,7 +24,7 @@ from rehab.exports.research.sinks import FORMATS
 from rehab.gait.recordings.readers import READERS
 from rehab.management.files import new_file
 from rehab.management.problem_report import write_report
-from rehab.people.audit import guards, seals
+from rehab.people.audit import append_only_triggers, seals
 from rehab.people.audit.seals import LogSeal
 from rehab.people.chores import TASK, Chore
 from rehab.people.commands import command, reinstall
@@ -33,8 +33,8 @@ from rehab.people.sign_in.first_start import count_pending_migrations
 from rehab.sessions import seals as session_seals
 from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.log_fold import DamagedLog, check_log
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import DamagedLog, check_log
 from rehab.sources import SOURCES
 from rehab.stations.models import Device
 from rehab.training.changes import OPEN_STATES, State
@@ -260,7 +260,7 @@ def examine_tokens() -> Iterator[Diagnosis]:
 
 def examine_seals() -> Iterator[Diagnosis]:
     """Diagnose the chains of the audit log and the history, and what keeps them append-only."""
-    for name in guards.find_missing(connection.alias):
+    for name in append_only_triggers.find_missing(connection.alias):
         yield Diagnosis("logs", f"the trigger {name} is missing", f"Run {command('migrate')}.")
     broken = list(seals.find_broken())
     for problem in broken[:10]:

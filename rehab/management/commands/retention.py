@@ -11,7 +11,7 @@ from django.core.management.base import BaseCommand
 from django.db import transaction
 from django.utils import timezone
 
-from rehab.boards.changes import delete_old_changes
+from rehab.boards.cache_invalidation import delete_old_changes
 from rehab.exports.research.package import discard_old
 from rehab.patients.closure import SessionStillOpen
 from rehab.patients.erasure import erase

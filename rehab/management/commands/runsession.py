@@ -27,7 +27,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import describe_cue
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.recording import Recording, RecordingError, read_recording
-from rehab.sources.recording.samples import is_sample
+from rehab.sources.recording.sample_recordings import is_sample
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule

@@ -146,7 +146,7 @@ class Command(BaseCommand):
 
 def prepare_https(*, make: bool) -> None:
     """Check port and certificate of https; make one of the clinic's own. Raises CommandError."""
-    from rehab.sessions.live.encryption import BadCertificate, make_context
+    from rehab.sessions.live.https_port import BadCertificate, make_context
 
     if settings.HOSTED:
         raise CommandError(

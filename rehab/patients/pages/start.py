@@ -26,7 +26,7 @@ from rehab.sessions.alarms import Alarm, open_alarms
 from rehab.sessions.feedback_text_updates import change_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.forms.initial import initial_choices, last_session
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
 from rehab.stations.builtin import first_station

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from datetime import date, time, timedelta
+from datetime import timedelta
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect
 from django.utils import timezone
 from django.utils.dateformat import format as format_date
-from django.utils.dateparse import parse_date, parse_time
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 from django.views.decorators.http import require_POST
 
-from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, plan_visit, suggested_time
+from rehab.patients.visits import (
+    QUICK_VISIT_DAYS,
+    InvalidVisitDay,
+    Visit,
+    parse_day,
+    parse_weeks,
+    plan_visit,
+    suggested_time,
+)
 from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.sessions.formatting import clinic_time
-
-MAX_AHEAD = timedelta(days=366)
-MAX_WEEKS = 26  # of visits that are planned at once
-
-
-class InvalidVisitDay(ValueError):
-    """A day or time that is no valid visit; the message says what to do."""
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -45,8 +45,8 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
             day = now.date() + timedelta(days=int(days))
             at = suggested_time(user, patient, now) if int(days) else None
         else:
-            day, at = _parse_day(given.get("day", ""), given.get("at", ""), now.date())
-        weeks = _parse_weeks(given.get("weeks", "1"))
+            day, at = parse_day(given.get("day", ""), given.get("at", ""), now.date())
+        weeks = parse_weeks(given.get("weeks", "1"))
     except InvalidVisitDay as problem:
         messages.error(request, str(problem))
     else:
@@ -62,27 +62,3 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
         )
         messages.success(request, message % names)
     return redirect("patient", patient_id=patient.pk)
-
-
-def _parse_weeks(given: str) -> int:
-    """Return for how many weeks a visit is planned. Raises InvalidVisitDay."""
-    if not (given.isascii() and given.isdecimal() and 1 <= int(given[:3]) <= MAX_WEEKS):
-        raise InvalidVisitDay(
-            _("Plan visits for 1 to %(most)s weeks at a time.") % {"most": MAX_WEEKS}
-        )
-    return int(given)
-
-
-def _parse_day(day: str, at: str, today: date) -> tuple[date, time | None]:
-    """Return a day and an optional time. Raises InvalidVisitDay."""
-    try:
-        chosen, hour = parse_date(day), parse_time(at) if at else None
-    except ValueError:
-        chosen = hour = None
-    if chosen is None or (at and hour is None):
-        raise InvalidVisitDay(
-            _("Choose the day of the visit, and a time such as 10:30 if there is one.")
-        )
-    if not today <= chosen <= today + MAX_AHEAD:
-        raise InvalidVisitDay(_("Choose a day between today and a year from now."))
-    return chosen, hour

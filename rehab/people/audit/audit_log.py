@@ -23,7 +23,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed
 from rehab.people.audit.history import clinic_id_of
-from rehab.people.audit.sealing import ERASED, SealableModel, has_seal, is_cut
+from rehab.people.audit.row_digests import ERASED, SealableModel, has_seal, is_cut
 from rehab.people.field_policy import erased_by, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.networks import client_address

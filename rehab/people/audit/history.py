@@ -24,7 +24,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed
 from rehab.people.audit.moves import Translate, translate_json
-from rehab.people.audit.sealing import ERASED, SealableModel, is_cut, plain
+from rehab.people.audit.row_digests import ERASED, SealableModel, is_cut, plain
 from rehab.people.field_policy import policies_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import RIGHTS, Right, Role, rights_of

@@ -21,7 +21,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed, AppendOnlyModel
 from rehab.people.audit.moves import Translate, moves_of, original_keys, same_key
-from rehab.people.audit.sealing import SealableModel
+from rehab.people.audit.row_digests import SealableModel
 from rehab.people.models import Clinic
 from rehab.people.scope import Scope
 

@@ -17,11 +17,11 @@ from rehab.people.roles import may_see_names
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.search import SessionSearchFilter
 from rehab.sessions.reports.trend import with_metrics
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.sessions.step_columns import STEP_COLUMNS
 from rehab.training.changes import OPEN_STATES, State
 

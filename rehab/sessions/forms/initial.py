@@ -11,7 +11,7 @@ from rehab.people.models import Patient, User
 from rehab.sessions.formatting import format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.gestures import choices_from_cue
+from rehab.sessions.setup.cue_gestures import choices_from_cue
 from rehab.sessions.setup.options import OPTIONS
 from rehab.sessions.setup.protocol_outline import protocol_minutes
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol

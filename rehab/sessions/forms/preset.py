@@ -10,7 +10,7 @@ from django.utils.translation import gettext
 
 from rehab.people.access import clinic_of
 from rehab.people.models import Patient, User
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.setup.options import preset_options
 from rehab.sessions.setup.presets import NAME_TAKEN, SOURCES, Preset
 

@@ -21,7 +21,7 @@ from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.process import end_tasks, move_database_log
-from rehab.sessions.live.session.instruments import LOOP_LATE_S, TASK_FAILURES
+from rehab.sessions.live.session.prometheus_metrics import LOOP_LATE_S, TASK_FAILURES
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.seals import PAUSE_S, seal_sessions
 from rehab.stations.models import Device

@@ -20,7 +20,7 @@ from twisted.protocols.tls import TLSMemoryBIOProtocol
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import server_lease
-from rehab.sessions.live.encryption import encrypt
+from rehab.sessions.live.https_port import encrypt
 from rehab.sessions.live.process import end_tasks
 from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.pulse import keep_pulse

@@ -25,7 +25,7 @@ from rehab.questionnaires.form_items import MAX_LETTERS, FormItem, total
 from rehab.sessions.assessments import Assessment, format_result, load_courses
 from rehab.sessions.clinic_tests import fix_tests
 from rehab.sessions.formatting import format_number
-from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
+from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS
 from rehab.training.measures import InvalidSetting
 
 USUAL_METERS = 10.0

@@ -30,7 +30,7 @@ from rehab.sessions.formatting import (
     format_state,
 )
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.noted import describe_noted
+from rehab.sessions.reports.remarks import describe_noted
 from rehab.sessions.reports.trend import (
     load_trend,
     metrics_by_session,

@@ -15,8 +15,8 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.reports.incident import review_incident
+from rehab.sessions.robot_incidents import RobotIncident
 from robot.wire.frames import BadFrame
 from robot.wire.incident import to_lines
 

@@ -13,7 +13,7 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
 from rehab.sessions.formatting import format_number, format_rate
 from rehab.sessions.reports.insight import ANY_GOAL, KEYS, PERIODS, Group, compare, read_view
-from rehab.sessions.reports.playback import start_of
+from rehab.sessions.reports.replay import start_of
 
 LISTED = 40  # events and notes, the newest
 

@@ -25,7 +25,7 @@ from rehab.sessions.corrections import add_note
 from rehab.sessions.log import EVENTS, FallSeverity, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.options import OPTIONS
-from rehab.sessions.setup.walking import BELT_M_S, SUPPORT_PERCENT
+from rehab.sessions.setup.walking_conditions import BELT_M_S, SUPPORT_PERCENT
 from rehab.training.changes import OPEN_STATES
 from rehab.training.plans import ROBOT_LEVELS
 

@@ -15,7 +15,7 @@ from rehab.sessions.control_text import chart_marks
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.monitor import redirect_to_consent
-from rehab.sessions.reports.playback import play_back, start_of
+from rehab.sessions.reports.replay import play_back, start_of
 from rehab.sessions.reports.review import review_session
 
 

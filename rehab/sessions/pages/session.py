@@ -18,13 +18,13 @@ from rehab.people.roles import Role, may_see_names
 from rehab.sessions.corrections import CorrectedField, can_correct, describe_corrections
 from rehab.sessions.formatting import clinic_time, format_day, format_state
 from rehab.sessions.forms.correction import CorrectionForm
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import format_incidents, format_phases, format_summary
 from rehab.sessions.reports.text_note import write_text_note
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.training.changes import OPEN_STATES, State
 from robot.wire.incident import MOTION
 

@@ -19,7 +19,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.preset import save_preset
-from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.setup.option import Group
 from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.presets import Preset

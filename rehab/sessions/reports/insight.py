@@ -21,13 +21,13 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.people.simulated import counted
-from rehab.sessions.conditions import CONDITIONS, load_conditions, name_assistance
 from rehab.sessions.corrections import CorrectedField, SessionCorrection
 from rehab.sessions.formatting import NBSP, clinic_time, format_number
 from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import CONDITIONS, load_conditions, name_assistance
 from rehab.sessions.reports.intervals import MeanInterval, mean_interval
-from rehab.sessions.reports.noted import ADVERSE, Noted, load_noted
+from rehab.sessions.reports.remarks import ADVERSE, Noted, load_noted
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.valences import VALENCES
 

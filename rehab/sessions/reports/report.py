@@ -11,7 +11,6 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
-from rehab.sessions.conditions import CONDITIONS, format_noted
 from rehab.sessions.formatting import (
     clinic_time,
     format_change,
@@ -21,8 +20,9 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import CONDITIONS, format_noted
 from rehab.sessions.reports.answers import list_answers
-from rehab.sessions.reports.noted import ADVERSE, read_noted
+from rehab.sessions.reports.remarks import ADVERSE, read_noted
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
 from rehab.sessions.reports.summary import (

@@ -12,12 +12,12 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.sessions.conditions import format_noted
 from rehab.sessions.control_text import describe_change
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import FallSeverity, PartEntry, Remark, RobotEntry, SessionEvent, Step
+from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import fold_log
+from rehab.sessions.noted_conditions import format_noted
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS, marked_kinds

@@ -10,17 +10,17 @@ from django.utils.translation import gettext
 from rehab.people.models import User
 from rehab.people.models.clinics import NOTE_PLACEHOLDERS, PLACEHOLDER
 from rehab.sessions.assessments import assessments_with
-from rehab.sessions.conditions import (
+from rehab.sessions.formatting import MISSING, clinic_time
+from rehab.sessions.log import EVENTS
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import (
     CONDITIONS,
     MEASURED,
     format_noted,
     name_assistance,
     summarize_conditions,
 )
-from rehab.sessions.formatting import MISSING, clinic_time
-from rehab.sessions.log import EVENTS
-from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.noted import Noted, read_noted
+from rehab.sessions.reports.remarks import Noted, read_noted
 from rehab.sessions.reports.review import SessionReview
 from rehab.sessions.reports.summary import format_summary
 

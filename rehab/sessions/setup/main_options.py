@@ -10,7 +10,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.feedback.translation import valence_choices
 from rehab.people.models import User
 from rehab.sessions.formatting import format_source
-from rehab.sessions.setup.gestures import (
+from rehab.sessions.setup.cue_gestures import (
     DEFAULT_GESTURE,
     GESTURE_NAMES,
     robot_gesture_choices,

@@ -16,7 +16,7 @@ from django.utils.translation import gettext
 from rehab.people.models import User
 from rehab.people.ranges import NumberField, WholeNumberField, between
 from rehab.sessions.formatting import MISSING
-from rehab.sessions.setup.walking import WalkingConditions
+from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
 

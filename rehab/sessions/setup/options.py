@@ -15,7 +15,7 @@ from typing import Any
 from rehab.sessions.setup.answer_options import ANSWER_OPTIONS
 from rehab.sessions.setup.main_options import MAIN_OPTIONS
 from rehab.sessions.setup.option import Group, Option, OptionColumn
-from rehab.sessions.setup.walking import WalkingConditions
+from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.sessions.setup.walking_options import WALKING_OPTIONS
 from rehab.training.goal_adaptation import GoalAdaptation
 from rehab.training.goals import GoalRule, Target

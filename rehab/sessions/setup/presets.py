@@ -14,7 +14,7 @@ from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import format_quantity, format_rate
-from rehab.sessions.setup.gestures import DEFAULT_GESTURE, known_gesture_choices
+from rehab.sessions.setup.cue_gestures import DEFAULT_GESTURE, known_gesture_choices
 from rehab.sessions.setup.option import OptionForm
 from rehab.sessions.setup.options import build_parts, preset_options
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol

@@ -23,7 +23,7 @@ from django.db import close_old_connections
 from django.utils.text import slugify
 from django.utils.translation import gettext
 
-from rehab.sources.recording.samples import is_sample, mark_of
+from rehab.sources.recording.sample_recordings import is_sample, mark_of
 from robot.plugins import find_names
 from robot.wire.limits import TIME_MAX_S
 

@@ -11,7 +11,7 @@ from django.conf import settings
 from rehab.people.models import Patient
 from rehab.sessions.formatting import RECORDING_PREFIX, SIMULATED_PREFIX
 from rehab.sessions.setup.recordings import recordings_folder
-from rehab.sources.recording.samples import is_sample
+from rehab.sources.recording.sample_recordings import is_sample
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 

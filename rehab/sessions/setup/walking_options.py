@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.utils.translation import gettext_lazy as _
 
 from rehab.sessions.setup.option import Group, Option, OptionColumn
-from rehab.sessions.setup.walking import (
+from rehab.sessions.setup.walking_conditions import (
     BELT_M_S,
     MAX_DEVICE_LETTERS,
     SUPPORT_PERCENT,

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from rehab.gait import Stride
-from rehab.gait.recordings.ankle import add_computed
 from rehab.gait.recordings.columns import SIDES
+from rehab.gait.recordings.inverse_dynamics import add_computed
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
@@ -30,7 +30,7 @@ from rehab.sources.intake.rows import (
 )
 from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.intake.tables import TablePlans
-from rehab.sources.intake.wearables import Sided, WearablePipeline
+from rehab.sources.intake.wearable_pipeline import Sided, WearablePipeline
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import HEART_RATE, Measurement, Side
 from robot.wire.limits import MAX_EXTRA

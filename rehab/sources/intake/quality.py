@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rehab.gait.signals.clock import SampleClock
-from rehab.gait.signals.frames import FrameClock, read_frames
+from rehab.gait.signals.frame_clock import FrameClock, read_frames
 from rehab.gait.stances.gaps import GAP_S, LATE_SAMPLE_S
 from rehab.sources.intake.alignment import Floats
 from rehab.training.steps import Measurement

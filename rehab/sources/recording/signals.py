@@ -9,7 +9,7 @@ from rehab.gait import check_signals, measure_strides
 from rehab.gait.recordings.csv_files import read_mass
 from rehab.gait.recordings.readers import read_signals
 from rehab.gait.signals.clock import estimate_rate
-from rehab.gait.signals.frames import find_frame_problem
+from rehab.gait.signals.frame_clock import find_frame_problem
 from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.recording.table import RecordingError
 from rehab.training.steps import Measurement, Side

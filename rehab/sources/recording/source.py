@@ -14,7 +14,7 @@ from pathlib import Path
 from rehab.sources.client import Display, NextStride, write_step
 from rehab.sources.recording.layouts import LAYOUTS
 from rehab.sources.recording.reading import read_recording
-from rehab.sources.recording.samples import is_sample
+from rehab.sources.recording.sample_recordings import is_sample
 from rehab.sources.reporting import Notify, SourceError
 from rehab.sources.source import PlayedSource
 from rehab.training.steps import Measurement, Side

@@ -23,7 +23,7 @@ from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import JUST_NOW, format_device_states
-from rehab.stations.programs import PROGRAMS
+from rehab.stations.sensor_programs import PROGRAMS
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)

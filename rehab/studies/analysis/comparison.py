@@ -16,8 +16,8 @@ from itertools import combinations
 import numpy as np
 from scipy.special import stdtrit
 
-from rehab.studies.analysis import designs
-from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Design, Observation
+from rehab.studies.analysis import design_matrix
+from rehab.studies.analysis.design_matrix import MIN_PARTICIPANTS, Design, Observation
 from rehab.studies.analysis.mixed_model import Estimate, Floats
 from rehab.studies.analysis.tipping_point import Missing, missing_of
 
@@ -162,7 +162,7 @@ def compare(
     walked = _walked(observations, arms)
     if not walked:
         return Comparison({}, ())
-    make = designs.crossover if crossover else designs.parallel
+    make = design_matrix.crossover if crossover else design_matrix.parallel
     return _compare(make(observations, walked), observations, paired=crossover)
 
 
@@ -180,7 +180,7 @@ def carry_over(observations: Sequence[Observation], arms: Sequence[str]) -> tupl
     walked = _walked(observations, arms)
     if len({one.period for one in observations if one.value is not None}) < 2:
         return ()
-    design = designs.crossover(observations, walked, carry_over=True)
+    design = design_matrix.crossover(observations, walked, carry_over=True)
     found = _compare(design, observations, paired=False)
     return tuple(replace(one, effect=None, missing=None) for one in found.differences)
 

@@ -8,7 +8,7 @@ from math import inf
 
 from rehab.studies.analysis.clinical_outcomes import is_of_test
 from rehab.studies.analysis.comparison import Difference, Interval, carry_over, compare
-from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
+from rehab.studies.analysis.design_matrix import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import BOUNDS
 from rehab.studies.analysis.participants import Participant
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rehab.studies.analysis.clinical_outcomes import is_of_test
 from rehab.studies.analysis.curves import Curve, Point, average, curve_of
-from rehab.studies.analysis.designs import MIN_PARTICIPANTS, Observation
+from rehab.studies.analysis.design_matrix import MIN_PARTICIPANTS, Observation
 from rehab.studies.analysis.outcomes import compute_outcomes
 from rehab.studies.analysis.phase_figures import channel_changes, describe_phases
 from rehab.studies.analysis.walk_figures import History

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.studies.analysis.designs import Design
+from rehab.studies.analysis.design_matrix import Design
 from rehab.studies.analysis.mixed_model import Estimate, Floats
 
 

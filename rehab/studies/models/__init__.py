@@ -1,7 +1,7 @@
 """Studies: what is compared, in which versions, and who must not know or may look early."""
 
 from rehab.studies.models.arm import Arm
-from rehab.studies.models.protocol import (
+from rehab.studies.models.study import (
     METHODS,
     NOT,
     SCHEDULE_FIELDS,

@@ -14,7 +14,7 @@ from rehab.sessions.formatting import format_schedule
 from rehab.sessions.setup.options import OPTIONS, build_parts
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.studies.arms import ArmRule, Condition
-from rehab.studies.models.protocol import SCHEDULE_FIELDS, Study
+from rehab.studies.models.study import SCHEDULE_FIELDS, Study
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import ROBOT_LEVELS

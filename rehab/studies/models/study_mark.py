@@ -10,10 +10,10 @@ from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.append_only import Allowed
-from rehab.people.audit.sealing import SealableModel
+from rehab.people.audit.row_digests import SealableModel
 from rehab.people.models import User
 from rehab.people.scope import Scope
-from rehab.studies.models.protocol import Study
+from rehab.studies.models.study import Study
 
 
 class StudyMark(SealableModel):

@@ -19,7 +19,7 @@ from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import User
 from rehab.sessions.alarms import UNASKED
 from rehab.sessions.log import RobotEntry, SessionEvent
-from rehab.sessions.reports.noted import ABOUT_A_FALL, read_noted
+from rehab.sessions.reports.remarks import ABOUT_A_FALL, read_noted
 from rehab.studies.models import Study, StudyMark, has_mark
 from rehab.studies.participants import Enrollment
 from rehab.studies.results.harms_and_deviations import HARMS

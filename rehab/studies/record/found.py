@@ -11,13 +11,13 @@ from rehab.people.covariates import age_band, months_since
 from rehab.sessions.log import RobotEntry
 from rehab.studies.agreements import WITHDRAWN
 from rehab.studies.analysis.comparison import Difference, Interval
-from rehab.studies.analysis.designs import MIN_PARTICIPANTS
+from rehab.studies.analysis.design_matrix import MIN_PARTICIPANTS
 from rehab.studies.analysis.participants import ArmFlow, Attendance
 from rehab.studies.guesses import guess_rows
 from rehab.studies.models import Arm, Study
 from rehab.studies.participants import StudyEvent
 from rehab.studies.record.adverse_events import Relation, listing_rows
-from rehab.studies.registration.sealing import unseal
+from rehab.studies.registration.allocation_secret import unseal
 from rehab.studies.results.harms_and_deviations import HARMS, label_of
 from rehab.studies.results.results import Results
 from rehab.training.measures import InvalidSetting

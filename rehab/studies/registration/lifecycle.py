@@ -15,9 +15,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion
 from rehab.studies.participants import Allocation, StudyEvent
+from rehab.studies.registration.allocation_secret import unseal
 from rehab.studies.registration.document import ANALYSIS, describe, digest_of
 from rehab.studies.registration.problems import check_plan
-from rehab.studies.registration.sealing import unseal
 from rehab.training.changes import OPEN_STATES
 from rehab.training.measures import InvalidSetting
 

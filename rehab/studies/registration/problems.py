@@ -12,9 +12,9 @@ from django.utils.translation import gettext
 from rehab.people.web.refusals import format_refusal
 from rehab.studies.allocation.scheme import Method
 from rehab.studies.models import Study
+from rehab.studies.registration.allocation_secret import unseal
 from rehab.studies.registration.document import describe, describe_arm
 from rehab.studies.registration.measurable import find_unmeasurable
-from rehab.studies.registration.sealing import unseal
 from rehab.studies.registration.size import size_of_study
 from rehab.training.measures import InvalidSetting
 

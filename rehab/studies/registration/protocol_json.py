@@ -9,9 +9,9 @@ from typing import Any
 
 from rehab.studies.allocation.draws import RULE
 from rehab.studies.models import Study, StudyState
+from rehab.studies.registration.allocation_secret import unseal
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.outcome_changes import outcome_changes
-from rehab.studies.registration.sealing import unseal
 
 DATES = frozenset({"registered_at", "closed_at", "at"})
 

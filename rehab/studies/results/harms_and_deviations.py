@@ -17,7 +17,7 @@ from rehab.sessions.alarms import UNASKED
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import EVENTS, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.noted import ABOUT_A_FALL, ADVERSE, read_noted
+from rehab.sessions.reports.remarks import ABOUT_A_FALL, ADVERSE, read_noted
 from rehab.studies.analysis.participants import Attendance, Participant
 from rehab.studies.models import Study
 from rehab.studies.participants import StudyEvent, StudyVisit, counts_people_alone

@@ -19,9 +19,9 @@ from django.db.models import Count, F, Max, Q, Sum
 from rehab.sessions.assessments import Assessment
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
-from rehab.sessions.replay import fold_log
 from rehab.studies.analysis.clinical_outcomes import (
     AFTER,
     FOLLOW_UP,

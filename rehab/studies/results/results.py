@@ -15,7 +15,7 @@ from rehab.sessions.formatting import clinic_time
 from rehab.studies.analysis import sequential
 from rehab.studies.analysis.comparison import Difference, holm
 from rehab.studies.analysis.curves import Point
-from rehab.studies.analysis.designs import MIN_PARTICIPANTS
+from rehab.studies.analysis.design_matrix import MIN_PARTICIPANTS
 from rehab.studies.analysis.findings import Departure, OutcomeResult
 from rehab.studies.analysis.participants import (
     CHANNEL,
@@ -27,6 +27,7 @@ from rehab.studies.analysis.participants import (
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import StudyEvent
+from rehab.studies.registration.allocation_secret import unseal
 from rehab.studies.registration.lifecycle import note
 from rehab.studies.registration.outcome_changes import (
     OutcomeChange,
@@ -34,7 +35,6 @@ from rehab.studies.registration.outcome_changes import (
     outcome_changes,
     registered_outcomes,
 )
-from rehab.studies.registration.sealing import unseal
 from rehab.studies.results.harms_and_deviations import (
     ConductRow,
     Occurrence,

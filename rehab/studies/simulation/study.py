@@ -14,9 +14,9 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, Protocol
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.models import Arm, Study, StudyState
 from rehab.studies.participants import Enrollment
+from rehab.studies.registration.allocation_secret import seal
 from rehab.studies.registration.lifecycle import close, register, start
 from rehab.studies.registration.measurable import SEVERAL_VISITS
-from rehab.studies.registration.sealing import seal
 from rehab.studies.results.results import Results, read_results
 from rehab.studies.simulation.example import ARMS, OUTCOME, PHASES, SECONDARY
 from rehab.studies.simulation.trial import Trial

@@ -1,6 +1,6 @@
 // A session's log, played: tells each page that joins what it was told then, up to the moment that is shown.
 //
-// `log` is made by rehab/sessions/reports/playback.py. A moment is counted, not only timed: several can have one time.
+// `log` is made by rehab/sessions/reports/replay.py. A moment is counted, not only timed: several can have one time.
 
 const AT_S = 0;
 const NUMBER = 1;

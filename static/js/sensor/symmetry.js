@@ -1,6 +1,6 @@
 // How unequal the steps of both legs are, by the contacts of another phone on the other leg.
 //
-// As rehab/sources/intake/wearables.py: only where both clocks agree within 10 ms.
+// As rehab/sources/intake/wearable_pipeline.py: only where both clocks agree within 10 ms.
 
 const AGREE_S = 0.01;
 const KEPT = 20;

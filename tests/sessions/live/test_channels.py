@@ -14,8 +14,8 @@ import pytest
 from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import clinic_owners
-from rehab.sessions.live.session.instruments import REGISTRY
 from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.prometheus_metrics import REGISTRY
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     change,

@@ -15,7 +15,7 @@ from opentelemetry.sdk.trace import TracerProvider
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 
-from rehab.sessions.live.session import commits, instruments
+from rehab.sessions.live.session import commits, prometheus_metrics
 from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.commits import EarlierWriteFailed, Fenced, Job
@@ -184,7 +184,7 @@ async def test_a_commit_is_traced_with_how_much_it_stored(bench, aggregates, mon
     await until_done(bench, 3)
     kept, provider = InMemorySpanExporter(), TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(kept))
-    monkeypatch.setattr(instruments, "TRACER", provider.get_tracer("test"))
+    monkeypatch.setattr(prometheus_metrics, "TRACER", provider.get_tracer("test"))
     bench.walk(aggregates[0])
     await until_done(bench, 4)
     fail_on(monkeypatch, aggregates[0].session.pk, DatabaseError("Failing row contains (Rosa)"))

@@ -7,8 +7,8 @@ from asgiref.sync import sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.clinic_owners import note_ends
+from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import fold_log
 from rehab.training.fold import SessionFold
 from tests.support.callers import a_step, change, numbers, restart
 from tests.support.evidence import lose_steps

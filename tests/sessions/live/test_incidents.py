@@ -10,8 +10,8 @@ from asgiref.sync import sync_to_async
 from django.db import OperationalError
 from django.utils import timezone
 
-from rehab.sessions import incidents
-from rehab.sessions.incidents import RobotIncident
+from rehab.sessions import robot_incidents
+from rehab.sessions.robot_incidents import RobotIncident
 from robot.wire.incident import MAX_TEXT_CHARS, pack
 from tests.support.world import RECORDED
 
@@ -66,19 +66,19 @@ async def test_a_bad_one_is_refused_and_not_kept(place, begun, wrong):
 
 
 async def test_a_session_keeps_so_many_and_no_more(place, begun, monkeypatch):
-    monkeypatch.setattr(incidents, "MAX_INCIDENTS", 2)
+    monkeypatch.setattr(robot_incidents, "MAX_INCIDENTS", 2)
     session = await begun(place)
-    store = sync_to_async(incidents.store_incident)
+    store = sync_to_async(robot_incidents.store_incident)
     kept = [await store(session.pk, timezone.now(), "bump", pack(RECORDED)) for _ in range(3)]
     assert [row.pk for row in await stored()] == kept[:2]
     assert kept[2] is None
 
 
 async def test_parts_of_the_motion_are_counted_apart(place, begun, monkeypatch):
-    monkeypatch.setattr(incidents, "MAX_INCIDENTS", 1)
-    monkeypatch.setattr(incidents, "MAX_PARTS", 2)
+    monkeypatch.setattr(robot_incidents, "MAX_INCIDENTS", 1)
+    monkeypatch.setattr(robot_incidents, "MAX_PARTS", 2)
     session = await begun(place)
-    store = sync_to_async(incidents.store_incident)
+    store = sync_to_async(robot_incidents.store_incident)
     reasons = ("motion", "bump", "motion", "bump", "motion")
     kept = [await store(session.pk, timezone.now(), one, pack(RECORDED)) for one in reasons]
     assert [key is not None for key in kept] == [True, True, True, False, False]

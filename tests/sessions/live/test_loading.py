@@ -10,13 +10,13 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError, connection
 from django.test.utils import CaptureQueriesContext
 
-from rehab.people.audit import guards
+from rehab.people.audit import append_only_triggers
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import loading
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Remark, RobotEntry, Step
+from rehab.sessions.log_fold import DamagedLog
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import DamagedLog
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.fold.checkpoints import fold_to_json
 from rehab.training.steps import Measurement, Side
@@ -80,7 +80,7 @@ def test_sessions_loaded_together_are_what_each_is_alone():
 
 def test_a_session_that_cannot_be_loaded_leaves_the_others_alone():
     whole, damaged = (walk(build_place(name), 4) for name in ("elm", "oak"))
-    with guards.lifted("default"):
+    with append_only_triggers.lifted("default"):
         Step.everywhere.filter(session=damaged, number=2).delete()
     found = loading.load_together(dict.fromkeys([whole.pk, damaged.pk, 0], 0))
     assert isinstance(found[whole.pk], loading.LoadedSession)

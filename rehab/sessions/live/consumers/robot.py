@@ -11,7 +11,6 @@ from django.db import DatabaseError
 from django.utils import timezone
 
 from rehab.sessions.alarms import UNASKED
-from rehab.sessions.incidents import store_incident
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.protocol.fields import read_fields
 from rehab.sessions.live.protocol.messages import (
@@ -23,6 +22,7 @@ from rehab.sessions.live.protocol.messages import (
 from rehab.sessions.live.session.hub import Lagged, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
+from rehab.sessions.robot_incidents import store_incident
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.frames import BadFrame

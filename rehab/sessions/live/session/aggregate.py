@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from rehab.people.models import User
 from rehab.sessions.alarms import OpenAlarms
-from rehab.sessions.conditions import CONDITIONS, planned_conditions
 from rehab.sessions.log import (
     ALARM_KINDS,
     PartEntry,
@@ -20,9 +19,10 @@ from rehab.sessions.log import (
     SessionEvent,
     SessionMetric,
 )
+from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import CONDITIONS, planned_conditions
 from rehab.sessions.payloads import change_mark
-from rehab.sessions.replay import fold_log
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
 from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold

@@ -9,7 +9,6 @@ from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 
 from rehab.people.models import User
-from rehab.sessions.conditions import find_reported
 from rehab.sessions.events.change import source_message
 from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
@@ -37,6 +36,7 @@ from rehab.sessions.log import (
     RuleEntry,
     Step,
 )
+from rehab.sessions.noted_conditions import find_reported
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State
 from rehab.training.controls import Audience

@@ -18,8 +18,7 @@ from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import MARKS, SessionAggregate, kinds_with_marks
 from rehab.sessions.live.session.live_session import RECENT_STEPS
 from rehab.sessions.log import ALARM_KINDS, RobotEntry, SessionEvent, Step
-from rehab.sessions.models import TrainingSession, find_newest
-from rehab.sessions.replay import (
+from rehab.sessions.log_fold import (
     MEASURED,
     DamagedLog,
     check_end,
@@ -27,6 +26,7 @@ from rehab.sessions.replay import (
     fold_entries,
     merge_entries,
 )
+from rehab.sessions.models import TrainingSession, find_newest
 from rehab.training.changes import OPEN_STATES
 from rehab.training.controls import CONTROLS
 

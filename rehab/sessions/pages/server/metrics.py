@@ -22,7 +22,7 @@ from rehab.people.access import public
 from rehab.people.chores import Chore
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import Trouble
-from rehab.sessions.live.session.instruments import REGISTRY
+from rehab.sessions.live.session.prometheus_metrics import REGISTRY
 from rehab.sessions.pages.server.health import find_unready
 
 

@@ -14,11 +14,11 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.choices import Aggregation, CountedTypes, Participants, PeriodKind
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.formatting import BoardPanel, date_rows, format_rows
+from rehab.boards.panels.panel_rows import BoardPanel, date_rows, format_rows
 from rehab.boards.ranking.anonymity import find_visible_own_rows
+from rehab.boards.ranking.counted_sessions import read_sessions
 from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
-from rehab.boards.ranking.sessions import read_sessions
 from rehab.boards.ranking.standings import Standings
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession

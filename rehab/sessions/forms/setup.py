@@ -20,7 +20,7 @@ from rehab.sessions.services import (
     check_station_is_free,
     create_session,
 )
-from rehab.sessions.setup.gestures import cue_from_choices
+from rehab.sessions.setup.cue_gestures import cue_from_choices
 from rehab.sessions.setup.option import OptionForm
 from rehab.sessions.setup.options import OPTIONS, build_parts
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol

@@ -11,10 +11,10 @@ from django.utils.translation import gettext, ngettext
 
 from rehab.people.models import User
 from rehab.sessions.alarms import ACKNOWLEDGMENTS
-from rehab.sessions.conditions import format_noted
 from rehab.sessions.formatting import format_number
 from rehab.sessions.log import EVENTS, FallSeverity, Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import format_noted
 
 ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
 ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # part of the fall, not of their own

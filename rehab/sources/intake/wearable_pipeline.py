@@ -11,7 +11,7 @@ import numpy as np
 from rehab.gait import GaitInputError, WearableDetector, WearableStride
 from rehab.gait.settings import check_rate
 from rehab.gait.signals.clock import SampleClock, estimate_rate
-from rehab.gait.signals.frames import FrameClock
+from rehab.gait.signals.frame_clock import FrameClock
 from rehab.sources.intake.alignment import Floats
 from rehab.sources.intake.settings import Wearable
 from rehab.sources.reporting import Notify

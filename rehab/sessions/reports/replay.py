@@ -15,7 +15,6 @@ from typing import Any
 
 from rehab.people.models import User
 from rehab.sessions.alarms import OpenAlarms
-from rehab.sessions.conditions import planned_conditions
 from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
     LiveEvent,
@@ -25,7 +24,6 @@ from rehab.sessions.events.event import (
     robot_stopped_event,
 )
 from rehab.sessions.events.snapshot import snapshot
-from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import (
     ALARM_KINDS,
     EVENTS,
@@ -36,10 +34,12 @@ from rehab.sessions.log import (
     SessionEvent,
     Step,
 )
+from rehab.sessions.log_fold import DamagedLog, log_rows, to_change
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import planned_conditions
 from rehab.sessions.payloads import Message
-from rehab.sessions.replay import DamagedLog, log_rows, to_change
 from rehab.sessions.reports.incident import review_incident
+from rehab.sessions.robot_incidents import RobotIncident
 from rehab.training.controls import CONTROLS, Audience
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.sessions.conditions import find_reported, format_noted, summarize_conditions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.noted_conditions import find_reported, format_noted, summarize_conditions
 from rehab.sessions.reports.insight import Walked, compare
 from tests.support.world import NOW
 

@@ -12,8 +12,8 @@ from django.utils.translation import gettext
 from rehab.boards.choices import NameStyle
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.anonymity import VisibleRow
+from rehab.boards.ranking.counted_sessions import PERCENT_METRICS
 from rehab.boards.ranking.eligibility import eligible_patients
-from rehab.boards.ranking.sessions import PERCENT_METRICS
 from rehab.people.aliases import format_alias
 from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
