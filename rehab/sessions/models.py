@@ -144,7 +144,7 @@ class TrainingSession(ClinicModel):
         help_text=_("Arguments of the source that the server runs."),
     )
     plan = models.JSONField(_("plan"))
-    # How the patient walked (setup/walking.py); for analyses, and in no score.
+    # How the patient walked (setup/walking_conditions.py); for analyses, and in no score.
     device = models.CharField(_("device"), max_length=MAX_DEVICE_LETTERS, blank=True)
     belt_speed_m_s = models.FloatField(_("belt speed (m/s)"), null=True, blank=True)
     weight_support_percent = models.FloatField(_("body-weight support (%)"), null=True, blank=True)
