@@ -14,7 +14,7 @@ from robot.marking import gettext_noop
 
 # By language: the longest phrase, and the longest word in it, that the largest words have room for
 # on a tablet (tests/browser/test_word_sizes.py). Of a language that is not here: the last of them.
-LENGTHS = {"en": (24, 12), "de": (30, 13), "es": (30, 13), "fr": (30, 13)}
+LENGTHS = {"en": (24, 10), "de": (30, 10), "es": (30, 11), "fr": (30, 10)}
 APART = 6  # phrases that come before one may come again, where a pool has at least twice as many
 
 
@@ -110,7 +110,7 @@ STRONG = join(
 )
 
 STRONGEST = join(
-    gettext_noop("Outstanding!"),
+    gettext_noop("Stunning!"),
     gettext_noop("Excellent!"),
     gettext_noop("Superb!"),
     gettext_noop("Fantastic!"),

@@ -99,8 +99,7 @@ def look(page: Page, side: str, screen: str, text: str, degree: float | None) ->
           const { dataset, style } = document.body;
           if (column) dataset.column = column;
           else delete dataset.column;
-          if (column) delete dataset.side;
-          else dataset.side = side;
+          dataset.side = column || side;
           dataset.text = text;
           if (degree) dataset.pxPerMm = 1;
           else delete dataset.pxPerMm;

@@ -32,18 +32,20 @@ export function createFeedback(body) {
     return true;
   }
 
-  function setPhrase(text) {
-    if (words.textContent === text) return;
-    const line = document.createElement("span");
-    line.textContent = text;
-    words.replaceChildren(line);
+  function setLines(element, text) {
+    const lines = text.split("\n");
+    if (element.textContent === lines.join("")) return;
+    element.replaceChildren(
+      ...lines.map((line) => Object.assign(document.createElement("span"), { textContent: line })),
+    );
   }
 
   function drawStep(session) {
     const step = session.last;
-    setPhrase(phraseOf(step));
+    setLines(words, phraseOf(step));
     emblem.dataset.emblem = step?.kind === "missing" ? "none" : (step?.emblem ?? "");
     emblem.toggleAttribute("data-hit", Boolean(step?.hit && !step.close));
+    emblem.toggleAttribute("data-more", step?.points === 0 && !step.hit && !step.close);
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
@@ -85,8 +87,8 @@ export function createFeedback(body) {
       isAlone: body.classList.contains("alone"),
       silent_s: page.silent_s,
     });
-    setPhrase(text);
-    set(sub, more);
+    setLines(words, text);
+    setLines(sub, more);
     set(live, `${text} ${more}`);
     if (screen === "calm") drawPart(session);
   };

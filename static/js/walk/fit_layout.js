@@ -26,7 +26,8 @@ const SCALE_LEAST = 260; // of the thermometer
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const INSET = 56; // of the thermometer where all is in the middle of a high screen
+const GAP = 24; // between total, badge and thermometer
+const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -46,9 +47,11 @@ export function createFitting(body, scene) {
   const landscape = matchMedia("(orientation: landscape)");
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
+  const numberRange = document.createRange();
   let [fitted, widest] = ["", ""];
 
   const unit = () => parseFloat(getComputedStyle(main).right) / EDGE; // walk.css
+  const badgeWidth = () => Number(getComputedStyle(body).getPropertyValue("--badge")); // walk.css
   const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
 
   // Return whether a message fits between header and buttons. By its parts' lines: letters reach beyond theirs.
@@ -72,6 +75,8 @@ export function createFitting(body, scene) {
     }
     const u = unit();
     const total = count.offsetHeight / u;
+    numberRange.selectNodeContents(key);
+    const wide = numberRange.getBoundingClientRect().width / u;
     words.replaceChildren(...[was[0]].filter(Boolean));
     key.textContent = was[1];
     if (was[2] !== undefined) key.dataset.lost = was[2];
@@ -91,7 +96,9 @@ export function createFitting(body, scene) {
     const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
     const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
-    const inset = column === "center" && !landscape.matches ? INSET : 0;
+    // In the middle stands the thermometer together with what is beside it.
+    const beside = isRow ? wide + (badge && GAP + badgeWidth()) : Math.max(wide, badge);
+    const inset = column === "center" ? Math.max(0, (width - beside - GAP - SCENE) / 2 - EDGE) : 0;
     const below = goal + reach + AIR - main.offsetTop / u;
     return { width, height, isWide, inset, top, zero, goal, reach, below };
   }
@@ -101,6 +108,7 @@ export function createFitting(body, scene) {
     if (short < 1) body.dataset.short = short.toFixed(4);
     else delete body.dataset.short;
     body.style.setProperty("--short", short);
+    body.style.setProperty("--inset", 0);
   }
 
   // Return the largest size of words, in shares of the promised one, at which a layout holds all.
@@ -148,6 +156,7 @@ export function createFitting(body, scene) {
     body.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
     body.style.setProperty("--above", `${found.below * unit()}px`);
+    body.style.setProperty("--inset", found.inset);
     scene.layOut({ ...found, isFlipped: side === "left" });
   };
 }

@@ -19,7 +19,6 @@ export function createScene(svg) {
   const find = (selector) => svg.querySelector(selector);
   const thermometer = find(".thermometer");
   const liquid = find(".liquid");
-  const arrow = find(".way");
   const ticks = TICKS.map(() => append(find(".ticks"), "path"));
   const dots = createDots(svg);
   let layout, shown;
@@ -84,8 +83,6 @@ export function createScene(svg) {
     const height = performance === null ? layout.zero + 60 : level;
     liquid.style.transform = `translateY(${height}px)`;
     ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));
-    const goesOn = performance > 0 && !hit && !close && level - 20 > y(1) + 14;
-    arrow.setAttribute("d", goesOn ? `M0 ${level - 20}V${y(1) + 14}` : "");
     thermometer.dataset.hit = hit && !close ? "yes" : "no";
     thermometer.toggleAttribute("data-missing", performance === null);
     thermometer.toggleAttribute("data-over", performance > TOP);

@@ -5,6 +5,7 @@ import { _, fill, n_, number } from "garry/shared/language";
 
 const SAFE = _("Your score is safe.");
 const KEEP_WALKING = _("Keep walking if you feel well.");
+const sentences = (...all) => all.filter(Boolean).join("\n");
 
 // Return what a screen without a step says: [the phrase, the line below it].
 // `isAlone`: on a tablet that cannot go on by itself; `silent_s`: how long the server has said nothing.
@@ -29,14 +30,11 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "waiting":
       return [_("Waiting for the sensor."), _("Please wait. No score yet.")];
     case "lost":
-      return [_("No signal from the sensor."), `${KEEP_WALKING} ${safe}`];
+      return [_("No signal from the sensor."), sentences(KEEP_WALKING, safe)];
     case "still":
-      return [_("No steps measured."), `${KEEP_WALKING} ${safe}`];
+      return [_("No steps measured."), sentences(KEEP_WALKING, safe)];
     case "paused":
-      return [
-        _("Pause."),
-        [_("Rest now."), isAlone && _("Your therapist will start again."), safe].filter(Boolean).join(" "),
-      ];
+      return [_("Pause."), sentences(_("Rest now."), isAlone && _("Your therapist will start again."), safe)];
     case "ask":
       return [_("End this session?"), safe];
     case "offline":
@@ -86,7 +84,7 @@ const NOT_MEASURED = _("Step not measured.");
 export function phraseOf(step) {
   if (step?.kind === "missing") return NOT_MEASURED;
   if (typeof step?.goal !== "number") return step?.words ?? "";
-  return step.words || fill(_("The goal is %(goal)s."), { goal: number(step.goal, 2) });
+  return step.words || fill(_("Goal: %(goal)s"), { goal: number(step.goal, 2) });
 }
 
 // Return the longest phrases that may follow a step, and a number as wide as most.
