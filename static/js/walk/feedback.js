@@ -34,10 +34,9 @@ export function createFeedback(body) {
 
   function setLines(element, text) {
     const lines = text.split("\n");
-    if (element.textContent === lines.join("")) return;
-    element.replaceChildren(
-      ...lines.map((line) => Object.assign(document.createElement("span"), { textContent: line })),
-    );
+    if (element.textContent === lines.join(" ")) return;
+    const spans = lines.map((line) => Object.assign(document.createElement("span"), { textContent: line }));
+    element.replaceChildren(...spans.flatMap((span, i) => (i ? [" ", span] : [span])));
   }
 
   function drawStep(session) {
