@@ -82,7 +82,7 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
             Bar(
                 label,
                 _("%(hits)s of 10") % {"hits": out_of_ten(one.hit_rate)},
-                round(100 * one.hit_rate, 1),
+                10 * out_of_ten(one.hit_rate),  # as long as its words say
             )
             for label, one in labeled
         ],
@@ -125,7 +125,7 @@ def _find_facts(
     row = rows.filter(session=session).values_list("value", flat=True).first()
     if rewards and row:
         earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
-        label = _("Most in a row so far") if earlier and row > earlier else _("Most in a row")
+        label = _("Longest streak so far") if earlier and row > earlier else _("Longest streak")
         facts.append((label, format_number(row, 0)))
     count = before.count() + 1
     if is_milestone(count):
