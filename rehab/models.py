@@ -10,7 +10,7 @@ from rehab.people import chores, server_keys  # noqa: F401
 from rehab.people.audit import moves  # noqa: F401
 from rehab.people.consent import tombstones  # noqa: F401
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.sign_in import attempts, resets  # noqa: F401
+from rehab.people.sign_in import attempt_counter, resets  # noqa: F401
 from rehab.people.sign_in.factors import factors  # noqa: F401
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions import (  # noqa: F401

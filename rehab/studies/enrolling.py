@@ -14,7 +14,7 @@ from rehab.people.consent.services import active_consents
 from rehab.people.models import Patient, User
 from rehab.sessions.formatting import clinic_time
 from rehab.studies.agreements import WITHDRAWN, StudyConsent, check_consent
-from rehab.studies.allocation.groups import Allocated
+from rehab.studies.allocation.groups_and_strata import Allocated
 from rehab.studies.models import Study, StudyState
 from rehab.studies.participants import Allocation, Enrollment, Screening, StudyEvent, StudyVisit
 from rehab.studies.registration.lifecycle import (

@@ -16,7 +16,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.studies.allocation.crossover import crossover_groups
-from rehab.studies.allocation.groups import Group
+from rehab.studies.allocation.groups_and_strata import Group
 from rehab.studies.analysis.blinding_index import bang_index, james_index
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Enrollment, StudyEvent

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from rehab.studies.allocation.groups import Group
+from rehab.studies.allocation.groups_and_strata import Group
 from rehab.studies.analysis.comparison import compare
 from rehab.studies.analysis.design_matrix import Observation
 from rehab.studies.analysis.findings import observations

@@ -51,7 +51,7 @@ def exported(user: User, folder: Path, study: Study) -> dict[str, str]:
 
 def secret_of(method: str) -> Secret:
     if method == "list":
-        from rehab.studies.allocation.groups import Factor, Group
+        from rehab.studies.allocation.groups_and_strata import Factor, Group
         from rehab.studies.allocation.lists import read_list
 
         groups = (Group(("A",)), Group(("B",)))

@@ -13,7 +13,7 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in.attempts import SignInAttempts
+from rehab.people.sign_in.attempt_counter import SignInAttempts
 from rehab.people.sign_in.factors import factors
 from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from tests.support import accounts

@@ -13,8 +13,8 @@ from django.utils import timezone
 from rehab.people.models import Clinic, User
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.people.sign_in import attempts
-from rehab.people.sign_in.attempts import SignInAttempts
+from rehab.people.sign_in import attempt_counter
+from rehab.people.sign_in.attempt_counter import SignInAttempts
 from rehab.people.sign_in.browser_sessions import LAST_ACTIVITY_AT, SIGNED_IN_AT
 from tests.support.accounts import PASSWORD, add_account, enter, is_in
 
@@ -318,10 +318,12 @@ def test_guessing_the_old_password_at_an_open_screen_is_counted(client, pt):
 
 @pytest.mark.django_db
 def test_an_address_stays_known_for_a_month_while_old_failures_are_deleted():
-    known, stranger = (attempts.Limit("password", 5, address=address) for address in "ab")
+    known, stranger = (attempt_counter.Limit("password", 5, address=address) for address in "ab")
     then = timezone.now()
-    attempts.count([known, stranger], then)
-    attempts.forget([known], then)
-    attempts.count([attempts.Limit("password", 5, address="c")], then + timedelta(days=29))
-    assert attempts.is_known(known, then + timedelta(days=29))
+    attempt_counter.count([known, stranger], then)
+    attempt_counter.forget([known], then)
+    attempt_counter.count(
+        [attempt_counter.Limit("password", 5, address="c")], then + timedelta(days=29)
+    )
+    assert attempt_counter.is_known(known, then + timedelta(days=29))
     assert not SignInAttempts.everywhere.filter(key=stranger.key).exists()

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from rehab.studies.allocation import blocks, lists, minimization
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups, williams_orders
 from rehab.studies.allocation.draws import RULE, Draws
-from rehab.studies.allocation.groups import Allocated, Factor, Group
+from rehab.studies.allocation.groups_and_strata import Allocated, Factor, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
 from rehab.studies.arms import ArmRule, Condition, check_arms, check_channels
 from rehab.training.measures import InvalidSetting

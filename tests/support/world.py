@@ -30,7 +30,7 @@ from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import BoardsConsent, Clinic, Patient, SignOnGroup, User
 from rehab.people.roles import Role
 from rehab.people.server_keys import ServerKey
-from rehab.people.sign_in.attempts import SignInAttempts
+from rehab.people.sign_in.attempt_counter import SignInAttempts
 from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken

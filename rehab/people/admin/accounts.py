@@ -21,7 +21,7 @@ from rehab.people.access import user_of
 from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in import attempts, resets
+from rehab.people.sign_in import attempt_counter, resets
 from rehab.people.sign_in.factors import factors
 from rehab.people.web.admin_base import ScopedOptions, TrackedAdmin, asks_who_it_is, rights_for
 from rehab.people.web.row_forms import with_values
@@ -68,7 +68,7 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         for account in accounts:
             with transaction.atomic():
                 record_security_change(Act.UNLOCK, request, account, timezone.now())
-                attempts.forget_all(account)
+                attempt_counter.forget_all(account)
         message = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, message % {"count": accounts.count()})
 

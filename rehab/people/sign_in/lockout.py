@@ -22,8 +22,8 @@ from django.utils.translation import ngettext
 from rehab.people.audit import sign_in_log
 from rehab.people.models import User
 from rehab.people.networks import client_address
-from rehab.people.sign_in import attempts
-from rehab.people.sign_in.attempts import Limit
+from rehab.people.sign_in import attempt_counter
+from rehab.people.sign_in.attempt_counter import Limit
 from rehab.people.sign_in.hashing import BUSY_S, HashingBusy
 
 FACTORS = ("code", "passkey")  # the credentials of second factors
@@ -43,7 +43,7 @@ def limits_of(request: HttpRequest, credentials: Credentials, now: datetime) -> 
     address = client_address(request)
     own = _password_limit(name, address)
     limits = [own, Limit("address", ADDRESS_FAILURES, address=address)]
-    if not attempts.is_known(own, now):
+    if not attempt_counter.is_known(own, now):
         limits.append(Limit("name", NAME_FAILURES, name))
     return limits
 
@@ -55,7 +55,7 @@ def _password_limit(name: str, address: str) -> Limit:
 def is_allowed(request: HttpRequest, credentials: Credentials) -> bool:
     """Count an attempt; return whether it may be checked."""
     now = timezone.now()
-    wait = attempts.count(limits_of(request, credentials, now), now)
+    wait = attempt_counter.count(limits_of(request, credentials, now), now)
     _note_lockout(request, wait)
     return not wait
 
@@ -71,7 +71,9 @@ def record_lockout(
         return
     now = timezone.now()
     if not lockout_s(request):
-        _note_lockout(request, attempts.time_to_wait(limits_of(request, credentials, now), now))
+        _note_lockout(
+            request, attempt_counter.time_to_wait(limits_of(request, credentials, now), now)
+        )
     if lockout_s(request):
         sign_in_log.record_lockout(credentials.get("username"), request)
 
@@ -79,14 +81,14 @@ def record_lockout(
 def take_back(request: HttpRequest | None, **credentials: str) -> None:
     """Take back an attempt that was right, or was not checked after all."""
     if request is not None:
-        attempts.take_back(limits_of(request, credentials, timezone.now()))
+        attempt_counter.take_back(limits_of(request, credentials, timezone.now()))
 
 
 def forget_failures(request: HttpRequest, user: User, now: datetime) -> None:
     """Forget the failures of an account that has just signed in, here."""
     password = _password_limit(user.username, client_address(request))
     of_factors = [Limit(kind, OWN_FAILURES, user.username) for kind in FACTORS]
-    attempts.forget([password, *of_factors], now)
+    attempt_counter.forget([password, *of_factors], now)
 
 
 def lockout_s(request: HttpRequest) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from rehab.studies.allocation.draws import Draws
-from rehab.studies.allocation.groups import Group
+from rehab.studies.allocation.groups_and_strata import Group
 from rehab.training.measures import InvalidSetting
 
 MAX_BLOCK = 64

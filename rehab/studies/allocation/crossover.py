@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
 
-from rehab.studies.allocation.groups import Group
+from rehab.studies.allocation.groups_and_strata import Group
 from rehab.training.measures import InvalidSetting
 
 MAX_VISITS = 60

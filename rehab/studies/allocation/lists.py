@@ -6,7 +6,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rehab.studies.allocation.groups import Factor, Group, check_levels, find_group
+from rehab.studies.allocation.groups_and_strata import Factor, Group, check_levels, find_group
 from rehab.training.measures import InvalidSetting
 
 MAX_ENTRIES = 10_000

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from rehab.studies.allocation.draws import Draws
-from rehab.studies.allocation.groups import Allocated, Group
+from rehab.studies.allocation.groups_and_strata import Allocated, Group
 from rehab.training.measures import InvalidSetting
 
 # Of taking the best group: with 0.8 groups stay near balance, and the next one is hard to guess

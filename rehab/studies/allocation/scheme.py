@@ -10,7 +10,7 @@ from hashlib import sha256
 from typing import Any
 
 from rehab.studies.allocation import blocks, lists, minimization
-from rehab.studies.allocation.groups import (
+from rehab.studies.allocation.groups_and_strata import (
     Allocated,
     Factor,
     Group,

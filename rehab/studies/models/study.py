@@ -18,7 +18,7 @@ from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 from rehab.sessions.clinic_tests import own_tests
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
-from rehab.studies.allocation.groups import Factor, Group
+from rehab.studies.allocation.groups_and_strata import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
 from rehab.studies.analysis.outcomes import Outcome, outcomes_with

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rehab.studies.allocation.groups import Group
+from rehab.studies.allocation.groups_and_strata import Group
 from rehab.studies.simulation.trial import Trial
 from rehab.studies.simulation.walkers import Population
 from rehab.training.goals import GoalRule

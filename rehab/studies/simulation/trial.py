@@ -9,7 +9,7 @@ from operator import attrgetter
 
 from rehab.sources.synthetic import SyntheticWalker
 from rehab.studies.allocation.crossover import VisitPlan
-from rehab.studies.allocation.groups import Allocated, Group
+from rehab.studies.allocation.groups_and_strata import Allocated, Group
 from rehab.studies.allocation.scheme import Method, Scheme, Secret
 from rehab.studies.analysis.comparison import Difference, compare
 from rehab.studies.analysis.findings import observations
