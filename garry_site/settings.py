@@ -124,7 +124,7 @@ MIDDLEWARE = [
     "rehab.people.web.language.LanguageMiddleware",
     "rehab.people.web.language.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
-    "rehab.sessions.pages.server.whereabouts.ClinicServerMiddleware",
+    "rehab.sessions.pages.server.redirect_to_owner.ClinicServerMiddleware",
     "rehab.people.sign_in.lockout.LockoutMiddleware",
 ]
 ROOT_URLCONF = "garry_site.urls"

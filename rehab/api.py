@@ -27,7 +27,7 @@ from rehab.people.models import User
 from rehab.people.web.api_base import PerUserThrottle, Rejected, SessionAuth, TokenAuth, check_roles
 from rehab.sessions import api as sessions
 from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
-from rehab.sessions.pages.server.whereabouts import at_clinics_server, redirect_call
+from rehab.sessions.pages.server.redirect_to_owner import at_clinics_server, redirect_call
 
 
 class Api(NinjaAPI):

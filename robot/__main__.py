@@ -54,7 +54,7 @@ from robot.connection_args import (
     find_token_store,
     websocket_url,
 )
-from robot.homing.camera_eye import CameraEye
+from robot.homing.camera_supervisor import CameraEye
 from robot.link import Link, LinkRefused
 from robot.original_topics import OriginalTopics
 from robot.ros.holder import add_driven_base_arguments, find_driven_base

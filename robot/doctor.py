@@ -19,7 +19,7 @@ from robot.bases.kobuki import STOP_FRAME, KobukiBase
 from robot.bases.kobuki_protocol.frames import BAUD
 from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
 from robot.calibration import BadCalibration, home_views
-from robot.homing.camera_eye import CameraEye
+from robot.homing.camera_supervisor import CameraEye
 from robot.homing.codes import CAMERA_SILENT, CAMERA_SLOW, NO_TAG
 from robot.homing.codes import CURES as CAMERA_CURES
 from robot.homing.home_view import HomeView

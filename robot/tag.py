@@ -27,7 +27,7 @@ from robot.base_options import (
 )
 from robot.bases import BASES, BadOption, BaseLost
 from robot.calibration import BadCalibration, store_home_view
-from robot.homing.camera_eye import CameraEye
+from robot.homing.camera_supervisor import CameraEye
 from robot.homing.codes import CAMERA_SILENT, CURES
 from robot.homing.home_view import BadHomeView, Carried, HomeView, Lens, Mount, check_tag
 from robot.homing.sighting import Sighting

@@ -10,7 +10,7 @@ pytest.importorskip("cv2", reason="pip install garry[tag]")
 import cv2
 
 from robot.homing.camera import Camera
-from robot.homing.camera_eye import CameraEye
+from robot.homing.camera_supervisor import CameraEye
 from robot.homing.sighting import Sighting, read_sighting
 from tests.support.tag_pictures import picture_of, show
 
