@@ -25,8 +25,8 @@ class Format:
     steps: int  # of the stride's axis, at most
 
 
-PAPER = Format("paper", 1000, 260, 17, 2.6, 18, 10)
-PHONE = Format("phone", 300, 230, 13, 1.8, 5, 4)  # as many units as a phone has pixels
+PAPER = Format("paper", 1000, 230, 17, 2.6, 24, 10)
+PHONE = Format("phone", 300, 230, 13, 1.8, 12, 4)  # as many units as a phone has pixels
 
 
 def draw_chart(chart: dict[str, Any], size: Format = PAPER) -> dict[str, Any]:
