@@ -26,6 +26,7 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import Phase
 
+FIGURES = ("score", "hit_rate", "improvement_over_baseline")
 SESSIONS = 30  # more cannot be distinguished in a chart
 
 
@@ -74,7 +75,7 @@ class TrendPoint:
 def metrics_by_session(
     user: User, sessions: Sequence[TrainingSession]
 ) -> dict[int, dict[str, float]]:
-    """Return score and hit rate of sessions by their keys."""
+    """Return score, hit rate and improvement of sessions by their keys."""
     return _read_figures(SessionMetric.objects.visible_to(user), sessions)
 
 
@@ -82,9 +83,7 @@ def _read_figures(
     metrics: QuerySet[SessionMetric], sessions: Sequence[TrainingSession]
 ) -> dict[int, dict[str, float]]:
     found: dict[int, dict[str, float]] = defaultdict(dict)
-    rows = metrics.filter(
-        session__in=[session.pk for session in sessions], slug__in=("score", "hit_rate")
-    )
+    rows = metrics.filter(session__in=[session.pk for session in sessions], slug__in=FIGURES)
     for session_id, slug, value in rows.values_list("session_id", "slug", "value").order_by():
         found[session_id][slug] = value
     return found
