@@ -223,11 +223,13 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
         "hits": {
             "days": [day(point) for point in trend],
             "joined": len({point.session.valence for point in trend}) == 1,
+            "types": [_type_of(point.session) for point in trend],
             "hit": [to_percent(point.hit_rate) for point in trend],
             "wanted": [to_percent(point.target_hit_rate) for point in trend],
         },
         "values": {
             "days": [day(point) for point in comparable],
+            "types": [_type_of(point.session) for point in comparable],
             "mean": [spread and round(spread.mean, 3) for spread in trained],
             "deviation": [spread and round(spread.deviation, 3) for spread in trained],
             "baseline": [point.baseline and round(point.baseline.mean, 3) for point in comparable],
@@ -235,6 +237,11 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
             "unit": measure.unit if measure else "",
         },
     }
+
+
+def _type_of(session: TrainingSession) -> str:
+    """Return the slug of a session's feedback type; one that was changed is none of one type."""
+    return "" if session.changed_to else session.valence
 
 
 def to_percent(rate: float | None) -> float | None:
