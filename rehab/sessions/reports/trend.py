@@ -99,14 +99,18 @@ def with_metrics(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[Tra
 
 
 def load_trend(
-    user: User, sessions: QuerySet[TrainingSession], *, with_imported: bool = False
+    user: User,
+    sessions: QuerySet[TrainingSession],
+    *,
+    with_imported: bool = False,
+    most: int = SESSIONS,
 ) -> list[TrendPoint]:
-    """Return the newest of these sessions that have a hit rate, oldest first.
+    """Return the newest of these sessions that have a hit rate, oldest first, at most so many.
 
     ``with_imported``: also those from the original GARRY, which have points alone.
     """
     metrics, steps = SessionMetric.objects.visible_to(user), Step.objects.visible_to(user)
-    return _read_trend(sessions, metrics, steps, with_imported=with_imported)
+    return _read_trend(sessions, metrics, steps, with_imported=with_imported, most=most)
 
 
 def load_own_trend(sessions: QuerySet[TrainingSession]) -> list[TrendPoint]:
@@ -125,12 +129,13 @@ def _read_trend(
     steps: QuerySet[Step],
     *,
     with_imported: bool,
+    most: int = SESSIONS,
 ) -> list[TrendPoint]:
     rate = metrics.filter(session=OuterRef("pk"), slug="hit_rate")
     wanted = Exists(rate) | Q(legacy_id__isnull=False) if with_imported else Q(Exists(rate))
     counted = sessions.filter(wanted, excluded=False)
     ended = counted.select_related("measure")
-    newest = list(ended.order_by("-created_at", "-pk")[:SESSIONS])[::-1]
+    newest = list(ended.order_by("-created_at", "-pk")[:most])[::-1]
     figures, values = _read_figures(metrics, newest), _values_by_phase(steps, newest)
     points: list[TrendPoint] = []
     for session in newest:
