@@ -153,8 +153,6 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     context = lists | begin_context(user, patient)
     context |= {
         "patient": patient,
-        "here_today": patient.last_here
-        and clinic_time(patient.last_here, patient.clinic).date() == today,
         "progress": load_progress(user, patient, lists["now"]),
         "open_here": open_sessions(user).filter(patient=patient),
         "visits": visits,

@@ -105,5 +105,5 @@ def _count_adverse(user: User, since: datetime, incidents: list[Incident]) -> li
     return [
         (gettext("Falls"), raised[Alarm.FALL]),
         (gettext("Robot stopped by itself"), raised[Alarm.ROBOT_STOP]),
-        *((capfirst(EVENTS[kind]), noted[kind]) for kind in ADVERSE if kind != Remark.FALL),
+        *((capfirst(str(EVENTS[kind])), noted[kind]) for kind in ADVERSE if kind != Remark.FALL),
     ]
