@@ -55,6 +55,16 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     assert "Nothing was noted. Robot No robot." in words
 
 
+def test_it_tells_how_the_session_before_went(world, patient):
+    walk(patient, "binary", [HIT, MISS], days_ago=3)
+    walk(patient, "negative", [HIT], days_ago=2, simulated=True)  # nobody walked it
+    today = walk(patient, "positive", [HIT])
+    told = "Last time 18 Nov 2026 · Binary · Hit rate 50 % · Mean 2.00 W/kg · Goal 2.00 W/kg"
+    assert told in read(world, today)
+    earlier = patient.sessions.exclude(pk=today.pk).order_by("created_at").first()
+    assert "Last time" not in read(world, earlier)
+
+
 def test_strides_that_the_lab_sent_late_are_told_apart(world, patient):
     session = walk(patient, "positive", [HIT, None, "late", "late", "force_lost"])
     assert "Strides, trained leg 5 2 do not count, of 2 the samples came late" in read(

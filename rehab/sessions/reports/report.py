@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from dataclasses import replace
 from typing import Any
 
+from django.utils.formats import date_format
 from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
@@ -16,6 +17,7 @@ from rehab.sessions.formatting import (
     format_change,
     format_number,
     format_quantity,
+    format_rate,
     format_significant,
 )
 from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
@@ -63,7 +65,8 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
         "answers": list_answers(user, session),
         "robot": _describe_robot(review.rows),
         "charts": [draw_chart(review.chart, size) for size in (PAPER, PHONE)],
-        "has_gain": any(phase["gain"] != 1 for phase in phases),
+        "has_gain": review.chart["has_gain"],
+        "last_time": _describe_last_time(user, session),
         "has_close": bool(review.figures["close"]),
         "unit": plan.measure.unit,
     }
@@ -91,6 +94,30 @@ def _list_figures(
         summary.duration,
         summary.score,
     ]
+
+
+def _describe_last_time(user: User, session: TrainingSession) -> list[str]:
+    """Return how the patient's session before this one went, which trained the same measure."""
+    before = TrainingSession.objects.visible_to(user).filter(
+        patient=session.patient_id,
+        measure=session.measure_id,
+        simulated=session.simulated,
+        created_at__lt=session.created_at,
+    )
+    points = load_trend(user, before, most=1)
+    if not points:
+        return []
+    (last,) = points
+    unit = session.measure.unit
+    mean = last.with_feedback.mean if last.with_feedback else None
+    day = date_format(clinic_time(last.session.began_at, session.clinic), "DATE_FORMAT")
+    figures = {
+        _("Hit rate"): format_rate(last.hit_rate),
+        _("Mean"): format_quantity(mean, unit),
+        _("Goal"): format_quantity(last.session.goal, unit),
+    }
+    told = [f"{label} {figure}" for label, figure in figures.items()]
+    return [day, last.session.valences_label, *told]
 
 
 def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:

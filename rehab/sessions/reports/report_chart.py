@@ -25,7 +25,7 @@ class Format:
     steps: int  # of the stride's axis, at most
 
 
-PAPER = Format("paper", 1000, 230, 17, 2.6, 24, 10)
+PAPER = Format("paper", 1000, 215, 17, 2.6, 24, 10)
 PHONE = Format("phone", 300, 230, 13, 1.8, 12, 4)  # as many units as a phone has pixels
 
 

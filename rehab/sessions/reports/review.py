@@ -130,9 +130,11 @@ def stride_chart(
     columns: dict[str, list[Any]] = {
         name: [] for name in ("number", "value", "goal", "hit", "close", "phase", "why")
     }
+    has_gain = False
     for number, valid, value, gain, goal, hit, close, phase, reasons in steps.iterator():
         measured, needed = value if valid else None, goal and goal / gain
         row = (number, _round(measured), _round(needed), hit, close, phase, ", ".join(reasons))
+        has_gain |= gain != 1
         for column, entry in zip(columns.values(), row, strict=True):
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
@@ -141,6 +143,7 @@ def stride_chart(
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
+        "has_gain": has_gain,
         "strides": columns,
         "phases": [
             {
