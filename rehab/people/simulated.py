@@ -6,6 +6,9 @@ from django.conf import settings
 from django.db.models import Q
 
 
-def counted() -> Q:
-    """Return the condition of the patients, or of the sessions, that lists and figures count."""
-    return Q() if settings.DEMO else Q(simulated=False)
+def counted(path: str = "") -> Q:
+    """Return the condition of the patients, or of the sessions, that lists and figures count.
+
+    ``path``: the way from what is filtered to these, such as ``session__``.
+    """
+    return Q() if settings.DEMO else Q((f"{path}simulated", False))

@@ -23,8 +23,7 @@ from rehab.sessions.clinic_tests import find_test, own_tests
 from rehab.sessions.formatting import MISSING, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS
-
-SPARK = (120, 32)  # the drawing of a course, in its own units
+from rehab.sessions.spark import draw_spark
 
 
 class Assessment(ClinicModel):
@@ -138,18 +137,9 @@ class Course:
 
     @property
     def spark(self) -> list[str]:
-        """The points of its line in a drawing of the size `SPARK`, better results higher."""
+        """The points of its line, better results higher."""
         values = [one.value for one in self.results]
-        low, high = min(values, default=0.0), max(values, default=0.0)
-        span = (high - low) or 1.0
-        width, height = SPARK
-        points = []
-        for place, value in enumerate(values):
-            share = (value - low) / span if high > low else 0.5
-            share = share if self.test.higher_is_better else 1 - share
-            x = 4 + place * (width - 8) / max(1, len(values) - 1)
-            points.append(f"{x:.1f},{4 + (1 - share) * (height - 8):.1f}")
-        return points
+        return draw_spark(values, higher_is_better=self.test.higher_is_better)
 
 
 def format_result(test: ClinicalTest, value: float) -> str:

@@ -124,8 +124,10 @@ def format_noted(kind: str, value: float | None) -> str:
         return gettext("from here on") if value else gettext("no longer")
     if kind == Remark.BELT_SPEED:
         return f"{format_number(value)}{NBSP}m/s"
-    places = format_number(value, 0)
-    return f"{places}{NBSP}%" if kind == Remark.WEIGHT_SUPPORT else places
+    whole = format_number(value, 0)
+    if kind in RATED:
+        return gettext("%(number)s of %(count)s") % {"number": whole, "count": 10}
+    return f"{whole}{NBSP}%" if kind == Remark.WEIGHT_SUPPORT else whole
 
 
 def name_assistance(conditions: Mapping[str, float]) -> str:

@@ -84,7 +84,7 @@ def test_sessions_are_compared_and_taken_along(visit: Visit, sessions: dict[str,
     assert set(rows(page)) == {"Omar (O-2)", "Rosa (R-1)"}
     assert rows(page)["Rosa (R-1)"][2].startswith("60 % (")
     assert page.locator("svg.interval rect").count() == 1  # none of fewer than three sessions
-    page.click(".chips >> text=All >> nth=0")
+    page.click(".chips >> text=All time")
     page.click("text=Feedback types")
     assert "Explicit" in rows(page)
 
@@ -100,7 +100,7 @@ def test_sessions_are_compared_and_taken_along(visit: Visit, sessions: dict[str,
 
     # One tap takes along what is shown.
     with page.expect_download() as download:
-        page.click("text=As a file")
+        page.click("text=Download")
     (head, *lines) = csv.reader(io.StringIO(Path(download.value.path()).read_text("utf-8-sig")))
     told = [dict(zip(head, line, strict=True)) for line in lines]
     assert len(told) == sum(int(row[0]) for row in rows(page).values()) == 6

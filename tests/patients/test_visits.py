@@ -61,6 +61,10 @@ def test_who_was_here_today_is_next_expected_another_day(world, pt):
     later = plan_visit(cleo, HERE.date() + timedelta(7), time(9, 0))
     assert "Train again today" in (after := pt.get(page).content.decode())
     assert after.count("Remove the visit of") == 1
+    assert after.count('aria-pressed="true" disabled') == 1  # the day that is planned is no choice
+    assert "here today" in after
+    assert after.index("Last session: today") < after.index("Next visit")
+    assert after.index("Next visit") < after.index("Train again today")
     (case,) = [one for one in load_caseload(world.people[Role.PT], HERE) if one.patient == cleo]
     assert case.next_visit == later
 

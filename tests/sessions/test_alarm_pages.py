@@ -18,7 +18,7 @@ from rehab.patients import urls
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from tests.support.page_text import plain
+from tests.support.page_text import plain, words
 from tests.support.walks import HIT, make_patient, walk
 from tests.support.world import NOW, World, build_world, client_of
 
@@ -113,12 +113,13 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     assert f"by {by}" in listed
     assert "The robot of Iris stopped by itself." in listed
     assert "not seen yet" in listed
+    assert "Falls 1 Robot stopped by itself 1 Near fall 0" in words(listed)
     assert "! incident" in plain(
         pt.get(reverse("history", args=[session.patient_id])).content.decode()
     )
     for page in ("report", "session"):
         text = plain(pt.get(reverse(page, args=[session.pk])).content.decode())
-        assert "! Falls" in text
+        assert "Falls" in text
         assert "slightly hurt, seen" in text
         assert "Robot stopped by itself" in text
 

@@ -55,7 +55,7 @@ def test_a_session_has_the_mean_over_its_steps():
         ("weight_support", 20, "20 %"),
         ("orthosis", 1, "from here on"),
         ("orthosis", 0, "no longer"),
-        ("pain", 4, "4"),
+        ("pain", 4, "4 of 10"),
         ("pain", None, ""),
         ("rest", None, ""),
     ],

@@ -55,9 +55,8 @@ def test_the_list_tells_type_date_duration_score_hit_rate_and_goal(client, patie
     walk(patient, "positive", strides(1, 1), days_ago=1, end=ChangeKind.ABORT)
     walk(patient, "binary", [], end=None, simulated=True)
     listed = items(history(client, patient))
-    assert day_and_time(3) in listed[3]
-    assert "Negative · goal 2.00 · 2 min 49 % −46 points" in listed[3]
-    assert f"{day_and_time(2)} Explicit · goal 2.00 · 3 s 75 % hits" in listed[2]
+    assert f"{day_and_time(3)}, 2 min Negative · goal 2.00 49 % −46 points" in listed[3]
+    assert f"{day_and_time(2)}, 3 s Explicit · goal 2.00 75 % hits" in listed[2]
     assert "ended early" in listed[1]
     assert "– hits" in listed[1]
     assert "running simulated" in listed[0]
@@ -68,7 +67,7 @@ def test_chips_count_each_type_and_filter_by_it(client, patient):
     walk(patient, "positive", strides(4, 2))
     page = history(client, patient)
     chips = words(re.search(r'<nav class="chips\b.*?</nav>', page, re.DOTALL)[0])
-    assert chips == "All 4 Positive 2 Negative 1 Binary 1 Explicit 0"
+    assert chips == "All types 4 Positive 2 Negative 1 Binary 1 Explicit 0"
     page = history(client, patient, "?type=binary")
     assert len(items(page)) == 1
     assert reverse("session", kwargs={"session_id": sessions["binary"].pk}) in page
@@ -115,6 +114,7 @@ def test_the_trend_equals_the_stored_strides(world, client, patient):
     assert point.baseline.mean == pytest.approx(statistics.mean(before)) == 1.5
     assert point.change == pytest.approx(statistics.mean(trained) / 1.5 - 1)
     chart = read_json(history(client, patient), "trend")
+    assert chart["hits"]["types"] == chart["values"]["types"] == [session.valence]
     assert chart["hits"]["wanted"] == [60.0]
     judged = [step.hit for step in steps if step.phase in {1, 3}]
     assert chart["hits"]["hit"] == [round(100 * sum(judged) / len(judged), 1)]

@@ -15,7 +15,7 @@ from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report import report_context
-from rehab.sessions.reports.report_chart import draw_chart
+from rehab.sessions.reports.report_chart import PAPER, PHONE, draw_chart
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.clock import HERE
@@ -47,12 +47,22 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     assert f"{HERE:%A} {HERE.day} {HERE:%B %Y, %H:%M}" in words
     assert "Positive · left leg" in words
     assert "Hit rate 75 % wanted 60 %" in words
-    assert "Mean with feedback 2.25 W/kg baseline 2.00 W/kg, +12 %" in words
+    assert "Mean with feedback 2.25 W/kg +12 % from baseline 2.00 W/kg" in words
     assert "Strides, trained leg 9 1 does not count" in words
     changed = (NOW + timedelta(seconds=7)).astimezone(HERE.tzinfo)
     assert f"Goal 2.00 W/kg → 2.40 W/kg ({changed:%H:%M})" in words
     assert re.search(r"Training yes 1\.00 5 4 3 75 % 2\.25", words)
     assert "Nothing was noted. Robot No robot." in words
+
+
+def test_it_tells_how_the_session_before_went(world, patient):
+    walk(patient, "binary", [HIT, MISS], days_ago=3)
+    walk(patient, "negative", [HIT], days_ago=2, simulated=True)  # nobody walked it
+    today = walk(patient, "positive", [HIT])
+    told = "Last time 18 Nov 2026 · Binary · Hit rate 50 % · Mean 2.00 W/kg · Goal 2.00 W/kg"
+    assert told in read(world, today)
+    earlier = patient.sessions.exclude(pk=today.pk).order_by("created_at").first()
+    assert "Last time" not in read(world, earlier)
 
 
 def test_strides_that_the_lab_sent_late_are_told_apart(world, patient):
@@ -75,9 +85,16 @@ def test_paper_and_pages_show_the_clinics_clock(world, patient):
     assert "Sunday 22 November" in page
 
 
-def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
+def test_what_went_wrong_stands_near_the_top_what_else_was_noted_below(world, patient):
     session = walk(patient, "binary", [HIT, MISS])
-    for kind, value in [("rest", None), ("borg", 4), ("fall", None), ("borg", 7), ("fall", None)]:
+    for kind, value in [
+        ("rest", None),
+        ("borg", 4),
+        ("fall", None),
+        ("pain", 3),
+        ("borg", 7),
+        ("fall", None),
+    ]:
         note(session, kind, value)
     for above in (True, True, False):
         note(session, "robot_decision", above=above)
@@ -85,7 +102,8 @@ def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
     note(session, "robot_gesture", phase="ended")
     note(session, "robot_stop")
     words, at = read(world, session), f"{HERE:%H:%M}"
-    assert f"! Fall 2 ×: {at}, {at} Rest 1 ×: {at} Exertion: 4 ({at}), 7 ({at})" in words
+    assert f"Falls: 2 ({at}, not seen yet; {at}, not seen yet) Pain: 3 of 10 ({at}) Goal" in words
+    assert f"Noted Rest 1 ×: {at} Exertion: 4 of 10 ({at}), 7 of 10 ({at}) Robot" in words
     assert "1 gesture, 2 of 3 decisions at or above its threshold, stopped once." in words
 
 
@@ -94,7 +112,9 @@ def test_a_fall_stands_with_how_badly_it_hurt_and_a_withdrawn_one_not_at_all(wor
     for kind, value in [("fall", None), ("fall_severity", 2), ("fall", None)]:
         note(session, kind, value)
     note(session, "fall_withdrawn")
-    assert f"! Fall 1 ×: {HERE:%H:%M} (moderately hurt)" in read(world, session)
+    words = read(world, session)
+    assert f"Falls: 1 ({HERE:%H:%M}, moderately hurt, not seen yet)" in words
+    assert "Nothing else was noted." in words
     other = walk(patient, "binary", [HIT, MISS])
     note(other, "fall")
     note(other, "fall_withdrawn")
@@ -107,7 +127,7 @@ def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
     for _ in range(400):
         note(session, "pain")
     words, at = read(world, session), f"{HERE:%H:%M}"
-    assert f"! Pain 400 ×: {at}, {at}, {at}, {at}, … 395 more …, {at}" in words
+    assert f"Pain 400 ×: {at}, {at}, {at}, {at}, … 395 more …, {at}" in words
     assert "… 24 changes more … → 2.30 W/kg" in words
     assert len(words) < 2_500
 
@@ -144,7 +164,7 @@ def test_the_chart_shows_every_stride_once(world, patient):
     strides: list[Walked] = [1.0, 1.5, HIT, MISS, None, HIT]
     strides += [Change(ChangeKind.GOAL, 3.0), HIT, MISS, 0.0]
     session = walk(patient, "positive", strides, phases=phases)
-    chart = report_context(world.people[Role.PT], session)["chart"]
+    chart = report_context(world.people[Role.PT], session)["charts"][0]
     assert chart["hit"].count("M") == 2
     assert chart["miss"].count("M") == 6
     assert chart["lost"].count("M") == 1
@@ -157,7 +177,7 @@ def test_the_chart_shows_every_stride_once(world, patient):
 def test_a_chart_of_the_smallest_and_largest_values():
     for values in ([0.0], [1e-6, 2e-6], [15.0] * 3, [None]):
         count = len(values)
-        columns = {"number": list(range(1, count + 1)), "shown": values, "goal": [None] * count}
+        columns = {"number": list(range(1, count + 1)), "value": values, "goal": [None] * count}
         verdicts = {"hit": [None] * count, "close": [False] * count}
         chart = {"strides": columns | verdicts, "phases": []}
         drawn = draw_chart(chart)
@@ -167,8 +187,26 @@ def test_a_chart_of_the_smallest_and_largest_values():
             assert -10 < float(number) < 1010
 
 
+def test_every_phase_has_its_name_in_the_chart_however_narrow():
+    """Names that would run into each other stand in rows, on a phone as on paper."""
+    names = {"Baseline": (1, 54), "Training": (55, 251), "Catch": (252, 263), "Washout": (264, 300)}
+    phases = [
+        {"name": name, "feedback": name == "Training", "from": first, "to": last}
+        for name, (first, last) in names.items()
+    ]
+    columns = {name: [2.0] * 300 for name in ("value", "goal", "hit")}
+    columns |= {"number": list(range(1, 301)), "close": [False] * 300}
+    for size in (PAPER, PHONE):
+        drawn = draw_chart({"strides": columns, "phases": phases}, size)
+        ends: dict[float, float] = {}
+        for phase in drawn["phases"]:
+            assert ends.get(phase["up"], 0) <= phase["at"] <= phase["x"]
+            ends[phase["up"]] = phase["at"] + 0.6 * size.letter * len(phase["name"])
+        assert max(ends.values()) <= size.width
+
+
 def test_close_strides_have_a_mark_of_their_own():
-    columns = {"number": [1, 2, 3], "shown": [2.0, 2.0, 1.0], "goal": [2.0] * 3}
+    columns = {"number": [1, 2, 3], "value": [2.0, 2.0, 1.0], "goal": [2.0] * 3}
     verdicts = {"hit": [True, True, False], "close": [False, True, True]}
     drawn = draw_chart({"strides": columns | verdicts, "phases": []})
     assert (drawn["hit"].count("M"), drawn["close"].count("M")) == (1, 2)

@@ -37,7 +37,7 @@ def test_it_says_what_was_walked_and_leaves_out_what_was_not_noted(world):
         )
     text = read(world, session)
     assert "Walked with: orthosis" in text
-    assert "Noted: Exertion 4 (" in text
+    assert "Noted: Exertion 4 of 10 (" in text
     assert read(world, session, Role.RESEARCHER) is None
 
 

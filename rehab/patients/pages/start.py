@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 from django.contrib import messages
@@ -24,16 +24,19 @@ from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.alarms import Alarm, open_alarms
 from rehab.sessions.feedback_text_updates import change_language
-from rehab.sessions.formatting import clinic_time
+from rehab.sessions.formatting import clinic_time, format_day, format_number, format_quantity
 from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
+from rehab.sessions.reports.trend import load_trend, summarize_trend
+from rehab.sessions.spark import draw_spark
 from rehab.stations.builtin import first_station
 from rehab.stations.tablets import has_tablet
 from rehab.training.changes import OPEN_STATES
 
 MAX_PATIENTS = 60  # patients on one page
+MAX_PROGRESS = 10  # sessions in the line on a patient's page
 DEMO_CODE = "demo"
 
 
@@ -87,6 +90,33 @@ def begin_context(user: User, patient: Patient) -> dict[str, Any]:
     }
 
 
+def load_progress(user: User, patient: Patient, now: datetime) -> dict[str, Any] | None:
+    """Return how a patient's last sessions went; None before the first one."""
+    sessions = TrainingSession.objects.visible_to(user).filter(
+        patient=patient, simulated=patient.simulated
+    )
+    trend = load_trend(user, sessions, most=MAX_PROGRESS)
+    if not trend:
+        return None
+    last = trend[-1].session
+    means = [
+        point.with_feedback.mean
+        for point in trend
+        if point.with_feedback and point.session.measure == last.measure
+    ]
+    higher_is_better = last.measure.higher_is_better
+    is_course = len(means) > 1
+    return {
+        "session": last,
+        "day": format_day(clinic_time(last.began_at, patient.clinic).date(), now.date()),
+        "totals": summarize_trend([], trend, simulated=patient.simulated),
+        "points": draw_spark(means, higher_is_better=higher_is_better) if is_course else [],
+        "ends": f"{format_number(means[0])} → {format_quantity(means[-1], last.measure.unit)}"
+        if is_course
+        else "",
+    }
+
+
 @for_roles(Role.LEAD, Role.PT)
 @never_cache  # so that going back shows the present state
 @require_safe
@@ -119,14 +149,16 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     )
     if was_here:
         visits = visits.exclude(day=today)
+    planned = {visit.day: visit for visit in visits}
     context = lists | begin_context(user, patient)
     context |= {
         "patient": patient,
+        "progress": load_progress(user, patient, lists["now"]),
         "open_here": open_sessions(user).filter(patient=patient),
         "visits": visits,
         "was_here": was_here,
         "soon": [
-            (days, today + timedelta(days=days))
+            (days, today + timedelta(days=days), planned.get(today + timedelta(days=days)))
             for days in QUICK_VISIT_DAYS
             if days or all(row.patient != patient for row in lists["today"])
         ],

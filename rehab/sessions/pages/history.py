@@ -71,7 +71,10 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
             "label": label,
             "count": sum(g["pk__count"] for g in groups if slug in ("", g["valence"])),
         }
-        for slug, label in (("", gettext("All")), *((v.slug, v.label) for v in VALENCES.values()))
+        for slug, label in (
+            ("", gettext("All types")),
+            *((v.slug, v.label) for v in VALENCES.values()),
+        )
     ]
     if chosen in VALENCES:
         mine = mine.filter(valence=chosen)
@@ -95,7 +98,7 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         "patient": patient,
         "chips": chips,
         "chosen": chosen,
-        "periods": {"": gettext("All"), **PERIODS},
+        "periods": {"": gettext("All time"), **PERIODS},
         "weeks": weeks,
         "page": page,
         "lines": [
@@ -109,6 +112,14 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         "courses": [course for course in load_courses(user, patient) if course.results],
         "trend": list(zip(chart["hits"]["days"], trend, strict=True)),
         "chart": chart,
+        "types": [
+            (slug, label)
+            for slug, label in [
+                *((one.slug, one.label) for one in VALENCES.values()),
+                ("", _("changed during the session")),
+            ]
+            if slug in chart["hits"]["types"]
+        ],
     }
     return render(request, "sessions/history.html", context)
 

@@ -11,7 +11,7 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
-from rehab.sessions.formatting import format_number, format_rate
+from rehab.sessions.formatting import format_change, format_number, format_rate
 from rehab.sessions.reports.insight import ANY_GOAL, KEYS, PERIODS, Group, compare, read_view
 from rehab.sessions.reports.replay import start_of
 
@@ -30,12 +30,14 @@ def show_insight(request: HttpRequest) -> HttpResponse:
         for adverse in one.adverse
     ]
     events.sort(key=lambda entry: entry[0].at, reverse=True)
+    groups = [_to_row(group) for group in compare(view.shown, view.by)]
     context = {
         "view": view,
         "any_goal": ANY_GOAL,
         "keys": {key: label for key, (label, *_functions) in KEYS.items()},
         "periods": PERIODS,
-        "groups": [_to_row(group) for group in compare(view.shown, view.by)],
+        "groups": groups,
+        "has_interval": any("width" in row["drawn"] for row in groups),
         "events": events[:LISTED],
         "noted": [one for one in view.shown if one.note][:LISTED],
     }
@@ -57,6 +59,7 @@ def _to_row(group: Group) -> dict[str, Any]:
         "group": group,
         "rate": words,
         "drawn": drawn,
+        "improvement": format_change(group.improvement.mean / 100 if group.improvement else None),
         "minutes": format_number(group.minutes, 0),
         "exertion": format_number(group.exertion.mean if group.exertion else None, 1),
     }

@@ -28,7 +28,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.noted_conditions import CONDITIONS, load_conditions, name_assistance
 from rehab.sessions.reports.intervals import MeanInterval, mean_interval
 from rehab.sessions.reports.remarks import ADVERSE, Noted, load_noted
-from rehab.sessions.reports.trend import metrics_by_session
+from rehab.sessions.reports.trend import FIGURES, metrics_by_session
 from rehab.training.valences import VALENCES
 
 MAX_SESSIONS = 2000  # the newest
@@ -43,6 +43,7 @@ class Walked:
     session: TrainingSession
     at: datetime  # by the clinic's clock
     hit_rate: float | None
+    improvement: float | None = None  # over its baseline, in percent
     adverse: list[Noted] = field(default_factory=list)
     exertion: float | None = None  # the highest that was noted, Borg CR10
     note: str = ""
@@ -55,11 +56,16 @@ class Walked:
         return self.at.date() - timedelta(days=self.at.weekday())
 
     @property
+    def valence(self) -> str:
+        """The slug of its feedback type; a session that was changed is none of one type."""
+        return "" if self.session.changed_to else self.session.valence
+
+    @property
     def type_label(self) -> str:
-        """Its feedback type; a session that was changed is none of one type."""
-        if self.session.changed_to:
+        """Its feedback type as text."""
+        if not self.valence:
             return gettext("changed during the session")
-        return gettext(VALENCES[self.session.valence].label)
+        return gettext(VALENCES[self.valence].label)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +73,11 @@ class Group:
     """Sessions that are compared as one: a week's, a type's, a patient's."""
 
     label: str
+    valence: str  # of all its sessions, or none
     sessions: int
     patients: int
     hit_rate: MeanInterval | None
+    improvement: MeanInterval | None
     minutes: float
     adverse: list[tuple[str, int]]
     exertion: MeanInterval | None
@@ -90,13 +98,12 @@ def load_walked(user: User, sessions: QuerySet[TrainingSession]) -> list[Walked]
     counted = sessions.filter(excluded=False, legacy_id=None, active_s__gt=0)
     chosen = counted.select_related("patient", "clinic", "measure").defer("plan", "checkpoint")
     rows = list(chosen.order_by("-created_at", "-pk")[:MAX_SESSIONS])
-    rates = metrics_by_session(user, rows)
-    walked = {
-        row.pk: Walked(
-            row, clinic_time(row.began_at, row.clinic), rates.get(row.pk, {}).get("hit_rate")
-        )
-        for row in rows
-    }
+    figures = metrics_by_session(user, rows)
+    walked = {}
+    for row in rows:
+        found = figures.get(row.pk, {})
+        at, improvement = clinic_time(row.began_at, row.clinic), found.get(FIGURES[-1])
+        walked[row.pk] = Walked(row, at, found.get("hit_rate"), improvement)
     for key, noted in load_noted(user, walked).items():
         walked[key].adverse = [one for one in noted if one.is_adverse]
     for key, conditions in load_conditions(user, rows).items():
@@ -165,7 +172,11 @@ KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked],
         lambda one: one.week.isoformat(),
         lambda one: gettext("Week of %(day)s") % {"day": date_format(one.week, "DATE_FORMAT")},
     ),
-    "type": (_("Feedback types"), lambda one: one.type_label, lambda one: one.type_label),
+    "type": (
+        _("Feedback types"),
+        lambda one: f"{[*VALENCES, ''].index(one.valence):03d}",
+        lambda one: one.type_label,
+    ),
     "patient": (
         _("Patients"),
         lambda one: f"{one.session.patient.nickname} {one.session.patient_id}",
@@ -178,7 +189,7 @@ KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked],
 
 
 def compare(walked: Sequence[Walked], by: str) -> list[Group]:
-    """Return the groups that sessions fall in; weeks with the newest first, others by name."""
+    """Return the groups that sessions fall in: the newest week first, types as in the set-up."""
     _label, key, describe = KEYS[by]
     found: defaultdict[str, list[Walked]] = defaultdict(list)
     for one in walked:
@@ -191,11 +202,14 @@ def compare(walked: Sequence[Walked], by: str) -> list[Group]:
 
 def _summarize(label: str, walked: Sequence[Walked]) -> Group:
     kinds = Counter(adverse.kind for one in walked for adverse in one.adverse)
+    valences = {one.valence for one in walked}
     return Group(
         label=label,
+        valence=valences.pop() if len(valences) == 1 else "",
         sessions=len(walked),
         patients=len({one.session.patient_id for one in walked}),
         hit_rate=_known(mean_interval(_independent(walked, lambda one: one.hit_rate), (0, 1))),
+        improvement=mean_interval(_independent(walked, lambda one: one.improvement)),
         minutes=sum(one.session.active_s for one in walked) / 60,
         adverse=[(str(EVENTS[kind]), kinds[kind]) for kind in ADVERSE if kinds[kind]],
         exertion=mean_interval(_independent(walked, lambda one: one.exertion), (0, 10)),
@@ -222,7 +236,7 @@ def _independent(walked: Sequence[Walked], figure: Callable[[Walked], float | No
     return [sum(each) / len(each) for each in values.values()]
 
 
-PERIODS = {"4": _("4 weeks"), "12": _("12 weeks"), "52": _("a year"), "": _("All")}  # in weeks
+PERIODS = {"4": _("4 weeks"), "12": _("12 weeks"), "52": _("a year"), "": _("All time")}  # in weeks
 ANY_GOAL = "any"
 
 

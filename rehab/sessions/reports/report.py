@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from dataclasses import replace
 from typing import Any
 
+from django.utils.formats import date_format
 from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
@@ -16,14 +17,15 @@ from rehab.sessions.formatting import (
     format_change,
     format_number,
     format_quantity,
+    format_rate,
     format_significant,
 )
 from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.noted_conditions import CONDITIONS, format_noted
 from rehab.sessions.reports.answers import list_answers
-from rehab.sessions.reports.remarks import ADVERSE, read_noted
-from rehab.sessions.reports.report_chart import draw_chart
+from rehab.sessions.reports.remarks import read_noted
+from rehab.sessions.reports.report_chart import PAPER, PHONE, draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
 from rehab.sessions.reports.summary import (
     Figure,
@@ -50,18 +52,21 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
     plan = session.to_plan()
     review = review_session(user, session)
     ended = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
-    phases = format_phases(review)
+    phases, remarks = format_phases(review), _summarize_remarks(review.rows, session)
     return {
         "figures": _list_figures(plan, review, ended[0] if ended else None),
         "incidents": format_incidents(review, session),
         "goals": _describe_goals(plan, review),
         "phases": phases[:MAX_PHASES],
         "more_phases": max(0, len(phases) - MAX_PHASES),
-        "remarks": _summarize_remarks(review.rows, session),
+        "adverse": [remark for remark in remarks if remark["adverse"]],
+        "remarks": [remark for remark in remarks if not remark["adverse"]],
         "extras": mean_extras(user, session),
         "answers": list_answers(user, session),
         "robot": _describe_robot(review.rows),
-        "chart": draw_chart(review.chart),
+        "charts": [draw_chart(review.chart, size) for size in (PAPER, PHONE)],
+        "has_gain": review.chart["has_gain"],
+        "last_time": _describe_last_time(user, session),
         "has_close": bool(review.figures["close"]),
         "unit": plan.measure.unit,
     }
@@ -80,7 +85,7 @@ def _list_figures(
             "mean": format_quantity(baseline.mean, unit),
             "change": format_change(point.change),
         }
-        note = _("baseline %(mean)s, %(change)s") % values
+        note = _("%(change)s from baseline %(mean)s") % values
     mean = format_quantity(with_feedback.mean if with_feedback else None, unit)
     return [
         summary.hit_rate,
@@ -89,6 +94,30 @@ def _list_figures(
         summary.duration,
         summary.score,
     ]
+
+
+def _describe_last_time(user: User, session: TrainingSession) -> list[str]:
+    """Return how the patient's session before this one went, which trained the same measure."""
+    before = TrainingSession.objects.visible_to(user).filter(
+        patient=session.patient_id,
+        measure=session.measure_id,
+        simulated=session.simulated,
+        created_at__lt=session.created_at,
+    )
+    points = load_trend(user, before, most=1)
+    if not points:
+        return []
+    (last,) = points
+    unit = session.measure.unit
+    mean = last.with_feedback.mean if last.with_feedback else None
+    day = date_format(clinic_time(last.session.began_at, session.clinic), "DATE_FORMAT")
+    figures = {
+        _("Hit rate"): format_rate(last.hit_rate),
+        _("Mean"): format_quantity(mean, unit),
+        _("Goal"): format_quantity(last.session.goal, unit),
+    }
+    told = [f"{label} {figure}" for label, figure in figures.items()]
+    return [day, last.session.valences_label, *told]
 
 
 def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:
@@ -117,26 +146,25 @@ def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:
 def _summarize_remarks(
     events: list[SessionEvent], session: TrainingSession
 ) -> list[dict[str, Any]]:
-    """Return each kind of remark with its times and values, adverse ones first."""
+    """Return each kind of remark with its times and values; falls are among the incidents."""
     times: defaultdict[Remark, list[str]] = defaultdict(list)
     with_value: set[Remark] = set()
-    for one in read_noted(events):
+    noted = [one for one in read_noted(events) if one.kind != Remark.FALL]
+    for one in noted:
         text = f"{clinic_time(one.at, session.clinic):%H:%M}"
         if value := format_noted(one.kind, one.value):
             with_value.add(one.kind)
             text = f"{value} ({text})"
-        elif one.severity is not None:
-            text = f"{text} ({one.severity.label})"
         times[one.kind].append(text)
-    order = sorted(times, key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind)))
+    adverse = {one.kind for one in noted if one.is_adverse}
     return [
         {
             "name": capfirst(EVENTS[kind]),
             "count": 0 if kind in with_value else len(times[kind]),
             "times": _join(times[kind], 2 if kind in CONDITIONS else MAX_TIMES),
-            "adverse": kind in ADVERSE,
+            "adverse": kind in adverse,
         }
-        for kind in order
+        for kind in sorted(times, key=list(Remark).index)
     ]
 
 

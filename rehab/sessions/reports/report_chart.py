@@ -4,15 +4,32 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-# In units of the view box.
-WIDTH, HEIGHT, MARGIN = 1000.0, 250.0, 18.0
-RING = 2.6
+LETTER_WIDTH = 0.6  # of bold words on average, by their size
+MAX_ROWS = 4  # of phases' names above each other
 
 
-def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class Format:
+    """Sizes of a drawing, in units of its view box."""
+
+    name: str
+    width: float
+    height: float
+    letter: float
+    ring: float
+    margin: float
+    steps: int  # of the stride's axis, at most
+
+
+PAPER = Format("paper", 1000, 215, 17, 2.6, 24, 10)
+PHONE = Format("phone", 300, 230, 13, 1.8, 12, 4)  # as many units as a phone has pixels
+
+
+def draw_chart(chart: dict[str, Any], size: Format = PAPER) -> dict[str, Any]:
     """Return all strides of the trained leg against the goal, as paths that print in gray.
 
     At or above the goal is a disc, below a ring, without a goal a cross, close to it a dash; an
@@ -20,10 +37,11 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
     ``chart`` is the result of ``review.stride_chart``. Returns {} without strides.
     """
     strides = chart["strides"]
-    numbers, shown, goals = strides["number"], strides["shown"], strides["goal"]
+    numbers, values, goals = strides["number"], strides["value"], strides["goal"]
     if not numbers:
         return {}
-    known = [value for value in (*shown, *goals) if value is not None]
+    width, height, ring = size.width, size.height, size.ring
+    known = [value for value in (*values, *goals) if value is not None]
     highest: float = max(known, default=1.0)
     top = 1.08 * highest if highest > 0 else 1.0
     levels = [value for value in round_steps(0, top, most=7) if 0 < value < top]
@@ -31,17 +49,17 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
     span: int = max(1, numbers[-1] - first)
 
     def x(number: float) -> float:
-        return MARGIN + (WIDTH - 2 * MARGIN) * (number - first) / span
+        return size.margin + (width - 2 * size.margin) * (number - first) / span
 
     def y(value: float) -> float:
-        return HEIGHT - HEIGHT * max(value, 0.0) / top
+        return height - height * max(value, 0.0) / top
 
     paths: defaultdict[str, list[str]] = defaultdict(list)
-    verdicts = zip(numbers, shown, strides["hit"], strides["close"], strict=True)
+    verdicts = zip(numbers, values, strides["hit"], strides["close"], strict=True)
     for number, value, hit, close in verdicts:
         at = x(number)
         if value is None:
-            paths["lost"].append(f"M{at:.1f} {HEIGHT:.0f}v6")
+            paths["lost"].append(f"M{at:.1f} {height:.0f}v6")
         elif hit is None:
             paths["free"].append(f"M{at - 2.4:.1f} {y(value):.1f}h4.8m-2.4 -2.4v4.8")
         elif close:
@@ -51,8 +69,8 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
         else:
             up = y(value)
             paths["miss"].append(
-                f"M{at - RING:.1f} {up:.1f}a{RING} {RING} 0 1 0 {2 * RING} 0"
-                f"a{RING} {RING} 0 1 0 {-2 * RING} 0"
+                f"M{at - ring:.1f} {up:.1f}a{ring} {ring} 0 1 0 {2 * ring} 0"
+                f"a{ring} {ring} 0 1 0 {-2 * ring} 0"
             )
     runs = [
         (goal, [number for number, _same in run])
@@ -63,23 +81,58 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
         if goal is not None:
             line += f"V{y(goal):.1f}" if before[0] else f"M{x(run[0]):.1f} {y(goal):.1f}"
             line += f"H{x(run[-1] + 1 if run[-1] != numbers[-1] else run[-1]):.1f}"
+    phases = [
+        {
+            "name": phase["name"],
+            "x": round(x(phase["from"]), 1),
+            "width": round(max(1.0, x(phase["to"]) - x(phase["from"])), 1),
+            "quiet": not phase["feedback"],
+        }
+        for phase in chart["phases"]
+    ]
+    rows = _name_phases(phases, size)
+    words = [f"{value:g}" for value in levels]
+    left = 10 + size.letter * LETTER_WIDTH * max(map(len, words), default=1)
+    above, below = size.letter * (1.25 * rows + 0.3), size.letter * 1.8
     return {
         **{name: "".join(parts) for name, parts in paths.items()},
         "goal": line,
-        "phases": [
-            {
-                "name": phase["name"],
-                "x": round(x(phase["from"]), 1),
-                "width": round(max(1.0, x(phase["to"]) - x(phase["from"])), 1),
-                "quiet": not phase["feedback"],
-            }
-            for phase in chart["phases"]
+        "size": size,
+        "box": f"{-left:.0f} {-above:.0f} {width + left:.0f} {height + above + below:.0f}",
+        "phases": phases,
+        "levels": [
+            {"y": round(y(value), 1), "words": word}
+            for value, word in zip(levels, words, strict=True)
         ],
-        "levels": [{"y": round(y(value), 1), "words": f"{value:g}"} for value in levels],
-        "first": numbers[0],
-        "last": numbers[-1],
+        "ticks": [
+            {"x": round(x(number), 1), "words": f"{number:.0f}"}
+            for number in round_steps(0, numbers[-1], most=size.steps)
+            if first <= number <= numbers[-1] and number == int(number)
+        ],
         "strides": len(numbers),
     }
+
+
+def _name_phases(phases: list[dict[str, Any]], size: Format) -> int:
+    """Add to phases where their names stand, those of narrow ones above the next; return the rows.
+
+    A phase's edge goes up to its name, past the rows below. A name for which there is no room in
+    any row is left out: the table has it.
+    """
+    begins = [size.width] * MAX_ROWS
+    used = 1
+    for phase in reversed(phases):
+        wide = size.letter * LETTER_WIDTH * len(phase["name"])
+        at = max(0.0, min(phase["x"], size.width - wide))
+        rows = (row for row in range(MAX_ROWS) if at + wide <= min(begins[row:]))
+        row = next(rows, None)
+        if row is None:
+            continue
+        begins[row] = at - size.letter / 2
+        used = max(used, row + 1)
+        phase["up"] = round(size.letter * (0.4 + 1.25 * row), 1)
+        phase["at"] = round(at, 1)
+    return used
 
 
 def round_steps(low: float, high: float, most: int = 6) -> list[float]:

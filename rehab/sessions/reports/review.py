@@ -116,24 +116,25 @@ def stride_chart(
 ) -> dict[str, Any]:
     """Return the chart's data: strides of the trained leg by column, phases, and changes.
 
-    ``shown`` is gain × value, also where no goal was known yet; ``hit`` is None where nothing was
-    judged. An invalid stride has no value, only its reasons.
+    Values are as measured, so that means of them agree; ``goal`` is what a value had to reach, the
+    goal by the gain. ``hit`` is None where nothing was judged. An invalid stride has no value, only
+    its reasons.
     """
     plan = fold.plan
     steps = (
         Step.objects.visible_to(user)
         .filter(session=session, side=session.trained_side)
         .order_by("number")
-        .values_list(
-            "number", "valid", "value", "gain", "shown", "goal", "hit", "close", "phase", "reasons"
-        )
+        .values_list("number", "valid", "value", "gain", "goal", "hit", "close", "phase", "reasons")
     )
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("number", "shown", "goal", "hit", "close", "phase", "why")
+        name: [] for name in ("number", "value", "goal", "hit", "close", "phase", "why")
     }
-    for number, valid, value, gain, shown, goal, hit, close, phase, reasons in steps.iterator():
-        seen = shown if shown is not None else value * gain if valid and value is not None else None
-        row = (number, _round(seen), _round(goal), hit, close, phase, ", ".join(reasons))
+    has_gain = False
+    for number, valid, value, gain, goal, hit, close, phase, reasons in steps.iterator():
+        measured, needed = value if valid else None, goal and goal / gain
+        row = (number, _round(measured), _round(needed), hit, close, phase, ", ".join(reasons))
+        has_gain |= gain != 1
         for column, entry in zip(columns.values(), row, strict=True):
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
@@ -142,6 +143,7 @@ def stride_chart(
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
+        "has_gain": has_gain,
         "strides": columns,
         "phases": [
             {

@@ -26,6 +26,7 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import Phase
 
+FIGURES = ("score", "hit_rate", "improvement_over_baseline")
 SESSIONS = 30  # more cannot be distinguished in a chart
 
 
@@ -74,7 +75,7 @@ class TrendPoint:
 def metrics_by_session(
     user: User, sessions: Sequence[TrainingSession]
 ) -> dict[int, dict[str, float]]:
-    """Return score and hit rate of sessions by their keys."""
+    """Return score, hit rate and improvement of sessions by their keys."""
     return _read_figures(SessionMetric.objects.visible_to(user), sessions)
 
 
@@ -82,9 +83,7 @@ def _read_figures(
     metrics: QuerySet[SessionMetric], sessions: Sequence[TrainingSession]
 ) -> dict[int, dict[str, float]]:
     found: dict[int, dict[str, float]] = defaultdict(dict)
-    rows = metrics.filter(
-        session__in=[session.pk for session in sessions], slug__in=("score", "hit_rate")
-    )
+    rows = metrics.filter(session__in=[session.pk for session in sessions], slug__in=FIGURES)
     for session_id, slug, value in rows.values_list("session_id", "slug", "value").order_by():
         found[session_id][slug] = value
     return found
@@ -100,14 +99,18 @@ def with_metrics(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[Tra
 
 
 def load_trend(
-    user: User, sessions: QuerySet[TrainingSession], *, with_imported: bool = False
+    user: User,
+    sessions: QuerySet[TrainingSession],
+    *,
+    with_imported: bool = False,
+    most: int = SESSIONS,
 ) -> list[TrendPoint]:
-    """Return the newest of these sessions that have a hit rate, oldest first.
+    """Return the newest of these sessions that have a hit rate, oldest first, at most so many.
 
     ``with_imported``: also those from the original GARRY, which have points alone.
     """
     metrics, steps = SessionMetric.objects.visible_to(user), Step.objects.visible_to(user)
-    return _read_trend(sessions, metrics, steps, with_imported=with_imported)
+    return _read_trend(sessions, metrics, steps, with_imported=with_imported, most=most)
 
 
 def load_own_trend(sessions: QuerySet[TrainingSession]) -> list[TrendPoint]:
@@ -126,12 +129,13 @@ def _read_trend(
     steps: QuerySet[Step],
     *,
     with_imported: bool,
+    most: int = SESSIONS,
 ) -> list[TrendPoint]:
     rate = metrics.filter(session=OuterRef("pk"), slug="hit_rate")
     wanted = Exists(rate) | Q(legacy_id__isnull=False) if with_imported else Q(Exists(rate))
     counted = sessions.filter(wanted, excluded=False)
     ended = counted.select_related("measure")
-    newest = list(ended.order_by("-created_at", "-pk")[:SESSIONS])[::-1]
+    newest = list(ended.order_by("-created_at", "-pk")[:most])[::-1]
     figures, values = _read_figures(metrics, newest), _values_by_phase(steps, newest)
     points: list[TrendPoint] = []
     for session in newest:
@@ -224,11 +228,13 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
         "hits": {
             "days": [day(point) for point in trend],
             "joined": len({point.session.valence for point in trend}) == 1,
+            "types": [_type_of(point.session) for point in trend],
             "hit": [to_percent(point.hit_rate) for point in trend],
             "wanted": [to_percent(point.target_hit_rate) for point in trend],
         },
         "values": {
             "days": [day(point) for point in comparable],
+            "types": [_type_of(point.session) for point in comparable],
             "mean": [spread and round(spread.mean, 3) for spread in trained],
             "deviation": [spread and round(spread.deviation, 3) for spread in trained],
             "baseline": [point.baseline and round(point.baseline.mean, 3) for point in comparable],
@@ -236,6 +242,11 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
             "unit": measure.unit if measure else "",
         },
     }
+
+
+def _type_of(session: TrainingSession) -> str:
+    """Return the slug of a session's feedback type; one that was changed is none of one type."""
+    return "" if session.changed_to else session.valence
 
 
 def to_percent(rate: float | None) -> float | None:

@@ -74,7 +74,7 @@ export class Marks {
   }
 
   bar(x, low, high, stroke) {
-    this.line(this.x(x), this.y(low), this.x(x), this.y(high), stroke, 5);
+    this.line(this.x(x), this.y(low), this.x(x), this.y(high), stroke, 2);
   }
 
   line(x0, y0, x1, y1, stroke, width, dashes = []) {

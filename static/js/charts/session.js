@@ -10,11 +10,11 @@ const DENSE_PX = 2; // a stride; with less they are drawn smaller
 // Values of the strides with a verdict: true for hits, false for misses, null without one. Those that
 // were close are drawn by themselves.
 function valuesOf(verdict) {
-  return strides.shown.map((shown, i) => (strides.hit[i] === verdict && !strides.close[i] ? shown : null));
+  return strides.value.map((value, i) => (strides.hit[i] === verdict && !strides.close[i] ? value : null));
 }
 
 function describeVerdict(index) {
-  if (strides.shown[index] === null)
+  if (strides.value[index] === null)
     return fill(_("does not count (%(why)s)"), {
       why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value"),
     });
@@ -33,7 +33,7 @@ function showReadout(index) {
     strides.goal[index] === null ? "" : fill(_(", goal %(goal)s"), { goal: formatValue(strides.goal[index]) });
   document.querySelector(".readout").textContent = fill(_("Stride %(number)s: %(value)s, %(verdict)s"), {
     number: strides.number[index],
-    value: formatValue(strides.shown[index]) + goal,
+    value: formatValue(strides.value[index]) + goal,
     verdict: describeVerdict(index),
   });
 }
@@ -93,8 +93,8 @@ function drawChanges(marks) {
 
 function drawGaps(marks) {
   const bottom = marks.box.top + marks.box.height;
-  strides.shown.forEach((shown, index) => {
-    if (shown !== null) return;
+  strides.value.forEach((value, index) => {
+    if (value !== null) return;
     const x = marks.x(strides.number[index]);
     if (x >= marks.box.left && x <= marks.box.left + marks.box.width) {
       marks.line(x, bottom - 12 * marks.unit, x, bottom, color("c-gap"), 2);
@@ -103,7 +103,7 @@ function drawGaps(marks) {
 }
 
 function drawStrides(element) {
-  const seen = [...strides.shown, ...strides.goal].filter((value) => value !== null);
+  const seen = [...strides.value, ...strides.goal].filter((value) => value !== null);
   const [least, most] = [Math.min(...seen), Math.max(...seen, 0.001)];
   const air = 0.06 * (most - Math.min(least, 0.9 * most));
   const bottom = least > 0.3 * most ? least - 2 * air : Math.min(0, least); // what lies far above zero fills the page
@@ -115,7 +115,7 @@ function drawStrides(element) {
       valuesOf(null),
       valuesOf(false),
       valuesOf(true),
-      strides.shown.map((shown, i) => (strides.close[i] ? shown : null)),
+      strides.value.map((value, i) => (strides.close[i] ? value : null)),
       strides.goal,
     ],
     series: [
@@ -130,11 +130,11 @@ function drawStrides(element) {
     cursor: { y: false, points: { show: false }, drag: { x: true, y: false } },
     under: drawPhases,
     paint: (marks) => {
-      strides.shown.forEach((shown, index) => {
-        if (shown === null || strides.hit[index] !== null) return;
+      strides.value.forEach((value, index) => {
+        if (value === null || strides.hit[index] !== null) return;
         const x = marks.x(strides.number[index]);
         if (x >= marks.box.left && x <= marks.box.left + marks.box.width) {
-          marks.square(strides.number[index], shown, size / 2.6, color("c-third"));
+          marks.square(strides.number[index], value, size / 2.6, color("c-third"));
         }
       });
       drawGaps(marks);
@@ -158,7 +158,7 @@ function fillTable(place) {
   const head = table.createTHead().insertRow();
   for (const name of [
     _("Stride"),
-    fill(_("Shown, %(unit)s"), { unit }),
+    fill(_("Measured, %(unit)s"), { unit }),
     fill(_("Goal, %(unit)s"), { unit }),
     _("Verdict"),
   ]) {
@@ -172,7 +172,7 @@ function fillTable(place) {
     const title = cell("th", stride);
     title.scope = "row";
     const value = (column) => (strides[column][index] === null ? "–" : number(strides[column][index], 2));
-    row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", describeVerdict(index)));
+    row.append(title, cell("td", value("value")), cell("td", value("goal")), cell("td", describeVerdict(index)));
   });
   place.append(table);
 }

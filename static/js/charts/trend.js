@@ -18,6 +18,18 @@ function days(labels) {
   };
 }
 
+const SIGNS = { positive: "+", negative: "−", binary: "±", explicit: "3.5" };
+
+// A session's mark is that of its feedback type, in the colors of the key.
+function drawType(marks, x, y, type) {
+  const style = getComputedStyle(document.querySelector(`.key [data-theme="${type}"]`));
+  marks.disc(x, y, 11, style.borderColor);
+  marks.disc(x, y, 9.5, style.backgroundColor);
+  const [sign, size] = [SIGNS[type] ?? "", type === "explicit" ? 10 : 16];
+  const middle = marks.y(y) + 0.36 * size * marks.unit;
+  marks.text(sign, marks.x(x), middle, { size, weight: 800, fill: color("ink") });
+}
+
 // The range of x leaves half a session on each side, so that marks are whole.
 function sessions(count) {
   return { x: { time: false, range: () => [-0.5, count - 0.5] } };
@@ -41,10 +53,10 @@ function drawHits(element) {
         if (hit === null) return; // imported: only its points are known
         const wanted = hits.wanted[index];
         if (wanted) marks.dash(index, wanted, color("c-goal"), count);
-        marks.disc(index, hit, 7, color("c-hit"));
+        drawType(marks, index, hit, hits.types[index]);
         if (count > LABELED) return;
         const below = hit > 88 || (wanted && wanted > hit && wanted - hit < 16);
-        const y = marks.y(hit) + (below ? 26 : -14) * marks.unit;
+        const y = marks.y(hit) + (below ? 30 : -17) * marks.unit;
         marks.text(number(hit), marks.x(index), y, { size: 17, weight: 800, fill: color("text") });
       });
     },
@@ -70,10 +82,10 @@ function drawValues(element) {
     paint: (marks) => {
       values.days.forEach((_, index) => {
         if (values.mean[index] !== null) {
-          marks.bar(index, ...span(index), `${color("c-hit")}59`);
-          marks.disc(index, values.mean[index], 7, color("c-hit"));
+          marks.bar(index, ...span(index), color("edge"));
         }
         if (values.goal[index] !== null) marks.dash(index, values.goal[index], color("c-goal"), count);
+        if (values.mean[index] !== null) drawType(marks, index, values.mean[index], values.types[index]);
         if (values.baseline[index] !== null) {
           marks.square(index, values.baseline[index], 6, color("c-third"), count > LABELED ? 0 : -20);
         }
