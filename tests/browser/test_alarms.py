@@ -246,7 +246,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")
         picture(patient, "fall-on-the-patients-page")
-        told.get_by_role("button", name="I have seen it").click()
+        told.get_by_role("button", name="I’ll take care of it").click()
         expect(told).to_have_count(0)
         for page in (monitor, second):
             expect(page.locator(".red[data-alarm]")).to_have_count(0)
