@@ -101,7 +101,8 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     }
     coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
     if coming:
-        context |= {"next": coming[0]} | begin_context(user, coming[0].patient)
+        following = next((row for row in coming if not row.is_late), coming[0])
+        context |= {"next": following} | begin_context(user, following.patient)
     return render(request, "patients/start.html", context)
 
 
