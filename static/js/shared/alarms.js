@@ -4,7 +4,14 @@ import { minutesAgo } from "garry/shared/format";
 
 const EVERY_MS = 2_500;
 const place = document.querySelector("[data-alarms]");
-let shown;
+let shown = "";
+
+// Whether the start page's list of today marks others than those who fell.
+function isListOld() {
+  const fallen = new Set([...place.querySelectorAll("[data-fell]")].map(({ dataset }) => dataset.fell));
+  const listed = [...document.querySelectorAll(".start:not(.chosen) .today a")];
+  return listed.some((row) => fallen.has(row.getAttribute("href")) !== row.classList.contains("fell"));
+}
 
 async function look() {
   if (!document.hidden) {
@@ -13,12 +20,9 @@ async function look() {
       const answer = await fetch(place.dataset.alarms, { headers: { "Garry-Watching": "yes" }, redirect: "error" });
       const found = answer.ok ? (await answer.text()).trim() : "";
       // The token in the forms is another each time.
-      const [now, before] = [found, shown ?? ""].map((text) => text.replace(/<input[^>]*>/g, ""));
-      const isNew = answer.ok && now !== before;
-      // The list of today marks who fell: it shows what is now.
-      if (isNew && shown !== undefined && document.querySelector(".start:not(.chosen)")) return location.reload();
-      if (isNew) place.innerHTML = found;
-      if (answer.ok) shown = found;
+      const [now, before] = [found, shown].map((text) => text.replace(/<input[^>]*>/g, ""));
+      if (answer.ok && now !== before) place.innerHTML = shown = found;
+      if (answer.ok && isListOld()) return location.reload();
       for (const since of place.querySelectorAll("[data-since]")) {
         const text = `(${minutesAgo(since.dataset.since)})`;
         if (since.textContent !== text) since.textContent = text;
