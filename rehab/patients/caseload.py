@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import date, datetime, timedelta
+from datetime import date, datetime, time, timedelta
 from enum import StrEnum
 
 from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from rehab.patients.visits import Visit
+from rehab.patients.visits import Visit, is_late
 from rehab.people.models import Patient, User
 from rehab.people.simulated import counted
 from rehab.sessions.formatting import clinic_time, format_number
@@ -64,7 +64,7 @@ class Case:
     """A patient of the list.
 
     ``walks``: the newest sessions, the newest first; ``recent``: how many of the last four weeks;
-    ``missed``: the last planned day on which the patient did not walk, if none was walked since.
+    ``missed``: the last planned day whose visit is past, if the patient has not walked since.
     """
 
     patient: Patient
@@ -107,7 +107,7 @@ def judge(
     walks
         The newest sessions, the newest first.
     next_day, missed
-        The next planned visit; a planned day that passed without a walk on it or since.
+        The next planned visit; a planned day whose visit is past, without a walk on it or since.
     today
         By the clinic's clock.
     """
@@ -131,7 +131,8 @@ def judge(
 
 
 def load_caseload(user: User, now: datetime) -> list[Case]:
-    """Return the patients whose program goes on: by need (`ORDER`), then by their last session.
+    """Return the patients whose program goes on: by need (`ORDER`), by when they come today, then
+    by their last session.
 
     ``now`` is in the clinic's time zone.
     """
@@ -155,11 +156,12 @@ def load_caseload(user: User, now: datetime) -> list[Case]:
     planned = Visit.objects.visible_to(user).filter(day__gte=today - COMING)
     for visit in planned.order_by("day", "at"):
         visits[visit.patient_id].append(visit)
-    cases = [_to_case(each, walks[each.pk], visits[each.pk], today) for each in patients]
+    cases = [_to_case(each, walks[each.pk], visits[each.pk], now) for each in patients]
     return sorted(
         cases,
         key=lambda case: (
             min((ORDER.index(flag) for flag in case.flags), default=ORDER.index(Flag.NEW)),
+            _time_today(case, today),
             not case.walks,
             case.walks[0].day if case.walks else date.min,
             case.patient.nickname,
@@ -167,10 +169,20 @@ def load_caseload(user: User, now: datetime) -> list[Case]:
     )
 
 
-def _to_case(patient: Patient, walks: Sequence[Walk], visits: Sequence[Visit], today: date) -> Case:
+def _time_today(case: Case, today: date) -> time:
+    """Return when somebody comes today; the day's last moment for who does not, or at no time."""
+    visit = case.next_visit
+    return (visit.at if visit and visit.day == today else None) or time.max
+
+
+def _to_case(
+    patient: Patient, walks: Sequence[Walk], visits: Sequence[Visit], now: datetime
+) -> Case:
+    today = now.date()
     last = walks[0].day if walks else date.min
     coming = next((v for v in visits if v.day >= today and v.day > last), None)
-    missed = next((v.day for v in reversed(visits) if last < v.day < today), None)
+    past = [v.day for v in visits if v.day < today or (v.day == today and is_late(v.at, now))]
+    missed = next((day for day in reversed(past) if day > last), None)
     return Case(
         patient,
         walks,

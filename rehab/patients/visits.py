@@ -26,6 +26,7 @@ QUICK_VISIT_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
 MAX_AHEAD = timedelta(days=366)
 MAX_WEEKS = 26  # of visits that are planned at once
 QUARTER_MIN = 15
+LATE_AFTER = timedelta(minutes=10)  # of a visit's time
 
 
 class InvalidVisitDay(ValueError):
@@ -61,7 +62,7 @@ class Visit(ClinicModel):
 
 
 class Progress(StrEnum):
-    """A patient's progress today, in the order of the list."""
+    """A patient's progress today: who is open comes first in the list, in this order."""
 
     WALKING = "walking"
     PAUSED = "paused"
@@ -78,6 +79,7 @@ class PatientToday:
     at: time | None
     progress: Progress
     walked_s: float = 0.0
+    is_late: bool = False
 
 
 PROGRESS_OF_OPEN = {
@@ -125,6 +127,11 @@ def next_visit(patient_id: int, after: datetime) -> Visit | None:
     return planned.exclude(day=after.date(), at__lt=after.time()).order_by("day", "at").first()
 
 
+def is_late(at: time | None, now: datetime) -> bool:
+    """Return whether who is expected today at a time should be here. Both in the clinic's zone."""
+    return at is not None and datetime.combine(now.date(), at, now.tzinfo) + LATE_AFTER < now
+
+
 def suggested_time(user: User, patient: Patient, now: datetime) -> time | None:
     """Return the time to suggest for the next visit: today's, or when the last session began.
 
@@ -144,10 +151,9 @@ def suggested_time(user: User, patient: Patient, now: datetime) -> time | None:
 
 
 def patients_today(user: User, now: datetime) -> list[PatientToday]:
-    """Return who is expected at somebody's clinic today or was here, in the order of `Progress`.
+    """Return who is expected at somebody's clinic today or was here: open ones first, then by time.
 
-    Within a state patients are ordered by time. ``now`` is in the clinic's time zone. Ended
-    sessions count if a person walked in them.
+    ``now`` is in the clinic's time zone. Ended sessions count if a person walked in them.
     """
     patients = Patient.objects.visible_to(user).filter(ended_at=None)
     patients = patients.annotate(count=Count("sessions", distinct=True))
@@ -162,10 +168,13 @@ def patients_today(user: User, now: datetime) -> list[PatientToday]:
         _to_row(patient, expected.get(patient.pk), by_patient.get(patient.pk, []), now)
         for patient in patients.filter(pk__in={*expected, *by_patient})
     ]
-    order = list(Progress)
-    return sorted(
-        rows, key=lambda row: (order.index(row.progress), row.at or time.max, row.patient.nickname)
-    )
+    order = list(PROGRESS_OF_OPEN.values())
+
+    def place(row: PatientToday) -> tuple[int, time, str]:
+        first = order.index(row.progress) if row.progress in order else len(order)
+        return first, row.at or time.max, row.patient.nickname
+
+    return sorted(rows, key=place)
 
 
 def _to_row(
@@ -182,4 +191,5 @@ def _to_row(
         at,
         progress[-1] if progress else ended,
         sum(session.active_s for session in sessions),
+        not sessions and is_late(at, now),
     )

@@ -173,6 +173,10 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 ),
                 gettext_noop("Tap “Lap” at each turn. Every minute, say how much time is left."),
                 gettext_noop("At six minutes, measure the meters since the last turn."),
+                gettext_noop(  # ATS 2002
+                    "Stop at once for chest pain, severe breathlessness, leg cramps, dizziness or "
+                    "staggering, heavy sweating, or a pale face."
+                ),
             ),
             norms=((60, 538, 572), (70, 471, 527), (80, 392, 417)),  # means: Steffen 2002
             least_change=34.4,  # Tang 2012

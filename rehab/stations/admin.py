@@ -10,7 +10,8 @@ from django.db.models import Prefetch, QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
-from django.utils.html import format_html_join
+from django.utils.html import format_html, format_html_join
+from django.utils.safestring import mark_safe
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -20,7 +21,7 @@ from rehab.people.web.token_admin import TokenAdmin
 from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import PinForm
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import format_device_state, format_device_states
+from rehab.stations.presence import format_badge, format_device_state, format_device_states
 
 
 class DeviceInline(ScopedOptions, admin.TabularInline):
@@ -49,7 +50,8 @@ class DeviceInline(ScopedOptions, admin.TabularInline):
     @admin.display(description=_("state"))
     def state(self, device: Device) -> str:
         """Return when the device last connected."""
-        return format_device_state(device, timezone.now())
+        now = timezone.now()
+        return format_badge(device, format_device_state(device, now), now)
 
 
 class StationAdminForm(PinForm, ClinicForm):
@@ -63,7 +65,7 @@ class StationAdmin(ScopedAdmin):
     form = StationAdminForm
     fields = ("name", "pin", "no_pin")
     list_display = ("name", "tablets", "sources", "robots", "has_pin")
-    search_fields = ("name", "devices__name")
+    actions = None  # few rows, each with a page of its own
     inlines = (DeviceInline,)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Station]:
@@ -100,13 +102,15 @@ class StationAdmin(ScopedAdmin):
     def _format_devices(self, station: Station, kind: Device.Kind) -> str:
         now = timezone.now()
         devices = [device for device in station.devices.all() if device.kind == kind]
-        found = [(device.name, state) for device, state in format_device_states(devices, now)]
-        return format_html_join(", ", "{}: {}", found) or gettext("none")
+        states = format_device_states(devices, now)
+        found = [(device.name, format_badge(device, state, now)) for device, state in states]
+        none = format_html('<span class="badge free">– {}</span>', gettext("none"))
+        return format_html_join(mark_safe("<br>"), "{} {}", found) or none
 
-    @admin.display(description=_("PIN to leave"), boolean=True)
-    def has_pin(self, station: Station) -> bool:
+    @admin.display(description=_("Leaving the patient’s page"))
+    def has_pin(self, station: Station) -> str:
         """Return whether leaving the patient's page asks for a PIN."""
-        return bool(station.pin_hash)
+        return gettext("with a PIN") if station.pin_hash else gettext("without a PIN")
 
 
 @admin.register(Device)
@@ -139,4 +143,5 @@ class DeviceAdmin(TokenAdmin):
         """Return that the device is revoked, or when it last connected."""
         if not device.pk:
             return gettext("Its token is shown once you save it.")
-        return format_device_state(device, timezone.now())
+        now = timezone.now()
+        return format_badge(device, format_device_state(device, now), now)

@@ -6,6 +6,8 @@ from collections.abc import Collection
 from datetime import datetime, timedelta
 
 from django.utils.formats import date_format
+from django.utils.html import format_html
+from django.utils.safestring import SafeString
 from django.utils.translation import gettext, ngettext
 
 from rehab.stations.device_trust import find_ended
@@ -45,6 +47,18 @@ def format_device_state(device: Device, now: datetime) -> str:
     """Return what is wrong with a device's token, else when it last connected."""
     [(_, state)] = format_device_states([device], now)
     return state
+
+
+def format_badge(device: Device, state: str, now: datetime) -> SafeString:
+    """Return a device's state with its sign: ✓ connected, ! to be seen to, – away or shut out."""
+    seen = device.last_seen_at
+    if device.is_revoked or (device.builtin and seen is None):
+        sign, look = "–", "free"
+    elif seen is None or state != format_last_seen(seen, now):
+        sign, look = "!", "warn"
+    else:
+        sign, look = ("✓", "") if now - seen < JUST_NOW else ("–", "free")
+    return format_html('<span class="badge {}">{} {}</span>', look, sign, state)
 
 
 def _format_state(device: Device, has_ended: bool, now: datetime) -> str:

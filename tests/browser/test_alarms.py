@@ -239,14 +239,18 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             expect(red).to_have_count(1)  # its consequences are hidden
             expect(red).to_contain_text("Iris fell")
             expect(page.locator("[data-alarm]")).to_have_count(1)
+            expect(red).to_contain_text("Robot stopped")  # there is one
+            expect(page.locator(".said")).to_be_empty()  # the banner says it
         told = start.locator(".elsewhere .red", has_text="Iris fell.")
         expect(told).to_be_visible()
+        expect(start.locator(".today li").first).to_contain_text("fell")
+        expect(start.locator(".chosen-one > .fell")).to_contain_text("Iris")
         expect(patient.locator(".words")).to_have_text("Stay where you are.")
         expect(patient.locator(".sub")).to_have_text("Help is coming.")
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")
         picture(patient, "fall-on-the-patients-page")
-        told.get_by_role("button", name="I have seen it").click()
+        told.get_by_role("button", name="I’ll take care of it").click()
         expect(told).to_have_count(0)
         for page in (monitor, second):
             expect(page.locator(".red[data-alarm]")).to_have_count(0)

@@ -90,3 +90,16 @@ def test_the_page_lists_patients_of_this_clinic_alone(world):
     TrainingSession.everywhere.filter(patient=world.patient).update(simulated=False, active_s=60)
     assert missed() is None
     assert client_of(world).get("/caseload/?only=nonsense").status_code == 200
+
+
+@pytest.mark.django_db
+def test_who_is_late_today_is_overdue_and_comes_by_time(world):
+    Visit.everywhere.all().delete()
+    now = clinic_time(NOW, world.clinic)
+    for name, minutes in (("Bo", -45), ("Ana", -30), ("Cleo", -5), ("Dora", 30)):
+        plan_visit(world.add_patient(name), now.date(), (now + timedelta(minutes=minutes)).time())
+    cases = load_caseload(world.people[Role.PT], now)
+    come = [(case.patient.nickname, "due" in case.flags) for case in cases if case.next_visit]
+    assert come == [("Bo", True), ("Ana", True), ("Cleo", False), ("Dora", False)]
+    page = client_of(world).get("/caseload/").content.decode()
+    assert "▲" not in page  # the note explains no arrow that is nowhere

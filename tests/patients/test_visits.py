@@ -33,7 +33,7 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     names = ("Ana", "Bo", "Cleo", "Dora", "Emil", "Fay")
     ana, bo, cleo, dora, emil, fay = (world.add_patient(name) for name in names)
     today = HERE.date()
-    plan_visit(ana, today, time(11, 0))
+    plan_visit(ana, today, time(9, 30))
     plan_visit(bo, today, None)
     plan_visit(cleo, today, time(9, 0))
     plan_visit(fay, today + timedelta(1), time(8, 0))
@@ -44,11 +44,12 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     listed = patients_today(world.people[Role.PT], HERE)
     assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
         ("Dora", HERE.time().replace(second=0), Progress.WALKING),
-        ("Ana", time(11, 0), Progress.EXPECTED),
-        ("Bo", None, Progress.EXPECTED),
         ("Cleo", time(9, 0), Progress.DONE),
+        ("Ana", time(9, 30), Progress.EXPECTED),
+        ("Bo", None, Progress.EXPECTED),
     ]
-    assert listed[-1].walked_s == pytest.approx(130, abs=3)
+    assert [row.is_late for row in listed] == [False, False, True, False]
+    assert listed[1].walked_s == pytest.approx(130, abs=3)
 
 
 def test_who_was_here_today_is_next_expected_another_day(world, pt):

@@ -350,8 +350,11 @@ def test_a_stations_page_shows_its_devices_and_their_state(world):
     url = f"/admin/rehab/station/{station.pk}/change/"
     page = client_of(world, Role.LEAD).get(url).content.decode()
     assert reverse("admin:rehab_device_change", args=[world.device.pk]) in page
-    assert "revoked" in page
+    assert '<span class="badge free">– revoked</span>' in page
     assert f"?station={station.pk}" in page
+    Device.everywhere.filter(pk=world.device.pk).update(revoked_at=None, last_seen_at=None)
+    listed = client_of(world, Role.LEAD).get("/admin/rehab/station/").content.decode()
+    assert '<span class="badge warn">! never seen</span>' in listed
 
 
 def test_deleting_says_what_goes_and_what_stays_behind(world):

@@ -47,6 +47,7 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     told = seen(pt)
     assert "Iris fell." in told
     assert "Finished" in told
+    assert "I’ll take care of it" in told
     assert "Iris" not in seen(pt, but=session.pk)
     assert "Iris" not in seen(pt, station=world.session.station_id or 0)  # it was at none
     assert "Iris" not in seen(client_of(build_world("oak")))
@@ -68,11 +69,15 @@ def test_what_an_ended_session_left_is_folded_up_on_the_page_of_another(world, s
         assert ("1 alarm of an ended session" in told) is is_folded
 
 
-def test_a_fall_stands_first_in_the_admins_day(world, session):
-    note(session, "fall")
+def test_a_fall_stands_first_on_the_start_page_and_in_the_admins_day(world, session):
+    note(session, "fall", by=world.people[Role.PT])
     TrainingSession.everywhere.filter(pk=session.pk).update(active_s=60)
     walk(make_patient(world.clinic, "Tom", code="K-2"), "positive", [HIT])
-    page = client_of(world).get(reverse("admin:index"))
+    pt = client_of(world)
+    assert f"noted by {world.people[Role.PT]}" in seen(pt)
+    listed = seen(pt, "start")
+    assert listed.index("Iris") < listed.index("Tom")
+    page = pt.get(reverse("admin:index"))
     fallen = [(row.patient, row.has_fallen) for row in page.context["today"]]
     assert fallen[0] == ("Iris", True)
     assert sum(has_fallen for _, has_fallen in fallen) == 1

@@ -30,6 +30,7 @@ def show_caseload(request: HttpRequest) -> HttpResponse:
             if not only or only in case.flags
         ],
         "only": only,
+        "has_arrows": any(case.way for case in cases),
         "chips": [
             (flag, label, sum(not flag or flag in case.flags for case in cases))
             for flag, label in {"": "", **FLAGS}.items()

@@ -68,13 +68,14 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
     else:  # patients whose program has ended are found by name or code only
         patients = patients.filter(ended_at=None)
     shown = list(patients[: MAX_PATIENTS + 1])
+    fallen = {one.session.patient_id for one in alarms if one.kind == Alarm.FALL}
     return {
         "now": now,
-        "today": patients_today(user, now),
+        "today": sorted(patients_today(user, now), key=lambda row: row.patient.pk not in fallen),
         "patients": shown[:MAX_PATIENTS],
         "more": len(shown) > MAX_PATIENTS,
-        "open": open_sessions(user),
-        "fallen": {one.session.patient_id for one in alarms if one.kind == Alarm.FALL},
+        "open": sorted(open_sessions(user), key=lambda one: one.patient_id not in fallen),
+        "fallen": fallen,
     }
 
 
@@ -130,7 +131,8 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     }
     coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
     if coming:
-        context |= {"next": coming[0]} | begin_context(user, coming[0].patient)
+        following = next((row for row in coming if not row.is_late), coming[0])
+        context |= {"next": following} | begin_context(user, following.patient)
     return render(request, "patients/start.html", context)
 
 

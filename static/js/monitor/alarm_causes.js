@@ -1,7 +1,7 @@
 // What a therapist has to look at: a table of causes, the one behind the others first. Each has the consequences that
 // it hides, a sentence with the cure, and what its button does.
 //
-//   describe(session, page)   the sentence; "" where it is not so
+//   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what to do, what is so
 //   action                    [label, what is done]; or a function of the session that returns it
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
@@ -15,7 +15,6 @@ import { describeReason } from "garry/monitor/robot_text";
 const FIRST_STRIDE_S = 10; // a walk needs longer to begin
 const RESTART_S = 15; // after which what has not come back is told
 const LAST = 10; // strides, of which half may not count before that is told
-const SEEN = _("I have seen it");
 const STORAGE = {
   late: _("The database is not answering: strides are waiting, and the robot is standing still."),
   disk_full: _("The server’s disk is full: strides are not stored. Make room on it."),
@@ -48,14 +47,14 @@ function describeFall(session, { robot }) {
   const alarm = alarmOf(session, "fall");
   if (!alarm) return "";
   const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
+  const { station } = document.getElementById("monitor").dataset;
+  const cure = `${_("Stay with the patient and call for help.")} ${_("If the belt still runs, stop it by hand.")}`;
   const facts = [
-    document.getElementById("monitor").dataset.station,
     minutesAgo(alarm.at),
     session.state === "paused" && _("Paused"),
-    robot.isStopped && _("Robot stopped"),
+    robot.isHere && robot.isStopped && _("Robot stopped"),
   ];
-  const cure = `${_("If the belt still runs, stop it by hand.")} ${_("Stay with the patient and call for help.")}`;
-  return `${fell}\n${facts.filter(Boolean).join(" · ")}\n${cure}`;
+  return [fell, station, cure, facts.filter(Boolean).join(" · ")].join("\n");
 }
 
 function describeOwnStop(session, { robot }) {
@@ -138,14 +137,14 @@ export const CAUSES = [
     isRed: true,
     describe: describeFall,
     isOwn: ({ state }) => state.fellHere,
-    action: () => [SEEN, ({ remark }) => remark("fall_acknowledged")],
+    action: () => [_("I’ll take care of it"), ({ remark }) => remark("fall_acknowledged")],
   },
   {
     cause: "robot_stop",
     hides: ["robot"],
     isRed: true,
     describe: describeOwnStop,
-    action: () => [SEEN, ({ remark }) => remark("stop_acknowledged")],
+    action: () => [_("I have seen it"), ({ remark }) => remark("stop_acknowledged")],
   },
   {
     cause: "storage",

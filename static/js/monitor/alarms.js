@@ -6,6 +6,7 @@ import { soundAlarm } from "garry/monitor/alarm_tone";
 import { findCauses } from "garry/monitor/alarm_causes";
 
 const REFRESH_MS = 250; // silence sends no event
+const LINES = ["b", "b", "span", "small"]; // of a fall, as in sessions/alarm.html
 
 export function createAlarms(page) {
   const { state } = page;
@@ -21,6 +22,19 @@ export function createAlarms(page) {
     banner.firstChild.className = "grow";
     if (!isCalm && !isOwn?.(page)) soundAlarm();
     return banner;
+  }
+
+  function drawWords(banner, sentence) {
+    if (banner.dataset.of === sentence) return;
+    banner.dataset.of = sentence;
+    const lines = sentence.split("\n");
+    const tags = lines.length > 1 ? LINES : ["span"];
+    const drawn = lines.map((line, index) => {
+      const part = document.createElement(tags[index]);
+      part.textContent = `${line} `;
+      return line ? part : "";
+    });
+    banner.firstChild.replaceChildren(...drawn);
   }
 
   function drawButton(banner, action) {
@@ -47,7 +61,7 @@ export function createAlarms(page) {
       if (!shown.has(row.cause)) shown.set(row.cause, make(row));
       const banner = shown.get(row.cause);
       if (place.children[index] !== banner) place.insertBefore(banner, place.children[index] ?? null);
-      if (banner.firstChild.textContent !== sentence) banner.firstChild.textContent = sentence;
+      drawWords(banner, sentence);
       drawButton(banner, row.action?.(session));
     });
     document.body.classList.toggle("stale", causes.has("server"));

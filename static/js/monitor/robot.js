@@ -162,7 +162,8 @@ export class RobotPanel {
   draw() {
     const { show } = this.#page;
     show("robot-state", this.#describeState());
-    show("robot-stop", this.isStopped ? _("Robot stopped") : _("Stop robot"));
+    const stopped = this.isHere ? _("Robot stopped") : _("No robot here");
+    show("robot-stop", this.isStopped ? stopped : _("Stop robot"));
     this.#button("stop").classList.toggle("done", this.isStopped);
     this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
     show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
@@ -217,9 +218,14 @@ export class RobotPanel {
     return !this.isStopped && simulated === true && state === "stopped" && !BY_PERSON.has(reason);
   }
 
+  // Whether there is one, connected or lost.
+  get isHere() {
+    return this.#isConnected || this.#page.state.hadRobot;
+  }
+
   // Whether a person has to arm it before it moves.
   get #isHeld() {
-    if (this.isStopped) return this.#isConnected || this.#page.state.hadRobot;
+    if (this.isStopped) return this.isHere;
     if (this.#isRecovering) return false;
     const { state, reason } = this.#status ?? {};
     return this.#isConnected && (WAITING_STATES.has(state) || reason === "place_unknown");

@@ -21,6 +21,8 @@ function draw(slug, isDone, words) {
   if (sign) sign.textContent = isDone ? "✓" : sign.dataset.sign;
   const live = root.querySelector(`[data-live=${slug}]`);
   if (!live) return;
+  // What is done is folded away: the next step is what leads on.
+  if (isDone && !live.classList.contains("done")) root.querySelector("details")?.removeAttribute("open");
   live.classList.toggle("done", isDone);
   if (live.textContent !== words) live.textContent = words;
   const next = root.querySelector("[name=skip]");

@@ -35,7 +35,9 @@ if (timer) {
     laps = passed_s = 0;
     timer.querySelector("[data-laps]")?.replaceChildren("0");
     run.textContent = _("Stop");
-    if (lap) lap.disabled = false;
+    run.classList.toggle("primary", !lap);
+    if (lap) lap.hidden = lap.disabled = false;
+    timer.scrollIntoView();
     show();
   }
 
@@ -43,6 +45,7 @@ if (timer) {
     passed_s = seconds();
     startedAt = null;
     run.textContent = _("Again");
+    run.classList.remove("primary");
     if (lap) lap.disabled = true;
     if (lapTest_s) measure();
     else result.value = passed_s.toFixed(2);

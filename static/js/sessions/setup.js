@@ -18,7 +18,7 @@ for (const step of document.querySelectorAll(".step")) {
 const choices = document.querySelectorAll("input[name=goal_by]");
 function showGoal() {
   const by = document.querySelector("input[name=goal_by]:checked")?.value ?? "value";
-  for (const step of document.querySelectorAll(".step[data-for]")) step.hidden = step.dataset.for !== by;
+  for (const part of document.querySelectorAll("[data-for]")) part.hidden = part.dataset.for !== by;
 }
 choices.forEach((choice) => choice.addEventListener("change", showGoal));
 showGoal();

@@ -6,6 +6,13 @@ const EVERY_MS = 2_500;
 const place = document.querySelector("[data-alarms]");
 let shown = "";
 
+// Whether the start page's list of today marks others than those who fell.
+function isListOld() {
+  const fallen = new Set([...place.querySelectorAll("[data-fell]")].map(({ dataset }) => dataset.fell));
+  const listed = [...document.querySelectorAll(".start:not(.chosen) .today a")];
+  return listed.some((row) => fallen.has(row.getAttribute("href")) !== row.classList.contains("fell"));
+}
+
 async function look() {
   if (!document.hidden) {
     try {
@@ -15,6 +22,7 @@ async function look() {
       // The token in the forms is another each time.
       const [now, before] = [found, shown].map((text) => text.replace(/<input[^>]*>/g, ""));
       if (answer.ok && now !== before) place.innerHTML = shown = found;
+      if (answer.ok && isListOld()) return location.reload();
       for (const since of place.querySelectorAll("[data-since]")) {
         const text = `(${minutesAgo(since.dataset.since)})`;
         if (since.textContent !== text) since.textContent = text;

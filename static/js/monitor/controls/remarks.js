@@ -20,7 +20,10 @@ export function createRemarks({ announce, onPress, remark }) {
 
   return {
     events: {
-      remark: (_session, event) => announce(fill(_("Noted: %(what)s"), { what: describe(annotationOf(event)) })),
+      remark(_session, event) {
+        if (event.what === "fall") return; // its banner says so
+        announce(fill(_("Noted: %(what)s"), { what: describe(annotationOf(event)) }));
+      },
     },
   };
 }
