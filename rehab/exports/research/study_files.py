@@ -37,7 +37,7 @@ PARTICIPANTS = (
 HERE = Path(__file__).parent
 VERIFIER = HERE / "verify_allocation.py"
 # What `reanalyze.py` computes with: GARRY's own model, as it is.
-MODEL = ("comparison", "designs", "mixed_model", "sequential", "tipping_point")
+MODEL = ("comparison", "design_matrix", "mixed_model", "sequential", "tipping_point")
 PACKAGE = "garry_analysis"
 DATED = re.compile(r"\d{4}-\d{2}-\d{2}")
 
