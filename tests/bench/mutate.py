@@ -3,7 +3,8 @@
 Each mutant is one small change (a comparison, a number, a condition, a call that goes, …) in a copy
 of the tree. One run of all tests tells which of them come to the changed statements (for what runs
 while a module is imported: those in the folder that mirrors its own); a mutant meets those, the
-quick files first, and is killed where one fails that passed before. Which mutants are
+quick files first, and is killed where one fails that passed before. Those that none comes to meet
+the tests of PostgreSQL (DATABASE_URL); where no server answers they do not count. Which mutants are
 made depends on the seed and on the code alone, so that two runs of one tree agree.
 
 `--seed`, `--each` (mutants a package), `--only` (a package), `--tree` (another checkout).
@@ -22,11 +23,15 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
 
+import psycopg
+
 from tests.bench import mutation_probe
 from tests.bench.mutants import Mutant, mutants, probed
+from tests.bench.own_database import POSTGRES
 
 ROOT = Path(__file__).parents[2]
 TIMEOUT_S = 300  # of one run of tests: a mutant that hangs is killed, too
@@ -54,6 +59,8 @@ def take_snapshot(checkout: Path, folder: Path) -> None:
 class Tree:
     """A copy of a snapshot, in which one file at a time is another."""
 
+    on_postgresql = False  # its tests, which then are those marked so
+
     def __init__(self, snapshot: Path, folder: Path) -> None:
         self.snapshot, self.folder, self.notes = snapshot, folder / "tree", folder / "notes"
         self.notes.mkdir(parents=True)
@@ -61,7 +68,8 @@ class Tree:
 
     def run(self, *arguments: str, timeout_s: float, **notes: Path) -> str:
         """Run tests; return the end of what they print where one fails (or hangs), else ""."""
-        command = [sys.executable, "-m", "pytest", "-q", "-m", UNMARKED, "--timeout", "60"]
+        marks = f"postgres and {UNMARKED}" if self.on_postgresql else UNMARKED
+        command = [sys.executable, "-m", "pytest", "-q", "-m", marks, "--timeout", "60"]
         command += ["-p", "no:cacheprovider", "-p", mutation_probe.__name__, *arguments]
         environment = os.environ | {
             "GARRY_TEST_TABLES": "mutants",  # no mutant changes a table
@@ -70,6 +78,8 @@ class Tree:
             "PYTHONDONTWRITEBYTECODE": "1",
             "PYTHONPATH": str(self.folder),
         }
+        if self.on_postgresql:
+            environment["GARRY_DATABASE_URL"] = POSTGRES
         environment |= {getattr(mutation_probe, name): str(file) for name, file in notes.items()}
         try:
             result = subprocess.run(
@@ -88,6 +98,8 @@ class Tree:
             source = (self.snapshot / name).read_text()
             (self.folder / name).write_text(probed(source, numbers))
         hits, passed = self.notes / "hits", self.notes / "passed"
+        hits.write_text("")
+        passed.write_text("")
         self.run(
             "-n", "2", "--dist", "worksteal", "tests", timeout_s=3600, HITS=hits, PASSED=passed
         )
@@ -143,6 +155,37 @@ def _in_rounds(tests: list[str]) -> Iterator[list[str]]:
     yield from (some for some in (tests[:150], tests[150:]) if some)
 
 
+def meet_all(trees: tuple[Tree, Tree], chosen: list[Mutant]) -> dict[Mutant, str]:
+    """Return what kills each mutant that a test comes to, "" for a survivor."""
+    found = trees[0].tests_of(chosen)
+    tests = {mutant: some for mutant, some in zip(chosen, found, strict=True) if some}
+    free: SimpleQueue[Tree] = SimpleQueue()
+    for tree in trees:
+        free.put(tree)
+
+    def meet(mutant: Mutant) -> str:
+        tree, began = free.get(), time.monotonic()
+        killer = tree.killer(mutant, tests[mutant])
+        free.put(tree)
+        print(
+            f"{'killed  ' if killer else 'SURVIVED'} {mutant.file}:{mutant.line} {mutant.what} "
+            f"({time.monotonic() - began:.0f} s, {len(tests[mutant])} tests) {killer}",
+            flush=True,
+        )
+        return killer
+
+    with ThreadPoolExecutor(len(trees)) as pool:
+        killers = dict(zip(tests, pool.map(meet, tests), strict=True))
+    known = [killer for killer in killers.values() if "::" in killer]
+    again = trees[0].notes / "chosen"
+    again.write_text("\n".join(known))
+    files = {killer.partition("::")[0] for killer in known}
+    if files and (failed := trees[0].run(*files, timeout_s=TIMEOUT_S, CHOSEN=again)):
+        print(f"{failed}\nThese fail without a mutant, too.", file=sys.stderr)
+        sys.exit(2)
+    return killers
+
+
 def main() -> int:
     """Make mutants and name the survivors; return 1 where too many survive."""
     parser = argparse.ArgumentParser(description=main.__doc__)
@@ -159,38 +202,20 @@ def main() -> int:
             if args.only in (None, package):
                 made = mutants(snapshot, package, random.Random(f"{args.seed} {package}"))
                 chosen += [next(made) for _ in range(args.each)]
-        trees: SimpleQueue[Tree] = SimpleQueue()
-        first, second = (Tree(snapshot, Path(folder) / name) for name in "ab")
-        tests = first.tests_of(chosen)
-        trees.put(first)
-        trees.put(second)
-
-        def meet(number: int) -> str:
-            mutant, tree, began = chosen[number], trees.get(), time.monotonic()
-            killer = tree.killer(mutant, tests[number])
-            trees.put(tree)
-            print(
-                f"{'killed  ' if killer else 'SURVIVED'} {mutant.file}:{mutant.line} {mutant.what} "
-                f"({time.monotonic() - began:.0f} s, {len(tests[number])} tests) {killer}",
-                flush=True,
-            )
-            return killer
-
-        with ThreadPoolExecutor(2) as pool:
-            killers = list(pool.map(meet, range(len(chosen))))
-        known = [killer for killer in killers if "::" in killer]
-        (first.notes / "chosen").write_text("\n".join(known))
-        files = {killer.partition("::")[0] for killer in known}
-        if files and (
-            found := first.run(*files, timeout_s=TIMEOUT_S, CHOSEN=first.notes / "chosen")
-        ):
-            print(f"{found}\nThese fail without a mutant, too.", file=sys.stderr)
-            return 2
-    survivors = [mutant for mutant, killer in zip(chosen, killers, strict=True) if not killer]
-    killed, total = len(chosen) - len(survivors), len(chosen)
+        trees = Tree(snapshot, Path(folder, "a")), Tree(snapshot, Path(folder, "b"))
+        killers = meet_all(trees, chosen)
+        unmet = [mutant for mutant in chosen if mutant not in killers]
+        with suppress(psycopg.OperationalError):
+            psycopg.connect(POSTGRES, connect_timeout=3).close()
+            for tree in trees:
+                tree.on_postgresql = True
+            killers |= dict.fromkeys(unmet, "") | (meet_all(trees, unmet) if unmet else {})
+    killed, total = sum(map(bool, killers.values())), len(killers)
     print(f"\n{killed} of {total} killed ({killed / total:.0%}, aim {AIM:.0%})")
-    for mutant in survivors:
-        print(f"  survived: {mutant.file}:{mutant.line} {mutant.what}: {mutant.statement}")
+    for mutant in chosen:
+        if not killers.get(mutant):
+            fate = "survived" if mutant in killers else "no test without PostgreSQL"
+            print(f"  {fate}: {mutant.file}:{mutant.line} {mutant.what}: {mutant.statement}")
     return 0 if killed >= AIM * total else 1
 
 

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
-HITS = "GARRY_MUTATION_HITS"  # the file that says so
-PASSED = "GARRY_MUTATION_PASSED"  # the file of tests that passed, with their seconds
-CHOSEN = "GARRY_MUTATION_CHOSEN"  # the file of tests to run, of those collected
-FAILED = "GARRY_MUTATION_FAILED"  # the file of the test that failed
+# Not GARRY_…: of those a server that a test starts inherits none (tests/support/servers.py).
+HITS = "MUTATION_HITS"  # the file that says so
+PASSED = "MUTATION_PASSED"  # the file of tests that passed, with their seconds
+CHOSEN = "MUTATION_CHOSEN"  # the file of tests to run, of those collected
+FAILED = "MUTATION_FAILED"  # the file of the test that failed
 _seen: set[tuple[int, str]] = set()
 
 
