@@ -34,7 +34,7 @@ from tests.bench.mutants import Mutant, mutants, probed
 from tests.bench.own_database import POSTGRES
 
 ROOT = Path(__file__).parents[2]
-TIMEOUT_S = 300  # of one run of tests: a mutant that hangs is killed, too
+TIMEOUT_S = 300  # beyond what a run of tests takes: a mutant that hangs is killed, too
 AIM = 0.9
 PACKAGES = (
     "rehab/training", "rehab/gait", "rehab/sessions/live", "rehab/people", "robot/behavior",
@@ -89,8 +89,10 @@ class Tree:
             return f"No end within {timeout_s} s."
         return result.stdout.decode()[-2000:] if result.returncode else ""
 
-    def tests_of(self, chosen: list[Mutant]) -> list[list[str]]:
-        """Return the tests that come to each mutant and pass without it, quick files first."""
+    def tests_of(self, chosen: list[Mutant]) -> list[dict[str, float]]:
+        """Return the tests that come to each mutant and pass without it, and what each takes [s];
+        quick files first.
+        """
         places: dict[str, dict[int, int]] = defaultdict(dict)
         for number, mutant in enumerate(chosen):
             places[mutant.file][mutant.node] = number
@@ -112,11 +114,11 @@ class Tree:
         found: list[list[str]] = [[] for _ in chosen]
         for line in hits.read_text().splitlines():
             mutant_number, _, test = line.partition("\t")
-            if not test:  # at import, once for all tests
-                folder = self.mirror(chosen[int(mutant_number)].file)
-                found[int(mutant_number)] += [one for one in duration_s if one.startswith(folder)]
-            elif test in duration_s:
+            if test in duration_s:
                 found[int(mutant_number)].append(test)
+            else:  # at import, once for all tests, or in a server
+                some = test or self.mirror(chosen[int(mutant_number)].file)
+                found[int(mutant_number)] += [one for one in duration_s if one.startswith(some)]
         return [_quick_files_first(tests, duration_s) for tests in found]
 
     def mirror(self, file: str) -> str:
@@ -126,28 +128,30 @@ class Tree:
             folder = folder.parent
         return f"{folder.as_posix()}/"
 
-    def killer(self, mutant: Mutant, tests: list[str]) -> str:
+    def killer(self, mutant: Mutant, tests: dict[str, float]) -> str:
         """Return the test that notices, or ""."""
         chosen, failed = self.notes / "chosen", self.notes / "failed"
         (self.folder / mutant.file).write_text(mutant.source)
         try:
-            for some in _in_rounds(tests):
+            for some in _in_rounds(list(tests)):
+                timeout_s = TIMEOUT_S + 3 * sum(map(tests.__getitem__, some))
                 chosen.write_text("\n".join(some))
                 failed.write_text("")
                 files = dict.fromkeys(test.partition("::")[0] for test in some)
-                if self.run("-x", *files, timeout_s=TIMEOUT_S, CHOSEN=chosen, FAILED=failed):
+                if self.run("-x", *files, timeout_s=timeout_s, CHOSEN=chosen, FAILED=failed):
                     return (*failed.read_text().splitlines(), "(no end, or no start)")[0]
             return ""
         finally:
             shutil.copy2(self.snapshot / mutant.file, self.folder / mutant.file)
 
 
-def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> list[str]:
+def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> dict[str, float]:
     by_file: dict[str, list[str]] = defaultdict(list)
     for test in dict.fromkeys(tests):
         by_file[test.partition("::")[0]].append(test)
     took = {file: sum(map(duration_s.__getitem__, by_file[file])) for file in by_file}
-    return [test for file in sorted(by_file, key=took.__getitem__) for test in by_file[file]]
+    quick_first = sorted(by_file, key=took.__getitem__)
+    return {test: duration_s[test] for file in quick_first for test in by_file[file]}
 
 
 def _in_rounds(tests: list[str]) -> Iterator[list[str]]:

@@ -7,9 +7,12 @@ for it: they inherit its name.
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pytest
+if TYPE_CHECKING:
+    import pytest
 
 # Not GARRY_…: of those a server that a test starts inherits none (tests/support/servers.py).
 HITS = "MUTATION_HITS"  # the file that says so
@@ -20,8 +23,13 @@ _seen: set[tuple[int, str]] = set()
 
 
 def hit(mutant: int) -> None:
-    """Note that the test of this moment came here; no test where a module was being imported."""
+    """Note that the test of this moment came here; no test where a module was being imported.
+
+    In a server that it started, which others of its file may share: that file.
+    """
     test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    if "pytest" not in sys.modules:
+        test = test.partition("::")[0]
     if (mutant, test) not in _seen:
         _seen.add((mutant, test))
         _write(HITS, f"{mutant}\t{test}")
