@@ -16,6 +16,18 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if not 0 <= (self.hit_points or 1) <= POINTS_MAX:",
     ): "0 and 1 are both between the bounds",
     (
+        "rehab/gait/signals/buffer.py",
+        "self._room, self._wide = (4 * keep, len(self.layout.order))",
+    ): "more room moves the same samples more seldom",
+    (
+        "rehab/sessions/live/session/commits.py",
+        "if connection.vendor == 'postgresql' and len(rows) > COPIED_ROWS:",
+    ): "COPY and INSERT store the same",
+    (
+        "robot/behavior/cue.py",
+        "return QUIET_PACE if self.is_quiet else 1.5",
+    ): "no waypoint's own pace is above 1",
+    (
         "robot/motion/pose.py",
         "straight = math.sin(half_rad) / half_rad if abs(half_rad) >= 1e-09 else 1.0",
     ): "sin x / x is 1 there, to the last digit",

@@ -3,7 +3,8 @@
 Each mutant is one small change (a comparison, a number, a condition, a call that goes, …) in a copy
 of the tree. One run of all tests tells which of them come to the changed statements (for what runs
 while a module is imported: those in the folder that mirrors its own); a mutant meets those, the
-quick files first, and is killed where one fails that passed before. Which mutants are
+quick files first, and is killed where one fails that passed before. Those that none comes to meet
+the tests of PostgreSQL (DATABASE_URL); where no server answers they do not count. Which mutants are
 made depends on the seed and on the code alone, so that two runs of one tree agree.
 
 `--seed`, `--each` (mutants a package), `--only` (a package), `--tree` (another checkout).
@@ -22,14 +23,18 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
 
+import psycopg
+
 from tests.bench import mutation_probe
 from tests.bench.mutants import Mutant, mutants, probed
+from tests.bench.own_database import POSTGRES
 
 ROOT = Path(__file__).parents[2]
-TIMEOUT_S = 300  # of one run of tests: a mutant that hangs is killed, too
+TIMEOUT_S = 300  # beyond what a run of tests takes: a mutant that hangs is killed, too
 AIM = 0.9
 PACKAGES = (
     "rehab/training", "rehab/gait", "rehab/sessions/live", "rehab/people", "robot/behavior",
@@ -54,6 +59,8 @@ def take_snapshot(checkout: Path, folder: Path) -> None:
 class Tree:
     """A copy of a snapshot, in which one file at a time is another."""
 
+    on_postgresql = False  # its tests, which then are those marked so
+
     def __init__(self, snapshot: Path, folder: Path) -> None:
         self.snapshot, self.folder, self.notes = snapshot, folder / "tree", folder / "notes"
         self.notes.mkdir(parents=True)
@@ -61,7 +68,8 @@ class Tree:
 
     def run(self, *arguments: str, timeout_s: float, **notes: Path) -> str:
         """Run tests; return the end of what they print where one fails (or hangs), else ""."""
-        command = [sys.executable, "-m", "pytest", "-q", "-m", UNMARKED, "--timeout", "60"]
+        marks = f"postgres and {UNMARKED}" if self.on_postgresql else UNMARKED
+        command = [sys.executable, "-m", "pytest", "-q", "-m", marks, "--timeout", "60"]
         command += ["-p", "no:cacheprovider", "-p", mutation_probe.__name__, *arguments]
         environment = os.environ | {
             "GARRY_TEST_TABLES": "mutants",  # no mutant changes a table
@@ -70,6 +78,8 @@ class Tree:
             "PYTHONDONTWRITEBYTECODE": "1",
             "PYTHONPATH": str(self.folder),
         }
+        if self.on_postgresql:
+            environment["GARRY_DATABASE_URL"] = POSTGRES
         environment |= {getattr(mutation_probe, name): str(file) for name, file in notes.items()}
         try:
             result = subprocess.run(
@@ -79,8 +89,10 @@ class Tree:
             return f"No end within {timeout_s} s."
         return result.stdout.decode()[-2000:] if result.returncode else ""
 
-    def tests_of(self, chosen: list[Mutant]) -> list[list[str]]:
-        """Return the tests that come to each mutant and pass without it, quick files first."""
+    def tests_of(self, chosen: list[Mutant]) -> list[dict[str, float]]:
+        """Return the tests that come to each mutant and pass without it, and what each takes [s];
+        quick files first.
+        """
         places: dict[str, dict[int, int]] = defaultdict(dict)
         for number, mutant in enumerate(chosen):
             places[mutant.file][mutant.node] = number
@@ -88,6 +100,8 @@ class Tree:
             source = (self.snapshot / name).read_text()
             (self.folder / name).write_text(probed(source, numbers))
         hits, passed = self.notes / "hits", self.notes / "passed"
+        hits.write_text("")
+        passed.write_text("")
         self.run(
             "-n", "2", "--dist", "worksteal", "tests", timeout_s=3600, HITS=hits, PASSED=passed
         )
@@ -100,11 +114,11 @@ class Tree:
         found: list[list[str]] = [[] for _ in chosen]
         for line in hits.read_text().splitlines():
             mutant_number, _, test = line.partition("\t")
-            if not test:  # at import, once for all tests
-                folder = self.mirror(chosen[int(mutant_number)].file)
-                found[int(mutant_number)] += [one for one in duration_s if one.startswith(folder)]
-            elif test in duration_s:
+            if test in duration_s:
                 found[int(mutant_number)].append(test)
+            else:  # at import, once for all tests, or in a server
+                some = test or self.mirror(chosen[int(mutant_number)].file)
+                found[int(mutant_number)] += [one for one in duration_s if one.startswith(some)]
         return [_quick_files_first(tests, duration_s) for tests in found]
 
     def mirror(self, file: str) -> str:
@@ -114,33 +128,66 @@ class Tree:
             folder = folder.parent
         return f"{folder.as_posix()}/"
 
-    def killer(self, mutant: Mutant, tests: list[str]) -> str:
+    def killer(self, mutant: Mutant, tests: dict[str, float]) -> str:
         """Return the test that notices, or ""."""
         chosen, failed = self.notes / "chosen", self.notes / "failed"
         (self.folder / mutant.file).write_text(mutant.source)
         try:
-            for some in _in_rounds(tests):
+            for some in _in_rounds(list(tests)):
+                timeout_s = TIMEOUT_S + 3 * sum(map(tests.__getitem__, some))
                 chosen.write_text("\n".join(some))
                 failed.write_text("")
                 files = dict.fromkeys(test.partition("::")[0] for test in some)
-                if self.run("-x", *files, timeout_s=TIMEOUT_S, CHOSEN=chosen, FAILED=failed):
+                if self.run("-x", *files, timeout_s=timeout_s, CHOSEN=chosen, FAILED=failed):
                     return (*failed.read_text().splitlines(), "(no end, or no start)")[0]
             return ""
         finally:
             shutil.copy2(self.snapshot / mutant.file, self.folder / mutant.file)
 
 
-def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> list[str]:
+def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> dict[str, float]:
     by_file: dict[str, list[str]] = defaultdict(list)
     for test in dict.fromkeys(tests):
         by_file[test.partition("::")[0]].append(test)
     took = {file: sum(map(duration_s.__getitem__, by_file[file])) for file in by_file}
-    return [test for file in sorted(by_file, key=took.__getitem__) for test in by_file[file]]
+    quick_first = sorted(by_file, key=took.__getitem__)
+    return {test: duration_s[test] for file in quick_first for test in by_file[file]}
 
 
 def _in_rounds(tests: list[str]) -> Iterator[list[str]]:
     """Yield the first 150 tests, and then the rest: most mutants die early."""
     yield from (some for some in (tests[:150], tests[150:]) if some)
+
+
+def meet_all(trees: tuple[Tree, Tree], chosen: list[Mutant]) -> dict[Mutant, str]:
+    """Return what kills each mutant that a test comes to, "" for a survivor."""
+    found = trees[0].tests_of(chosen)
+    tests = {mutant: some for mutant, some in zip(chosen, found, strict=True) if some}
+    free: SimpleQueue[Tree] = SimpleQueue()
+    for tree in trees:
+        free.put(tree)
+
+    def meet(mutant: Mutant) -> str:
+        tree, began = free.get(), time.monotonic()
+        killer = tree.killer(mutant, tests[mutant])
+        free.put(tree)
+        print(
+            f"{'killed  ' if killer else 'SURVIVED'} {mutant.file}:{mutant.line} {mutant.what} "
+            f"({time.monotonic() - began:.0f} s, {len(tests[mutant])} tests) {killer}",
+            flush=True,
+        )
+        return killer
+
+    with ThreadPoolExecutor(len(trees)) as pool:
+        killers = dict(zip(tests, pool.map(meet, tests), strict=True))
+    known = [killer for killer in killers.values() if "::" in killer]
+    again = trees[0].notes / "chosen"
+    again.write_text("\n".join(known))
+    files = {killer.partition("::")[0] for killer in known}
+    if files and (failed := trees[0].run(*files, timeout_s=TIMEOUT_S, CHOSEN=again)):
+        print(f"{failed}\nThese fail without a mutant, too.", file=sys.stderr)
+        sys.exit(2)
+    return killers
 
 
 def main() -> int:
@@ -159,38 +206,20 @@ def main() -> int:
             if args.only in (None, package):
                 made = mutants(snapshot, package, random.Random(f"{args.seed} {package}"))
                 chosen += [next(made) for _ in range(args.each)]
-        trees: SimpleQueue[Tree] = SimpleQueue()
-        first, second = (Tree(snapshot, Path(folder) / name) for name in "ab")
-        tests = first.tests_of(chosen)
-        trees.put(first)
-        trees.put(second)
-
-        def meet(number: int) -> str:
-            mutant, tree, began = chosen[number], trees.get(), time.monotonic()
-            killer = tree.killer(mutant, tests[number])
-            trees.put(tree)
-            print(
-                f"{'killed  ' if killer else 'SURVIVED'} {mutant.file}:{mutant.line} {mutant.what} "
-                f"({time.monotonic() - began:.0f} s, {len(tests[number])} tests) {killer}",
-                flush=True,
-            )
-            return killer
-
-        with ThreadPoolExecutor(2) as pool:
-            killers = list(pool.map(meet, range(len(chosen))))
-        known = [killer for killer in killers if "::" in killer]
-        (first.notes / "chosen").write_text("\n".join(known))
-        files = {killer.partition("::")[0] for killer in known}
-        if files and (
-            found := first.run(*files, timeout_s=TIMEOUT_S, CHOSEN=first.notes / "chosen")
-        ):
-            print(f"{found}\nThese fail without a mutant, too.", file=sys.stderr)
-            return 2
-    survivors = [mutant for mutant, killer in zip(chosen, killers, strict=True) if not killer]
-    killed, total = len(chosen) - len(survivors), len(chosen)
+        trees = Tree(snapshot, Path(folder, "a")), Tree(snapshot, Path(folder, "b"))
+        killers = meet_all(trees, chosen)
+        unmet = [mutant for mutant in chosen if mutant not in killers]
+        with suppress(psycopg.OperationalError):
+            psycopg.connect(POSTGRES, connect_timeout=3).close()
+            for tree in trees:
+                tree.on_postgresql = True
+            killers |= dict.fromkeys(unmet, "") | (meet_all(trees, unmet) if unmet else {})
+    killed, total = sum(map(bool, killers.values())), len(killers)
     print(f"\n{killed} of {total} killed ({killed / total:.0%}, aim {AIM:.0%})")
-    for mutant in survivors:
-        print(f"  survived: {mutant.file}:{mutant.line} {mutant.what}: {mutant.statement}")
+    for mutant in chosen:
+        if not killers.get(mutant):
+            fate = "survived" if mutant in killers else "no test without PostgreSQL"
+            print(f"  {fate}: {mutant.file}:{mutant.line} {mutant.what}: {mutant.statement}")
     return 0 if killed >= AIM * total else 1
 
 

@@ -7,20 +7,29 @@ for it: they inherit its name.
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pytest
+if TYPE_CHECKING:
+    import pytest
 
-HITS = "GARRY_MUTATION_HITS"  # the file that says so
-PASSED = "GARRY_MUTATION_PASSED"  # the file of tests that passed, with their seconds
-CHOSEN = "GARRY_MUTATION_CHOSEN"  # the file of tests to run, of those collected
-FAILED = "GARRY_MUTATION_FAILED"  # the file of the test that failed
+# Not GARRY_…: of those a server that a test starts inherits none (tests/support/servers.py).
+HITS = "MUTATION_HITS"  # the file that says so
+PASSED = "MUTATION_PASSED"  # the file of tests that passed, with their seconds
+CHOSEN = "MUTATION_CHOSEN"  # the file of tests to run, of those collected
+FAILED = "MUTATION_FAILED"  # the file of the test that failed
 _seen: set[tuple[int, str]] = set()
 
 
 def hit(mutant: int) -> None:
-    """Note that the test of this moment came here; no test where a module was being imported."""
+    """Note that the test of this moment came here; no test where a module was being imported.
+
+    In a server that it started, which others of its file may share: that file.
+    """
     test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    if "pytest" not in sys.modules:
+        test = test.partition("::")[0]
     if (mutant, test) not in _seen:
         _seen.add((mutant, test))
         _write(HITS, f"{mutant}\t{test}")

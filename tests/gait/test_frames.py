@@ -209,6 +209,19 @@ def test_a_count_that_goes_on_where_samples_are_lost_is_ignored():
     assert count(counted.both_legs(), clean).wrong == 0
 
 
+@pytest.mark.parametrize(("late", "is_believed"), [(64, True), (65, False)])
+def test_a_stall_is_believed_for_a_second(late, is_believed):
+    """Then the stamps are right: samples are lost, and the count does not tell."""
+    number = np.arange(320.0)
+    stamps = number / 64
+    stamps[128 : 129 + late] += 6 / 64
+    stamps[129 + late : 134 + late] = stamps[128 + late]  # the rest comes at once
+    clock, times, _ = run(stamps, number)
+
+    assert (clock.problem == "") is is_believed
+    assert times.tolist() == pytest.approx(number / 64 if is_believed else stamps)
+
+
 def test_a_count_may_begin_anew_twice_and_samples_may_come_twice():
     stamps, frames = make_stamps()
     frames[700:] -= 5700  # it was started again

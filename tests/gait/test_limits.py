@@ -282,13 +282,14 @@ RESTS_ON = {  # what each number of these modules rests on, that is no limit of 
         own_kinetics.USUAL_GAIN own_kinetics.USUAL_LAG_S unloaded.FOOT_NM_KG unloaded.USUAL_NM_KG
         unloaded.USUAL_LOAD shapes.SHAPES shapes.LIKE shapes.NAMED_LIKE find_columns.CERTAIN_LIKE
         find_columns.CERTAIN_LEAD find_columns.OTHER_PLANE check.MOMENT_TOLERANCE_S
-        continuity.ANGLE_FOURTH continuity.MOMENT_STEP one_leg.USUAL_MOMENT one_leg.USUAL_A2""",
+        continuity.ANGLE_FOURTH continuity.MOMENT_STEP leg_checks.USUAL_MOMENT
+        leg_checks.USUAL_A2""",
     "this person's own strides": """
         one_leg.USUAL_STANCES one_leg.USUAL_MIN one_leg.USUAL_MAX lag_watch.STRIDES
         lag_watch.OWN_STRIDES lag_watch.DRIFT_MAX_S lag_watch.DRIFT_SCATTERS lag_watch.DRIFT_MOST_S
         lag_watch.SLOPE_STRIDES lag_watch.SLOPE_LEAST lag_watch.SLOPE_ERRORS
         lag_watch.SLOPE_MOVED_S lag_watch.SCATTER_S lag_watch.SCATTER_WEIGHT continuity.SPIKES_SHARE
-        checks.OWN_TOLERANCE_S one_leg.OFTEN""",
+        checks.OWN_TOLERANCE_S leg_checks.OFTEN""",
     "mechanics: plates carry a body, a foot is no longer than a shoe": """
         plausibility.WEIGHT_MIN plausibility.WEIGHT_MAX plausibility.SUPPORTED_BELOW
         plausibility.LOAD_MIN plausibility.LOAD_MAX

@@ -7,7 +7,7 @@ import pytest
 
 from rehab.gait import WearableDetector
 from rehab.gait.wearables import detector
-from rehab.gait.wearables.sign import find_sign
+from rehab.gait.wearables.sign import STRIDES_SURE, find_sign
 from tests.support.simulated_leg import walk_foot
 
 
@@ -45,3 +45,18 @@ def test_the_sign_is_judged_once_a_stride(monkeypatch):
     one = WearableDetector("foot")
     one.feed(*walk_foot(40))
     assert 20 < len(looks) <= sum(reading.total for reading in one._readings)
+
+
+def test_a_sign_is_dropped_after_five_looks_in_a_row_that_say_the_other(monkeypatch):
+    said = iter([0, *[1] * (STRIDES_SURE - 1), 0, *[1] * STRIDES_SURE])
+    signs = []
+
+    def look(readings, _axis):
+        signs.append(one.sign)
+        place = next(said, None)
+        return None if place is None else readings[place]
+
+    monkeypatch.setattr(detector, "find_sign", look)
+    one = WearableDetector("foot")
+    one.feed(*walk_foot(40))
+    assert signs[: 2 * STRIDES_SURE + 2] == [None, *[1.0] * 2 * STRIDES_SURE, None]

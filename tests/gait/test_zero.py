@@ -29,6 +29,13 @@ def test_a_swing_whose_ends_read_less(least_n, offset_n):
     assert zero.offset_n == offset_n
 
 
+def test_a_zero_that_drifts_is_followed_however_far_it_has_come():
+    zero = PlateZero(WEIGHT_N, RATE_HZ)
+    for read_n in (12.0, 24.0, 36.0):
+        zero.learn(np.full(20, read_n))
+    assert zero.offset_n == 24.0  # the median
+
+
 def test_a_dragged_swing_is_none_of_those_that_agree():
     """A zero that was set anew is the same in swings one after another."""
     zero = PlateZero(WEIGHT_N, RATE_HZ)

@@ -12,6 +12,7 @@ import pytest
 from django.urls import reverse
 from django.utils import timezone
 
+from rehab.people import server_status
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic, Patient, User
@@ -245,7 +246,7 @@ def test_a_researcher_sees_pseudonyms_and_no_station(world, rosa):
     assert reverse("monitor", args=[session.pk]) not in page
 
 
-def test_a_host_sees_clinics_and_the_server_and_no_patient(world, rosa):
+def test_a_host_sees_clinics_and_the_server_and_no_patient(world, rosa, monkeypatch):
     ago(rosa, "positive", strides(3, 1), timezone.now(), end=None)
     build_world("birch")
     host = User.everywhere.create_user("host", role=Role.HOST)
@@ -256,6 +257,11 @@ def test_a_host_sees_clinics_and_the_server_and_no_patient(world, rosa):
     assert mark("birch", Clinic) in page
     assert "Without a lead has no lead." in page
     assert "SQLite" in page or "PostgreSQL" in page
+    assert "up to date" in page
+    monkeypatch.setattr(server_status, "count_pending_migrations", lambda: 3)
+    page = front(host)
+    assert "changes due: 3" in page
+    assert "The database lacks changes of this version: 3. Run" in page
     for word in ("Rosa", rosa.pseudonym, mark("amber", Patient), "walks now"):
         assert word not in page
 

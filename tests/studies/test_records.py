@@ -71,6 +71,13 @@ def test_the_database_itself_refuses_to_change_them(study, sql, sealed):
     assert list(find_broken()) == []
 
 
+@pytest.mark.skipif(connection.vendor != "postgresql", reason="SQLite has no TRUNCATE")
+@pytest.mark.parametrize("table", [ALLOCATIONS, EVENTS, MARKS])
+def test_the_database_itself_refuses_to_empty_their_tables(table):
+    with pytest.raises(IntegrityError, match="append-only"):
+        run(f"TRUNCATE {table} CASCADE")
+
+
 SEEN = [sql for sql in BREAK_INS if "ended_at" not in sql]  # an end is sealed as its event
 
 

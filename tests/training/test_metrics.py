@@ -76,6 +76,7 @@ def test_the_gain_alters_performance_but_not_improvement() -> None:
         (walk_session([4.0], [5.0], [], valence="explicit"), {"score", "points_per_100_steps"}),
         (walk_session([], [5.0], [4.5]), {"improvement_over_baseline"}),
         (walk_session([4.0], [5.0], [4.5], repeat=49), {"improvement_over_baseline"}),
+        (walk_session([1e-6], [5.0], [4.5]), {"improvement_over_baseline"}),  # next to nothing
         (walk_session([4.0], [4.1], [4.1]), {"retention_in_washout"}),  # too small a gain to share
         (walk_session([4.0], [3.0], [4.1]), {"retention_in_washout"}),
         (walk_session([4.0], [5.0], []), {"retention_in_washout"}),

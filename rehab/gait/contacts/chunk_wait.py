@@ -35,7 +35,5 @@ class ChunkWait:
     free_n: float = math.inf
 
     def lasts(self, count: int, force: Floats) -> bool:
-        """Return whether ``count`` samples may wait, the newest of which bear this force [N]."""
-        if self.least_n <= force.item(-1) <= self.most_n or count <= self.young:
-            return True
-        return count <= self.low and find_minimum(force) >= self.free_n
+        """Return whether ``count`` samples [N] of a foot that changes what it does may wait."""
+        return count <= self.young or (count <= self.low and find_minimum(force) >= self.free_n)

@@ -78,7 +78,7 @@ class ContactFinder:
         self._end_index = 0  # of the newest contact
         self._low_index: int | None = None  # since when the force of a contact is not certain
         self._look_index = 0  # when a drag is looked for in a contact that is not certain
-        self._dragged = max(3, round(DRAG_S * rate_hz))
+        self._dragged = round(DRAG_S * rate_hz)
         self._shortest = int(SHORTEST_S * rate_hz)
         self._look_every = max(2, round(LOOK_EVERY_S * rate_hz))
 
@@ -207,7 +207,7 @@ class ContactFinder:
 
     def _begin(self, index: int) -> None:
         buffer = self._buffer
-        back = max(2, int(LOOK_BACK_S * self._rate_hz))
+        back = int(LOOK_BACK_S * self._rate_hz)
         first = max(self._end_index, buffer.samples.first, index - back)
         before = buffer.channel(FORCE, first, index)
         loading = buffer.channel(FORCE, first, index + 1)[::-1]
@@ -276,7 +276,7 @@ class ContactFinder:
 
         The lowest tenth of a second counts as a swing if it lies near enough to zero.
         """
-        block = max(1, int(BLOCK_S * self._rate_hz))
+        block = int(BLOCK_S * self._rate_hz)
         self._stuck_index = index + int(STUCK_S * self._rate_hz)
         first = max(0, index - int(STUCK_S * self._rate_hz))
         force = self._buffer.channel(FORCE, first, index)

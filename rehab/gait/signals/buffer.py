@@ -39,7 +39,7 @@ class SampleBuffer:
         self._table = table
         self._parts = {rows: table[place] for rows, place in self.layout.rows.items()}
         self._has_seldom = False  # rows that were never sent stay NaN
-        self._late = np.zeros(3 * keep)
+        self._late = np.zeros(self._room)
         self._late_end = 0  # behind the newest sample that was late
         self._time: Floats = table[middle]
         self._judged = 0  # the times of samples before this one are looked at

@@ -66,7 +66,7 @@ def find_margin(
     rate_hz
         Of the samples.
     """
-    reach = max(2, round(AROUND_S * rate_hz))
+    reach = round(AROUND_S * rate_hz)
     part = (max(legs[0].samples.first, index - reach), index + reach + 1)
     time_s = legs[0].channel(TIME, *part)
     middle_m = (legs[0].channel(HIP, *part) + legs[1].channel(HIP, *part)) / 2
@@ -79,7 +79,7 @@ def find_margin(
 
 
 def _find_peak(angle_rad: Floats, rate_hz: float) -> float:
-    width = min(len(angle_rad), max(1, round(QUIET_S * rate_hz)))
+    width = min(len(angle_rad), round(QUIET_S * rate_hz))
     return math.degrees(find_maximum(average(angle_rad, width)))
 
 

@@ -90,7 +90,7 @@ def check_force(
         Of the samples.
     """
     reasons = []
-    tail = force_n[-max(2, round(CUT_S * rate_hz) + 1) : -1]
+    tail = force_n[-round(CUT_S * rate_hz) - 1 : -1]
     is_cut = len(tail) and tail.item(0) - offset_n > CUT_SHARE * weight_n
     if is_cut or not is_finite(force_n):
         reasons.append(RejectionReason.FORCE_LOST)

@@ -56,6 +56,8 @@ class WearableDetector:
         For another place.
     """
 
+    _contrary = 0  # looks in a row that say the other sign
+
     def __init__(self, place: str) -> None:
         if place not in tuple(Place):
             raise GaitInputError(f"A sensor on the {place} is not known. Use foot or shank.")
@@ -167,7 +169,6 @@ class WearableDetector:
         self._best: Reading | None = None
         self._is_certain = False  # by what the patient was asked to do
         self._judged = 0  # strides by the newest look at the sign
-        self._contrary = 0  # looks in a row that say the other sign
 
     def _follow(self, sample: _Sample) -> None:
         axis, rate = self._axis.axis, sample.rate
@@ -225,10 +226,8 @@ class WearableDetector:
         found = find_sign(self._readings, self._axis)
         if found is None:
             return
-        if self._best is None:
-            self._best = found
-        elif found is self._best:
-            self._contrary = 0
+        if self._best in (None, found):
+            self._best, self._contrary = found, 0
         else:
             self._contrary += 1
             if self._contrary >= STRIDES_SURE:

@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot.behavior.answer_choice import APART, AnswerChooser, pick
+from robot.behavior.cue import QUIET_PACE
 from robot.behavior.window_decider import Decision
-from robot.motion.pools import POOLS, VARIANTS
+from robot.motion.pools import POOLS, VARIANTS, variants
 from robot.wire.cue_limits import VARIED
 from tests.support.robot_stage import CUE, WELCOME, Stage
 
@@ -123,6 +124,15 @@ def test_every_varied_answer_is_as_large_as_is_seen(intensity, mean):
     stage.walk(*[mean] * 21)
     for one in stage.of("decision"):
         assert one["intensity"] >= VARIANTS[one["gesture"]].least - 1e-3
+
+
+@pytest.mark.parametrize(("intensity", "is_quiet"), [(1.0, False), (0.5, True)])
+def test_a_quiet_robot_answers_by_what_is_short_enough_at_half_the_speed(intensity, is_quiet):
+    stage = Stage()
+    stage.hear(**WELCOME | {"cue": VARIED_CUE | {"above": "joy", "intensity": intensity}})
+    stage.walk(*[1.0] * 60)
+    played = {one["gesture"] for one in stage.of("decision") if one["gesture"]}
+    assert (played <= {gesture.name for gesture in variants("joy", QUIET_PACE)}) is is_quiet
 
 
 def test_off_answers_nothing():

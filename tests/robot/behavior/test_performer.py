@@ -40,6 +40,8 @@ def test_a_weak_window_droops(stage):
     (decision,) = stage.of("decision")
     assert (decision["gesture"], decision["above"]) == ("droop", False)
     assert decision["intensity"] == 1  # it never grows with the weakness
+    first, second, *later = (one["look"][1] for one in stage.of("status") if one["gesture"])
+    assert first == second > later[0] == later[1]  # the eyes begin open and fall
 
 
 def test_status_comes_every_second_and_four_times_while_it_moves(stage):

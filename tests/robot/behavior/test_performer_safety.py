@@ -183,7 +183,8 @@ def test_a_robot_without_a_session_waits_for_one():
 
 
 @pytest.mark.parametrize(
-    ("battery_v", "share", "low"), [(None, None, False), (16.5, 1, False), (13.9, 0.25, True)]
+    ("battery_v", "share", "low"),
+    [(None, None, False), (16.5, 1, False), (14.0, 0.28, False), (13.9, 0.25, True)],
 )
 def test_the_battery_is_told_as_people_read_it(felt, battery_v, share, low):
     felt.base.sensors = SensorState(battery_v=battery_v)

@@ -111,7 +111,7 @@ def test_an_arming_that_nobody_can_have_meant():
 
 def test_a_silent_base():
     watch = Watch()
-    assert watch.look(feeling(silent_s=0.19)) == ("", 0.02)
+    assert watch.look(feeling(silent_s=0.2)) == ("", 0.02)
     assert watch.look(feeling(silent_s=0.21)) == ("base_silent", 0.02)
     assert watch.safety.arm(watch.now_s + 5, feeling(silent_s=9)) == "base_silent"
 

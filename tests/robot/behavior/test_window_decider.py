@@ -156,6 +156,15 @@ def test_nobody_answers_a_window_of_long_ago():
     assert decider.blocking_reason(decision, performing=False) == LATE
 
 
+def test_how_long_no_answer_can_be_due():
+    decider = WindowDecider(CUE)
+    assert decider.free_s(0) == 5
+    decider.add(0, 1)
+    assert decider.free_s(4) == math.inf  # one step decides nothing
+    decider.add(1, 1)
+    assert [decider.free_s(now_s) for now_s in (1, 4.5, 7, 10.1)] == [4, 0.5, 0, math.inf]
+
+
 def test_no_gesture_where_the_order_names_none():
     decision = Decision(0, 5, 5, 4, 1.0, 0.9, True)
     assert (

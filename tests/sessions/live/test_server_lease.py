@@ -58,6 +58,18 @@ def test_a_server_knows_the_others_as_long_as_they_are_there():
     assert server_lease.held() is None
 
 
+def test_a_server_that_enters_forgets_those_that_ended_long_ago():
+    for name, ended in (("of today", "1 minute"), ("of yesterday", "1 day")):
+        sql(
+            "INSERT INTO rehab_server (id, address, ready, expires_at) "
+            "VALUES (%s, '', true, clock_timestamp() - %s::interval)",
+            *(name, ended),
+        )
+    one = enter()
+    assert {name for (name,) in sql("SELECT id FROM rehab_server")} == {one.id, "of today"}
+    one.release()
+
+
 def test_others_learn_of_a_server_that_takes_clinics():
     one = enter()
     assert [server.ready for server in server_lease.valid_servers()] == [False]

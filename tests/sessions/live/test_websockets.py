@@ -67,6 +67,10 @@ async def main():
     print(json.dumps([frames * 60_000, MAX_WAITING_BYTES, transport.reading, transport.told]))
     server.connections = {}  # it closed meanwhile
     print(json.dumps(server.create_application(protocol, {"type": "websocket"})))
+    beside = asyncio.create_task(asyncio.sleep(60))
+    server._hold(beside)
+    await server._drain()
+    print(json.dumps(beside.cancelled()))
 
 asyncio.run(main())
 """
@@ -116,6 +120,11 @@ def test_frames_of_every_length_are_whole(said):
 def test_a_connection_that_closed_meanwhile_begins_nothing(said):
     """Nor is its application left behind, which Python would warn of."""
     assert said[2] is None
+
+
+@pytest.mark.server
+def test_a_server_that_drains_ends_what_runs_beside_its_connections(said):
+    assert said[3] is True
 
 
 @pytest.mark.server
