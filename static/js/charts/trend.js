@@ -18,16 +18,16 @@ function days(labels) {
   };
 }
 
-const SIGNS = { positive: "+", negative: "−", binary: "±", explicit: "3.5" };
+const SIGNS = { positive: "+", negative: "−", binary: "±", explicit: "=" };
 
 // A session's mark is that of its feedback type, in the colors of the key.
 function drawType(marks, x, y, type) {
   const style = getComputedStyle(document.querySelector(`.key [data-theme="${type}"]`));
   marks.disc(x, y, 11, style.borderColor);
   marks.disc(x, y, 9.5, style.backgroundColor);
-  const [sign, size] = [SIGNS[type] ?? "", type === "explicit" ? 10 : 16];
+  const size = 16;
   const middle = marks.y(y) + 0.36 * size * marks.unit;
-  marks.text(sign, marks.x(x), middle, { size, weight: 800, fill: color("ink") });
+  marks.text(SIGNS[type] ?? "", marks.x(x), middle, { size, weight: 800, fill: color("ink") });
 }
 
 // The range of x leaves half a session on each side, so that marks are whole.

@@ -44,10 +44,13 @@ export function createFeedback(body) {
     setLines(words, phraseOf(step));
     emblem.dataset.emblem = step?.kind === "missing" ? "none" : (step?.emblem ?? "");
     emblem.toggleAttribute("data-hit", Boolean(step?.hit && !step.close));
-    emblem.toggleAttribute("data-more", step?.points === 0 && !step.hit && !step.close);
+    const isMoreWanted = step?.points === 0 && !step.hit && !step.close;
+    emblem.toggleAttribute("data-more", isMoreWanted);
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
+    if (sign || isMoreWanted) label.dataset.sign = sign || "↑";
+    else delete label.dataset.sign;
     if (step && step.number !== drawnNumber && !isStill())
       emblem.animate([{ transform: "scale(.92)" }, { transform: "none" }], SWAP);
     drawnNumber = step?.number ?? -1;
