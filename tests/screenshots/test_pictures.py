@@ -127,8 +127,8 @@ types = "explicit positive positive negative binary positive binary negative pos
 for index, valence in enumerate(types):
     days_ago = 3 * (len(types) - 1 - index)
     last = visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
-training = Protocol.everywhere.get(clinic=None, name="Training only")
-TrainingSession.everywhere.filter(pk=last.pk).update(protocol=training)
+walked = Protocol.everywhere.get(clinic=None, name="Baseline, training, washout")
+TrainingSession.everywhere.filter(pk=last.pk).update(protocol=walked)
 lead = User.everywhere.get(username="pt")
 jutta = Patient.everywhere.create(
     clinic=first_clinic(), code="K7-260", nickname="Jutta", paretic_side="left", language="de",

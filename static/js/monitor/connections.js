@@ -80,6 +80,8 @@ function describeTablets(count, silent_s, isHeard) {
 }
 
 export function createConnections({ state, show, socket, robot }) {
+  const mirror = document.querySelector(".mirror");
+
   function describeAll({ presence, state: sessionState }) {
     if (socket.isStale()) {
       const unknown = ["–", fill(_("not known for %(count)s s"), { count: Math.floor(socket.silentFor() / 1000) })];
@@ -100,6 +102,7 @@ export function createConnections({ state, show, socket, robot }) {
       const isSeen = state.isTabletHeard && !socket.isStale();
       show("mirror", isSeen ? fill(_("%(name)s sees"), { name: about.nickname }) : _("Patient’s page"));
       show("mirrored", isSeen ? _("now") : _("no screen"));
+      mirror.classList.toggle("unseen", !isSeen);
       if (presence.source_plays) show("played", PLAYED[presence.source_plays]);
       const described = describeAll(session);
       for (const row of document.querySelectorAll("[data-presence]")) {
