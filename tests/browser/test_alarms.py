@@ -244,7 +244,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
         told = start.locator(".elsewhere .red", has_text="Iris fell.")
         expect(told).to_be_visible()
         expect(start.locator(".today li").first).to_contain_text("fell")
-        expect(start.locator(".chosen-one > .fell")).to_contain_text("Iris")
+        expect(start.locator(".chosen-one > .fell", has_text="Iris")).to_be_visible()
         expect(patient.locator(".words")).to_have_text("Stay where you are.")
         expect(patient.locator(".sub")).to_have_text("Help is coming.")
         picture(second, "fall-on-the-second-screen")
