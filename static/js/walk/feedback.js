@@ -49,7 +49,7 @@ export function createFeedback(body) {
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
-    if (sign || isMoreWanted) label.dataset.sign = sign || "↑";
+    if (sign || isMoreWanted) label.dataset.sign = sign || "▲";
     else delete label.dataset.sign;
     if (step && step.number !== drawnNumber && !isStill())
       emblem.animate([{ transform: "scale(.92)" }, { transform: "none" }], SWAP);
