@@ -87,7 +87,8 @@ class Tree:
             )
         except subprocess.TimeoutExpired:
             return f"No end within {timeout_s} s."
-        return result.stdout.decode()[-2000:] if result.returncode else ""
+        # What breaks before a test begins is told on the other stream.
+        return (result.stdout + result.stderr).decode()[-2000:] if result.returncode else ""
 
     def tests_of(self, chosen: list[Mutant]) -> list[dict[str, float]]:
         """Return the tests that come to each mutant and pass without it, and what each takes [s];
