@@ -12,3 +12,8 @@ def counted(path: str = "") -> Q:
     ``path``: the way from what is filtered to these, such as ``session__``.
     """
     return Q() if settings.DEMO else Q((f"{path}simulated", False))
+
+
+def is_counted(simulated: bool) -> bool:
+    """Return whether lists and figures count a patient or session, by whether it is simulated."""
+    return not simulated or bool(settings.DEMO)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from datetime import datetime, timedelta
 
-from django.conf import settings
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
@@ -17,7 +16,7 @@ from django.views.decorators.http import require_POST, require_safe
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.simulated import counted
+from rehab.people.simulated import counted, is_counted
 from rehab.sessions.alarms import Alarm, Incident, find_incidents, open_alarms
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.database.trouble import NotStored
@@ -96,7 +95,7 @@ def list_incidents(request: HttpRequest) -> HttpResponse:
 def _count_adverse(user: User, since: datetime, incidents: list[Incident]) -> list[tuple[str, int]]:
     """Return how often each thing went wrong in sessions that count: incidents, then remarks."""
     raised = Counter(
-        one.raised.kind for one in incidents if settings.DEMO or not one.raised.session.simulated
+        one.raised.kind for one in incidents if is_counted(one.raised.session.simulated)
     )
     remarks = SessionEvent.objects.visible_to(user).filter(
         counted("session__"), kind__in=ADVERSE, at__gte=since
