@@ -92,7 +92,7 @@ class OpenAlarms:
     def check_seen_to_fall(self) -> None:
         """Raise NotAllowed where nothing may move: the patient fell, nobody acknowledged it."""
         if self.has_fallen:
-            raise NotAllowed("First acknowledge the fall on the therapist’s page.")
+            raise NotAllowed("First take care of the fall: its button is on the therapist’s page.")
 
     def describe(self) -> Message:
         """Return them as the therapist's page gets them."""

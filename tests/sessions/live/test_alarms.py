@@ -58,10 +58,10 @@ async def test_nothing_moves_before_a_fall_is_acknowledged(place, sourced):
     await monitor.say({"type": "robot", "order": "stop"})
     await monitor.until(lambda event: event.get("stopped") is True)
     assert (await monitor.change("pause"))["type"] == "done"
-    assert "acknowledge the fall" in (await monitor.change("resume"))["message"]
+    assert "take care of the fall" in (await monitor.change("resume"))["message"]
     arm = {"type": "robot", "order": "arm"}
     await monitor.say(arm)
-    assert "acknowledge the fall" in (await monitor.hear("error"))["message"]
+    assert "take care of the fall" in (await monitor.hear("error"))["message"]
     assert not [frame for frame in robot.heard if frame["type"] == "arm"]
 
     await monitor.say({"type": "remark", "what": "fall_acknowledged", "id": "a"})
