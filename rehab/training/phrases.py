@@ -14,7 +14,7 @@ from robot.marking import gettext_noop
 
 # By language: the longest phrase, and the longest word in it, that the largest words have room for
 # on a tablet (tests/browser/test_word_sizes.py). Of a language that is not here: the last of them.
-LENGTHS = {"en": (24, 10), "de": (30, 10), "es": (30, 11), "fr": (30, 10)}
+LENGTHS = {"en": (24, 9), "de": (30, 9), "es": (30, 9), "fr": (30, 9)}
 APART = 6  # phrases that come before one may come again, where a pool has at least twice as many
 
 
@@ -100,7 +100,7 @@ STRONG = join(
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
     gettext_noop("More than the goal!"),
-    gettext_noop("Splendid!"),
+    gettext_noop("Nice going!"),
     gettext_noop("A strong one!"),
     gettext_noop("Great going!"),
     gettext_noop("Very strong!"),
@@ -110,17 +110,17 @@ STRONG = join(
 )
 
 STRONGEST = join(
-    gettext_noop("Stunning!"),
-    gettext_noop("Excellent!"),
+    gettext_noop("Top step!"),
+    gettext_noop("Bravo!"),
     gettext_noop("Superb!"),
-    gettext_noop("Fantastic!"),
-    gettext_noop("Marvelous!"),
-    gettext_noop("Wonderful!"),
+    gettext_noop("Wow!"),
+    gettext_noop("So strong!"),
+    gettext_noop("Just great!"),
     gettext_noop("Far above the goal!"),
-    gettext_noop("Brilliant!"),
+    gettext_noop("A super step!"),
     gettext_noop("Well above!"),
-    gettext_noop("Amazing!"),
-    gettext_noop("Glorious!"),
+    gettext_noop("Way over!"),
+    gettext_noop("Far over the goal!"),
     gettext_noop("That was strong!"),
 )
 
@@ -162,9 +162,9 @@ NOTHING_LOST = join(
     gettext_noop("Nothing taken."),
     gettext_noop("No loss."),
     gettext_noop("The points stay."),
-    gettext_noop("Points unchanged."),
+    gettext_noop("Points as before."),
     gettext_noop("No change."),
-    gettext_noop("Score unchanged."),
+    gettext_noop("The same score."),
     gettext_noop("Your points stay."),
     gettext_noop("As many points."),
 )
