@@ -152,6 +152,9 @@ class ScreenForm(_SpokenForm):
             "screen_sounds",
         ]
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
+        help_texts: ClassVar = {
+            "screen_side": _("In one half, words are largest on a tablet that lies on its long side.")
+        }
 
 
 class EndProgramForm(forms.Form):

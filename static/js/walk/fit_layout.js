@@ -1,7 +1,7 @@
 // The words and the number keep the size that was promised: in degrees, as the patient sees them. What does not fit
 // beside them goes, in this order: the chart of strides, the badge, the thermometer, each only if that makes the
 // words larger. On a screen that nobody measured no size is promised: the badge stays there if that costs at most a
-// tenth, the thermometer, which says most, for a quarter. Where words are smaller than promised the page says by how
+// tenth, the thermometer, which says most, for two fifths. Where words are smaller than promised the page says by how
 // much (`data-short`).
 //
 // One frame holds for all steps: it follows from the longest phrases and a number of as many digits, so that goal,
@@ -12,7 +12,7 @@ const BADGE = 2;
 const LAST = 3;
 const ENOUGH = 0.99; // of the largest size that is possible
 // So much of it must be left where no size is promised, for the chart, the badge and the thermometer to stay.
-const WORTH = [ENOUGH, 0.9, 0.75];
+const WORTH = [ENOUGH, 0.9, 0.6];
 const LEAST = 0.1; // of the promised size
 const HALVINGS = 8; // of the search for what fits
 
