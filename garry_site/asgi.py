@@ -10,7 +10,7 @@ from django.core.asgi import get_asgi_application
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "garry_site.settings")
 pages: Any = get_asgi_application()
 
-from rehab.people.sign_in.gate import SignInGate  # noqa: E402
+from rehab.people.sign_in.flood_gate import SignInGate  # noqa: E402
 from rehab.people.web.static_files import StaticFilesHandler  # noqa: E402
 from rehab.routing import websocket_urlpatterns  # noqa: E402  (models must be loaded first)
 from rehab.sessions.live.consumers.isolation_gate import IsolationGate  # noqa: E402

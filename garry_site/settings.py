@@ -97,7 +97,7 @@ INSTALLED_APPS = [
     "rehab",  # before daphne: its own `runserver` takes precedence
     "daphne",
     "channels",
-    "rehab.site.GarryAdminConfig",  # django.contrib.admin with our front page
+    "rehab.admin_site.GarryAdminConfig",  # django.contrib.admin with our front page
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",
@@ -117,7 +117,7 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "rehab.people.sign_in.flow.SessionValidationMiddleware",
+    "rehab.people.sign_in.two_stage_sign_in.SessionValidationMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
@@ -189,10 +189,11 @@ AUTH_PASSWORD_VALIDATORS = [
     )
 ]
 AUTHENTICATION_BACKENDS = [
-    "rehab.people.sign_in.backends.CountingBackend",  # first: a lockout ends the sign-in here
-    "rehab.people.sign_in.backends.PasswordBackend",
-    "rehab.people.sign_in.backends.CodeBackend",
-    "rehab.people.sign_in.backends.PasskeyBackend",
+    # First: a lockout ends the sign-in there.
+    "rehab.people.sign_in.authentication_backends.CountingBackend",
+    "rehab.people.sign_in.authentication_backends.PasswordBackend",
+    "rehab.people.sign_in.authentication_backends.CodeBackend",
+    "rehab.people.sign_in.authentication_backends.PasskeyBackend",
 ]
 LOGIN_URL = "sign-in"
 OIDC_ISSUER = text("GARRY_OIDC_ISSUER", "", "address of the hospital's sign-on (OpenID Connect)")
@@ -223,7 +224,7 @@ if SMART_FHIR and not (OIDC_ISSUER and SMART_IDENTIFIER):
     raise ImproperlyConfigured("GARRY_SMART_FHIR needs GARRY_OIDC_ISSUER, GARRY_SMART_IDENTIFIER.")
 if SMART_FHIR and urlsplit(SMART_FHIR).scheme != "https" and HOSTED:
     raise ImproperlyConfigured("GARRY_SMART_FHIR must begin with https:// on a hosted server.")
-SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
+SESSION_ENGINE = "rehab.people.sign_in.sign_in_expiry"
 SESSION_COOKIE_AGE = 12 * 3600  # one working day, whatever the activity
 SESSION_COOKIE_SAMESITE = "Lax"
 SESSION_MINUTES = number(

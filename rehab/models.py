@@ -6,7 +6,7 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.outbox.models import Endpoint
 from rehab.patients import family, visits  # noqa: F401
-from rehab.people import chores, server_keys  # noqa: F401
+from rehab.people import server_keys, upkeep_runs  # noqa: F401
 from rehab.people.audit import moves  # noqa: F401
 from rehab.people.consent import tombstones  # noqa: F401
 from rehab.people.models import Clinic, Patient, User
@@ -14,7 +14,7 @@ from rehab.people.sign_in import attempt_counter, resets  # noqa: F401
 from rehab.people.sign_in.factors import factors  # noqa: F401
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions import (  # noqa: F401
-    assessments,
+    assessment_results,
     corrections,
     log,
     models,
@@ -22,10 +22,10 @@ from rehab.sessions import (  # noqa: F401
     robot_incidents,
     seals,
 )
-from rehab.sessions.clinic_tests import ClinicTest
+from rehab.sessions.available_tests import ClinicTest
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station
 from rehab.studies import participants, power_runs  # noqa: F401
 from rehab.studies.record import adverse_events  # noqa: F401

@@ -56,7 +56,7 @@ from robot.connection_args import (
 )
 from robot.homing.camera_supervisor import CameraEye
 from robot.link import Link, LinkRefused
-from robot.original_topics import OriginalTopics
+from robot.original_connection import OriginalTopics
 from robot.ros.holder import add_driven_base_arguments, find_driven_base
 from robot.ros.original_nodes import TOPICS
 from robot.worker import Worker

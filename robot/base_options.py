@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection
 from typing import TextIO
 
 from robot.bases import BASES, MobileBase
-from robot.ros.bridge import find_bridge, is_address
+from robot.ros.rosbridge_connection import find_bridge, is_address
 
 
 class VirtualClock:

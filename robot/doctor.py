@@ -34,7 +34,7 @@ SILENT_S = 0.5  # a base that has power sends 50 frames a second
 WATCHDOG_S, PRESS_S = 3.0, 20.0
 FRAMES_PER_S = 45.0  # a base sends 50; some may be lost
 CAMERA_S, CAMERA_FRAMES = 12.0, 30  # a camera may take some seconds to start
-CAMERA_PER_S = 4.0  # a look takes eight within 2.5 s (robot/homing/look.py)
+CAMERA_PER_S = 4.0  # a look takes eight within 2.5 s (robot/homing/still_frames.py)
 
 CURES = {
     "bump": "Something presses its bumper. Make room around it.",

@@ -63,7 +63,7 @@ def learn(
         The clock [s], and how to wait by it.
     """
     from robot.homing.homing import SURE_M, SURE_RAD
-    from robot.homing.look import Look
+    from robot.homing.still_frames import Look
     from robot.homing.tag_pose import find_place, solve_tag
 
     first = next(watch(eye, monotonic, sleep))

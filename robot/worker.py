@@ -15,7 +15,7 @@ from robot.black_box.capture import Capture
 from robot.black_box.recorder import BlackBox, Incident
 from robot.link import Link, LinkRefused, Message
 from robot.motion.limits import DEFAULT_LIMITS, Limits
-from robot.original_topics import OriginalTopics
+from robot.original_connection import OriginalTopics
 from robot.wire.close_codes import CloseCode
 
 if TYPE_CHECKING:  # it needs the extra `tag`

@@ -11,7 +11,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.exports.archive import StreamedResponse
-from rehab.exports.clinic.departure import make_receipt
+from rehab.exports.clinic.clinic_removal import make_receipt
 from rehab.exports.clinic.job import Job
 from rehab.exports.forms import ClinicExportForm, ClinicRemovalForm
 from rehab.people.access import for_roles, user_of

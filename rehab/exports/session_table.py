@@ -9,8 +9,8 @@ from typing import Any
 
 from django.utils.translation import gettext_lazy as _
 
+from rehab.exports.column_definitions import Column, Table, Type
 from rehab.exports.selection import Selection
-from rehab.exports.table import Column, Table, Type
 from rehab.people.field_policy import Covariate, covariates
 from rehab.people.models import Patient
 from rehab.sessions.log import Remark

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 from django.db import models
 from django.utils.translation import gettext_lazy as _
 
+from rehab.exports.column_definitions import Column, Table, Type
 from rehab.exports.selection import Selection
-from rehab.exports.table import Column, Table, Type
 from rehab.sessions.events.step import StepContext, patient_step
 from rehab.sessions.log import Step
 from rehab.sessions.log_fold import DamagedLog, fold_log, log_entries
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 from rehab.sessions.step_columns import MEASURE_UNIT, STEP_COLUMNS, StepColumn
 from rehab.training.changes import Change
 from rehab.training.fold import SessionFold

@@ -14,9 +14,9 @@ from django.utils.translation import gettext
 from django.views.decorators.http import require_GET, require_POST, require_safe
 
 from rehab.exports.archive import ZipResponse
+from rehab.exports.export_files import patient_files, session_files
 from rehab.exports.forms import ResearchExportForm
-from rehab.exports.patient_data import patient_files, session_files
-from rehab.exports.research.package import Package, discard_old
+from rehab.exports.research.resumable_export import Package, discard_old
 from rehab.outbox.models import Topic, notify
 from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.audit import audit_log

@@ -25,7 +25,7 @@ from rehab.people.access import clinic_of, user_of
 from rehab.people.models import LANGUAGES
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
-from rehab.training.bands import BANDS_MAX
+from rehab.training.feedback_bands import BANDS_MAX
 from rehab.training.valences import VALENCES
 
 READ_ONLY_FIELDS = ("from_percent", "words", "confetti")

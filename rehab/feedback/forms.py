@@ -14,7 +14,7 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.models import LANGUAGES
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
-from rehab.training.bands import TEXT_MAX, Band
+from rehab.training.feedback_bands import TEXT_MAX, Band
 from rehab.training.measures import InvalidSetting
 from rehab.training.phrases import LENGTHS
 from rehab.training.valences import VALENCES

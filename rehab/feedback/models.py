@@ -16,7 +16,7 @@ from rehab.people.models import Clinic
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
-from rehab.training.bands import Band, Confetti
+from rehab.training.feedback_bands import Band, Confetti
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import POINTS_MAX, VALENCES, CueGestures, Valence, edit_valence
 

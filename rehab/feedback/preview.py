@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from rehab.training.bands import Band, Confetti
+from rehab.training.feedback_bands import Band, Confetti
 from rehab.training.valences import Valence
 
 SCALE = 1.5  # the thermometer's end

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from rehab.gait.offline import measure_strides
-from rehab.gait.recordings.columns import ALL_CHANNELS, read_column, read_column_map
+from rehab.gait.recordings.column_mapping import ALL_CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
 from rehab.gait.recordings.readers import read_any_table, read_signals, require_columns

@@ -9,8 +9,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import User
+from robot.motion.gesture_variants import POOLS, TABLE
 from robot.motion.gestures import GESTURES, ORIGINALS
-from robot.motion.pools import POOLS, TABLE
 from robot.wire.cue_limits import VARIED
 
 

@@ -9,7 +9,7 @@ from django.utils.translation import gettext
 
 from rehab.people.web.refusals import format_refusal
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.score import read_score
+from robot.motion.lights_and_sounds import read_score
 
 TrackEntry = dict[str, Any]
 

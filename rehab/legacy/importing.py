@@ -14,7 +14,7 @@ from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.sessions.setup.protocol_models import MeasureDefinition
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting

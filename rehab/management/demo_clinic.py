@@ -17,7 +17,7 @@ from rehab.sessions.corrections import add_note
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.headless import simulate_strides
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
-from rehab.sessions.live.session.commits import Job, commit
+from rehab.sessions.live.session.commit_transaction import Job, commit
 from rehab.sessions.log import Remark
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner

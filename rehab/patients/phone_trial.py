@@ -11,7 +11,7 @@ from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, change_session, create_session
-from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.sessions.setup.protocol_models import MeasureDefinition
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN_STATES, ChangeKind, State
 from rehab.training.goals import TRIAL_BASELINE_STRIDES, GoalRule, Target

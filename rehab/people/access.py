@@ -21,7 +21,7 @@ from rehab.people import clinic_limits
 from rehab.people.audit import access_log, history
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import flow
+from rehab.people.sign_in import two_stage_sign_in
 
 View = Callable[..., HttpResponseBase]
 ViewT = TypeVar("ViewT", bound=Callable[..., Any])  # a page, or a call of the API
@@ -155,7 +155,9 @@ class AccessMiddleware:
             return None
         if getattr(view, "tablets", False) and tablet_of(request) is not None:
             return None
-        if getattr(view, "enrolling", False) and flow.pending_enrollment(request, timezone.now()):
+        if getattr(view, "enrolling", False) and two_stage_sign_in.pending_enrollment(
+            request, timezone.now()
+        ):
             return None
         if not user.is_authenticated:
             return redirect_to_login(request.get_full_path())

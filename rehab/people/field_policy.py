@@ -37,7 +37,7 @@ class Covariate:
     """A column of research exports that is made from a field of the patient.
 
     ``value`` returns the cell from the field's value and the day on which the session began.
-    ``type`` is one of `rehab.exports.table.Type`.
+    ``type`` is one of `rehab.exports.column_definitions.Type`.
     """
 
     name: str

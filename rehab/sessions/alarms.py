@@ -15,7 +15,7 @@ from operator import attrgetter
 
 from rehab.people.models import User
 from rehab.sessions.log import ALARM_KINDS, FallSeverity, Remark, RobotEntry, SessionEvent
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 from rehab.training.changes import NotAllowed
 
 SHOWN_FOR = timedelta(days=30)  # on pages of the clinic; the list of incidents has all

@@ -42,7 +42,7 @@ from rehab.sessions.schemas import (
 )
 from rehab.sessions.services import change_session
 from rehab.sessions.setup.options import OPTIONS
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import NotAllowed

@@ -21,8 +21,8 @@ from rehab.sessions.live.database.clinic_owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.orders import ChangeOrder
 from rehab.sessions.models import TrainingSession
-from rehab.training.bands import bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
+from rehab.training.feedback_bands import bands_to_json
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Valence
 

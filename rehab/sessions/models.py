@@ -20,7 +20,7 @@ from rehab.people.consent.services import allows_remote_view
 from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicModel
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ENDED_STATES, OPEN_STATES, STATE_LABELS, State

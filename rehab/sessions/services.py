@@ -22,7 +22,7 @@ from rehab.sessions.log import ALARM_KINDS, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import ask
 from rehab.sessions.setup.cue_gestures import composed_gestures, silence_cue
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import is_simulated
 from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.stations.models import Station

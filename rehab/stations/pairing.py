@@ -16,7 +16,7 @@ from rehab.people.audit.audit_log import Act, record, truncate_address
 from rehab.people.models import User
 from rehab.people.random_codes import random_code
 from rehab.people.row_values import read_values, save_changes
-from rehab.people.sign_in.known import is_known_network
+from rehab.people.sign_in.known_browsers import is_known_network
 from rehab.people.sign_in.tokens import hash_token
 from rehab.people.token_buckets import TokenBuckets
 from rehab.stations.builtin import builtin_device

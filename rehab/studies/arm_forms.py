@@ -11,7 +11,7 @@ from rehab.people.models import User
 from rehab.people.ranges import NumberField, say_ranges
 from rehab.sessions.forms.initial import WITH_BASELINE
 from rehab.sessions.setup.options import OPTIONS
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.studies.models import SCHEDULE_FIELDS, Arm, Study
 from rehab.training.measures import A2
 

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from rehab.training.bands import Band, bands_from_json
 from rehab.training.closeness import CloseSteps
+from rehab.training.feedback_bands import Band, bands_from_json
 from rehab.training.goal_adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 
-from rehab.training.bands import (
+from rehab.training.feedback_bands import (
     BANDS_MAX,
     BINARY_BANDS,
     EXPLICIT_BANDS,

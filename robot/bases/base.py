@@ -10,8 +10,8 @@ from enum import StrEnum
 from typing import ClassVar, Self
 
 from robot.motion.base_response import Response
+from robot.motion.lights_and_sounds import Color, Note
 from robot.motion.pose import Pose
-from robot.motion.score import Color, Note
 from robot.motion.twist import Twist
 
 

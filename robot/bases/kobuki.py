@@ -37,9 +37,9 @@ from robot.bases.kobuki_protocol.wheels import STOP, control_to_twist, twist_to_
 from robot.bases.odometry import Odometry
 from robot.bases.unordered_motion import UNORDERED, UnorderedMotion
 from robot.motion.base_response import Response
+from robot.motion.lights_and_sounds import Color, Note
 from robot.motion.limits import WHEEL_LIMITS
 from robot.motion.pose import HOME
-from robot.motion.score import Color, Note
 from robot.motion.twist import STILL, Twist
 from robot.port.client import PortClient, ReceivedBytes
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from robot.behavior.window_decider import Decision
 from robot.motion.gesture import Gesture
-from robot.motion.pools import POOLS, variants
+from robot.motion.gesture_variants import POOLS, variants
 from robot.wire.cue_limits import VARIED
 
 APART = 4  # of so many answers in a row no two are the same variant

@@ -7,7 +7,7 @@ from robot.behavior.body import Body
 from robot.behavior.cue import Cue
 from robot.behavior.idle import IdleLife
 
-# What a message of the session's state may order: pools of ``robot.motion.pools``.
+# What a message of the session's state may order: pools of ``robot.motion.gesture_variants``.
 MOMENTS = ("greeting", "rest", "farewell")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from robot.bases import MobileBase
-from robot.motion.score import Color, Light, Note, Score
+from robot.motion.lights_and_sounds import Color, Light, Note, Score
 
 
 class Expression:

@@ -12,7 +12,7 @@ import random
 
 from robot.behavior.safety import ANNOUNCE_S
 from robot.motion.gesture import Gesture
-from robot.motion.pools import IDLE
+from robot.motion.gesture_variants import IDLE
 
 # All ours: from one to the next at least this [s] and up to so much more; so long after anything
 # else that moved or was decided; and what a late base takes beyond what a motion needs.

@@ -11,9 +11,9 @@ from robot.bases import BaseState, Indication, MobileBase
 from robot.behavior.answer_choice import Choice
 from robot.behavior.safety import BATTERY_WARN_V, battery_share
 from robot.behavior.window_decider import Decision
+from robot.motion.face_and_arms import REST, look_of
 from robot.motion.gesture import Gesture
-from robot.motion.looks import REST, look_of
-from robot.motion.score import Color
+from robot.motion.lights_and_sounds import Color
 
 # What the lights of a base say where no score is played; pages show the same of every base.
 LIGHTS = {

@@ -16,7 +16,8 @@ from robot.wire.cue_limits import CueRule
 
 MIN_STEPS = 2  # of a window; with fewer valid steps there is no decision
 # A window above gets a gesture of full size from this mean performance on, where the strong words
-# for the patient begin (rehab/training/bands.py); at the threshold one of this share (our choice).
+# for the patient begin (rehab/training/feedback_bands.py); at the threshold one of this share (our
+# choice).
 FULL_PERFORMANCE = 1.1
 MIN_STRENGTH = 0.5
 SHORTEST_STEP_S = 0.7  # nobody who trains after a stroke takes steps of one leg faster (ours)

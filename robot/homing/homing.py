@@ -27,8 +27,8 @@ from robot.homing.codes import (
     UNSURE,
 )
 from robot.homing.home_view import Carried, HomeView
-from robot.homing.look import Look
 from robot.homing.sighting import Sighting
+from robot.homing.still_frames import Look
 from robot.homing.tag_pose import UNLIKELY, Matrix, Place, find_place, mount_matrix, solve_tag
 from robot.motion.base_response import OrdersInFlight, Response
 from robot.motion.delay_meter import DelayMeter

@@ -25,9 +25,9 @@ from robot.motion.gesture import (
 )
 from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
 from robot.motion.gestures import known_names
+from robot.motion.lights_and_sounds import read_score
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME, Pose, advance
-from robot.motion.score import read_score
 from robot.motion.twist import Twist
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 
 from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
+from robot.motion.lights_and_sounds import NEUTRAL, Score
 from robot.motion.limits import DEFAULT_LIMITS, REACH_M, Limits
 from robot.motion.path import Drive, Segment, is_on_path, plan_path
 from robot.motion.pose import HOME, Pose
-from robot.motion.score import NEUTRAL, Score
 
 # Less than this nobody sees from 2 m away [m, rad]: half a degree of the field of view, and 6°,
 # which a mast or a face on the base shows (docs/robot.md). (Ours.)

@@ -10,8 +10,8 @@ from typing import cast
 
 from robot.marking import gettext_noop
 from robot.motion.gesture import Gesture, Waypoint, check_gesture
-from robot.motion.pools import IDLE, POOLS, VARIANTS
-from robot.motion.score import FALLING, RISING
+from robot.motion.gesture_variants import IDLE, POOLS, VARIANTS
+from robot.motion.lights_and_sounds import FALLING, RISING
 from robot.plugins import Registry, check_one
 from robot.wire.cue_limits import VARIED
 

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from robot.motion.dry_run import dry_run
+from robot.motion.face_and_arms import EACH_S, look_of
 from robot.motion.gesture import Gesture
 from robot.motion.limits import TICK_S
-from robot.motion.looks import EACH_S, look_of
 
 ANNOUNCED_S = 0.5  # a base with lights and sounds shows these before it moves (docs/safety.md)
 EVERY = 2  # of the poses of a dry run: 25 a second

@@ -13,7 +13,7 @@ from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.stations.models import Station
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase

@@ -64,9 +64,9 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
 
     from rehab.sessions.live import auth
     from rehab.sessions.live.database import clinic_owners
-    from rehab.sessions.live.protocol import backlog, resent_steps
+    from rehab.sessions.live.protocol import past_steps, resent_steps
     from rehab.sessions.live.session import loading
-    from rehab.sessions.live.session.commits import Job, commit
+    from rehab.sessions.live.session.commit_transaction import Job, commit
     from rehab.sessions.models import TrainingSession
     from rehab.stations.models import Device
     from rehab.training.changes import Change, ChangeKind
@@ -102,7 +102,7 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
         "commit a change",
         lambda: commit([job(aggregate.change(pause, None, timezone.now()), aggregate.summary())]),
     )
-    yield "a page's past steps", lambda: async_to_sync(backlog.read_backlog)(keys[0], 900, 1800)
+    yield "a page's past steps", lambda: async_to_sync(past_steps.read_backlog)(keys[0], 900, 1800)
     resent, measure = Measurement(900, 990.0, Side.LEFT, 3.0), aggregate.fold.plan.measure
     assert isinstance(measure, Measure)
     yield (

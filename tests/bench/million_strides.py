@@ -49,7 +49,7 @@ def measure(sessions: int, folder: Path) -> dict[str, float]:
     from django.utils import timezone
 
     from rehab.exports.archive import write_zip
-    from rehab.exports.research.package import Package
+    from rehab.exports.research.resumable_export import Package
     from rehab.people.models import Clinic, User
     from rehab.people.roles import Role
 

@@ -20,7 +20,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "self._room, self._wide = (4 * keep, len(self.layout.order))",
     ): "more room moves the same samples more seldom",
     (
-        "rehab/sessions/live/session/commits.py",
+        "rehab/sessions/live/session/commit_transaction.py",
         "if connection.vendor == 'postgresql' and len(rows) > COPIED_ROWS:",
     ): "COPY and INSERT store the same",
     (

@@ -19,11 +19,11 @@ from PIL import Image, ImageDraw
 
 from robot.bases.twin.renderer import Renderer, View
 from robot.motion.dry_run import dry_run
+from robot.motion.face_and_arms import REST, find_act, look_at
 from robot.motion.gesture import Gesture
+from robot.motion.gesture_variants import IDLE, POOLS
 from robot.motion.gestures import BUILT_IN
 from robot.motion.limits import TICK_S
-from robot.motion.looks import REST, find_act, look_at
-from robot.motion.pools import IDLE, POOLS
 from robot.motion.preview import ANNOUNCED_S
 from robot.wire.cue_limits import VARIED
 from tests.support.robot_stage import walk_ten_minutes

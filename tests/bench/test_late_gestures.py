@@ -7,8 +7,8 @@ Nobody tells the player how late the base is.
 import pytest
 
 from robot.bases.kinematic import Imperfections
+from robot.motion.gesture_variants import VARIANTS
 from robot.motion.gestures import BUILT_IN, ORIGINALS
-from robot.motion.pools import VARIANTS
 from tests.support.gesture_runs import play_in_a_row
 
 TIMES = 20

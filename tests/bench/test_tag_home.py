@@ -21,7 +21,7 @@ import cv2
 from robot.bases.twin.tag_view import TagView
 from robot.behavior.manual_drive import HOLDS_S, SPEED_M_S
 from robot.homing.detector import find_tags, make_detector
-from robot.homing.look import FRAMES
+from robot.homing.still_frames import FRAMES
 from robot.motion.pose import HOME
 from tests.support.tag_room import HomingStage, TagRoom, find_start
 

@@ -8,7 +8,7 @@ import pytest
 from rehab.training.valences import VALENCES
 from robot.bases.kinematic import Imperfections
 from robot.behavior.answer_choice import APART
-from robot.motion.pools import POOLS
+from robot.motion.gesture_variants import POOLS
 from tests.support.gesture_runs import play_seen
 from tests.support.robot_stage import walk_ten_minutes
 from tests.support.variants import LEVELS, at_level, levels_of

@@ -83,7 +83,7 @@ def watch(path: Path) -> None:
     """Watch this process."""
     from rehab.sessions.live import process
     from rehab.sessions.live.session import group_commit
-    from rehab.sessions.live.session.commits import commit
+    from rehab.sessions.live.session.commit_transaction import commit
 
     seen, tune = Watch(), process.tune_interpreter
 

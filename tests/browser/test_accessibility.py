@@ -18,7 +18,7 @@ pytestmark = pytest.mark.browser
 WALKED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.stations.models import Station
 from tests.support.walks import make_patient, visit
 rosa = make_patient(first_clinic(), code="R-1")

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.browser
 SEED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from tests.support.walks import make_patient, strides, walk
 rosa = make_patient(first_clinic(), code="R-1")
 for valence in ("positive", "binary"):

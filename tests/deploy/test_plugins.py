@@ -72,7 +72,7 @@ def test_a_base_a_source_and_a_measure_come_and_go(garry):
     assert "a walker who steps to a beat" in garry.run("rehab.sources", "--help").stdout
     assert garry.run("garry_site", "migrate").returncode == 0
     measures = (
-        "from rehab.sessions.setup.protocols import MeasureDefinition as M; import json;"
+        "from rehab.sessions.setup.protocol_models import MeasureDefinition as M; import json;"
         "print(json.dumps(list(M.everywhere.filter(slug='beat_error').values('unit','channel'))))"
     )
     known = garry.run("garry_site", "shell", "-v", "0", "-c", measures)

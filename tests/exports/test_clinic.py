@@ -16,10 +16,10 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.exports.clinic import arrival, departure
-from rehab.exports.clinic.rows import ClinicRows
+from rehab.exports.clinic import clinic_import, clinic_removal
+from rehab.exports.clinic.clinic_models import STAYS, clinic_paths, moving_models, moving_tables
+from rehab.exports.clinic.row_serialization import ClinicRows
 from rehab.exports.clinic.sealed_file import seal_everything
-from rehab.exports.clinic.tables import STAYS, clinic_paths, moving_models, moving_tables
 from rehab.exports.encryption import generate_key
 from rehab.patients.erasure import erase
 from rehab.people.audit import append_only_triggers, seals
@@ -34,7 +34,7 @@ from rehab.sessions import seals as session_seals
 from rehab.sessions.log import Step
 from rehab.sessions.log_fold import check_log
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.stations.models import Device
 from rehab.studies.participants import Enrollment
 from tests.support.archives import body_of, open_archive, rows_of
@@ -49,7 +49,7 @@ SECRET, PUBLIC = generate_key()
 @pytest.fixture(autouse=True)
 def short_wait(monkeypatch: pytest.MonkeyPatch, settings: Any) -> None:
     monkeypatch.setattr("rehab.management.commands.clinic.LEAVES_WITHIN_S", 0.0)
-    monkeypatch.setattr(departure, "REST", 0.0)
+    monkeypatch.setattr(clinic_removal, "REST", 0.0)
     monkeypatch.setattr(os, "nice", lambda _by: None)
     settings.BACKUP_KEYS = [PUBLIC]
 
@@ -334,12 +334,12 @@ def test_a_failed_import_leaves_nothing_and_can_be_repeated(world, file, key, mo
     run("remove", world.clinic.name, file.with_suffix(".json"), "--file", file, "--key", key)
     empty = {model: model._base_manager.count() for model in moving_models()}
     with monkeypatch.context() as patched:
-        patched.setattr(arrival.Arrival, "_open", lambda *_: 1 / 0)
+        patched.setattr(clinic_import.Arrival, "_open", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             run("import", file, "--key", key)
         assert {model: model._base_manager.count() for model in moving_models()} == empty
         # Killed on the way: what it left is removed by the next try.
-        patched.setattr(arrival, "delete_rows", lambda _key: None)
+        patched.setattr(clinic_import, "delete_rows", lambda _key: None)
         with pytest.raises(ZeroDivisionError):
             run("import", file, "--key", key)
     assert not User.everywhere.filter(clinic__isnull=False, is_active=True).exists()
@@ -385,18 +385,18 @@ def test_a_removal_that_stops_keeps_its_certificate_and_is_completed(
     given = ("remove", name, paper, "--file", file, "--key", key)
     with monkeypatch.context() as patched:
         if at == "the end":
-            patched.setattr(departure, "REMOVED", "\ud800")  # cannot be written
+            patched.setattr(clinic_removal, "REMOVED", "\ud800")  # cannot be written
         else:
-            patched.setattr(departure, "_hand_accounts_on", lambda _: 1 / 0)
+            patched.setattr(clinic_removal, "_hand_accounts_on", lambda _: 1 / 0)
         with pytest.raises((UnicodeEncodeError, ZeroDivisionError)):
             run(*given)
     pending = json.loads(paper.read_text())
-    assert pending["certificate"] == departure.PENDING
+    assert pending["certificate"] == clinic_removal.PENDING
     assert pending["rows"]["rehab.step"] == steps
     run(*given)
     gone = json.loads(paper.read_text())
     assert not Clinic.everywhere.filter(pk=pk).exists()
-    assert (gone["certificate"], gone["rows"]) == (departure.REMOVED, pending["rows"])
+    assert (gone["certificate"], gone["rows"]) == (clinic_removal.REMOVED, pending["rows"])
     assert gone["digests_of_rows"] == pending["digests_of_rows"]
     entries = AuditEntry.everywhere.filter(clinic=None, act=Act.CLINIC_OUT)
     assert hashlib.sha256(paper.read_bytes()).hexdigest() in entries.last().about
@@ -418,7 +418,7 @@ def test_a_full_disk_at_the_end_of_a_removal_is_told_with_the_cure(world, file, 
             run("remove", world.clinic.name, paper, "--destroy")
     assert json.loads(paper.read_text())["rows"]["rehab.step"]
     run("remove", world.clinic.name, paper, "--destroy")
-    assert json.loads(paper.read_text())["certificate"] == departure.REMOVED
+    assert json.loads(paper.read_text())["certificate"] == clinic_removal.REMOVED
 
 
 def test_what_was_added_since_the_file_is_not_lost(world, file, key):

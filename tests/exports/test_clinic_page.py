@@ -13,8 +13,8 @@ from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 
-from rehab.exports.clinic import departure, job
-from rehab.exports.clinic.departure import make_receipt
+from rehab.exports.clinic import clinic_removal, job
+from rehab.exports.clinic.clinic_removal import make_receipt
 from rehab.exports.clinic.job import Job
 from rehab.exports.clinic.sealed_file import inspect
 from rehab.exports.encryption import generate_key, read_identities
@@ -54,7 +54,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch, settings: Any, tmp_path: Path) -> N
     monkeypatch.setattr(job, "run_aside", run)
     monkeypatch.setattr("os.nice", lambda _by: None)
     monkeypatch.setattr("rehab.management.commands.clinic.LEAVES_WITHIN_S", 0.0)
-    monkeypatch.setattr(departure, "REST", 0.0)
+    monkeypatch.setattr(clinic_removal, "REST", 0.0)
 
 
 @pytest.fixture

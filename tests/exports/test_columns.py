@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
+from rehab.exports.codebook import TABLES, AnswerRow, VisitRow, codebook_rows
+from rehab.exports.column_definitions import WHOSE, Type
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.session_table import SessionRow
 from rehab.exports.step_tables import StepRow
-from rehab.exports.table import WHOSE, Type
-from rehab.exports.tables import TABLES, AnswerRow, VisitRow, codebook_rows
 from rehab.sessions.events.step import MONITOR_FIELDS
 from rehab.sessions.log import Step
 from rehab.sessions.schemas import StepOut

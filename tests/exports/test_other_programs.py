@@ -14,10 +14,10 @@ from zipfile import ZipFile
 
 import pytest
 
+from rehab.exports.column_definitions import Column
 from rehab.exports.research.jamovi import write_omv
-from rehab.exports.research.package import Package
 from rehab.exports.research.redcap import COLUMNS, DICTIONARY
-from rehab.exports.table import Column
+from rehab.exports.research.resumable_export import Package
 from rehab.people.roles import Role
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.trials import walk_visit

@@ -19,10 +19,10 @@ from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
+from rehab.exports.codebook import TABLES
 from rehab.exports.selection import PAGE_ROWS, Selection
 from rehab.exports.session_table import SESSIONS
 from rehab.exports.step_tables import STEPS
-from rehab.exports.tables import TABLES
 from rehab.patients.visits import plan_visit
 from rehab.people.audit import append_only_triggers
 from rehab.people.audit.audit_log import Act, AuditEntry

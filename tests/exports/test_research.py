@@ -15,12 +15,12 @@ import pytest
 from django.core.management import CommandError, call_command
 from django.urls import reverse
 
-from rehab.exports.research import package as packages
+from rehab.exports.codebook import TABLES
+from rehab.exports.research import resumable_export as packages
 from rehab.exports.research.dates import shift_of, without_clocks
-from rehab.exports.research.package import Package, sessions_for
+from rehab.exports.research.resumable_export import Package, sessions_for
 from rehab.exports.selection import Selection
 from rehab.exports.step_tables import FEEDBACK
-from rehab.exports.tables import TABLES
 from rehab.patients.erasure import erase
 from rehab.people.audit import append_only_triggers
 from rehab.people.audit.audit_log import Act, AuditEntry

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rehab.exports.research.package import Package
+from rehab.exports.research.resumable_export import Package
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.questionnaires import answer, ask, next_response

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rehab.exports.research.package import Package
+from rehab.exports.research.resumable_export import Package
 from rehab.exports.research.study_files import VERIFIER
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent

@@ -14,7 +14,7 @@ from django.apps import apps
 from django.utils.choices import CallableChoiceIterator
 
 from rehab.feedback.translation import valence_choices
-from rehab.training.bands import Confetti
+from rehab.training.feedback_bands import Confetti
 from rehab.training.valences import POSITIVE, VALENCES, Valence
 
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ from scipy.signal import butter, lfilter, lfilter_zi
 
 from rehab.gait import GaitInputError, LegSamples, measure_strides
 from rehab.gait.__main__ import main
-from rehab.gait.recordings.columns import SIGNAL_LAYOUTS, put_back_filtered
+from rehab.gait.recordings.column_mapping import SIGNAL_LAYOUTS, put_back_filtered
 from rehab.gait.recordings.csv_files import save_signals
 from rehab.gait.recordings.readers import read_signals
 from rehab.gait.setup.check import check_setup

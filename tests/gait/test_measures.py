@@ -14,7 +14,7 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, TwoLegDetector, measure_strides
-from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS
+from rehab.gait.recordings.column_mapping import CHANNELS, SIGNAL_LAYOUTS
 from rehab.gait.recordings.readers import read_any_table
 from rehab.sources.intake.measurements import to_measurement
 from rehab.training.measures import PLATE_MEASURES

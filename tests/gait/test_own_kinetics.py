@@ -8,7 +8,7 @@ from scipy.signal import butter, filtfilt
 
 from rehab.gait import LegSamples, measure_strides
 from rehab.gait.recordings import c3d_plates, inverse_dynamics
-from rehab.gait.recordings.columns import MARKED, find_layout, find_required, read_column_map
+from rehab.gait.recordings.column_mapping import MARKED, find_layout, find_required, read_column_map
 from rehab.gait.recordings.inverse_dynamics import JOINT_AHEAD_M, compute_ankle
 from rehab.gait.recordings.markers import PLACES
 from rehab.gait.recordings.readers import read_any_table

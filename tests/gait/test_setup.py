@@ -8,7 +8,7 @@ import pytest
 
 from rehab.gait import GaitInputError
 from rehab.gait.__main__ import main
-from rehab.gait.recordings.columns import read_column_map
+from rehab.gait.recordings.column_mapping import read_column_map
 from rehab.gait.selfcheck.shapes import SHAPES
 from rehab.gait.setup.check import check_setup, compare_with_setup
 from rehab.gait.setup.report import format_arguments

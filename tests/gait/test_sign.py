@@ -7,7 +7,7 @@ import pytest
 
 from rehab.gait import WearableDetector
 from rehab.gait.wearables import detector
-from rehab.gait.wearables.sign import STRIDES_SURE, find_sign
+from rehab.gait.wearables.axis_sign import STRIDES_SURE, find_sign
 from tests.support.simulated_leg import walk_foot
 
 

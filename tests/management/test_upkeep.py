@@ -14,8 +14,8 @@ from django.utils import timezone
 from rehab.exports.encryption import generate_key
 from rehab.management.commands import upkeep
 from rehab.people.audit.seals import seal_at_once
-from rehab.people.chores import Chore, record_chore
 from rehab.people.server_keys import Purpose, store_first
+from rehab.people.upkeep_runs import Chore, record_chore
 from rehab.sessions.seals import seal_sessions
 from rehab.stations.https.authority import OwnAuthority
 from tests.support.walks import HIT, MISS, walk

@@ -13,7 +13,7 @@ from django.urls import reverse
 from rehab.patients.visits import plan_visit
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.better_or_worse import Result
-from rehab.sessions.reports.earned import next_mark
+from rehab.sessions.reports.earned_number import next_mark
 from rehab.sessions.reports.patient_summary import describe_today, is_milestone
 from rehab.training.valences import VALENCES
 from tests.support.boards import tablet_at

@@ -25,7 +25,7 @@ from rehab.people.sign_in.factors.factors import Authenticator
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.extent import EVERYTHING

@@ -8,7 +8,7 @@ import pytest
 from django.urls import reverse
 
 from rehab.people.models import User
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from tests.support.form_noise import run_noise
 from tests.support.world import build_world
 

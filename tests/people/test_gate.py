@@ -16,8 +16,8 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in import hashing, known, lockout
-from rehab.people.sign_in.gate import (
+from rehab.people.sign_in import hashing, known_browsers, lockout
+from rehab.people.sign_in.flood_gate import (
     ALL_BURST,
     ALL_INTERVAL_S,
     AT_ONCE,
@@ -29,7 +29,7 @@ from rehab.people.sign_in.gate import (
     SignInGate,
 )
 from rehab.people.sign_in.hashing import HashingBusy, HashingPool
-from rehab.people.sign_in.known import Lanes, lane_of_browser
+from rehab.people.sign_in.known_browsers import Lanes, lane_of_browser
 
 
 class Site:
@@ -175,8 +175,10 @@ def test_a_browser_that_has_signed_in_keeps_its_clinics_lane(client, world):
     client.post("/sign-in/", {"username": "lea", "password": "walk well 2026"})
     kept = cookies_of(client)
     assert lane_of_browser(kept) == user.clinic_id
-    assert client.cookies[known.COOKIE]["path"] == "/sign-in/"
-    assert lane_of_browser(kept | {known.COOKIE: f"1{kept[known.COOKIE]}"}) is None
+    assert client.cookies[known_browsers.COOKIE]["path"] == "/sign-in/"
+    assert (
+        lane_of_browser(kept | {known_browsers.COOKIE: f"1{kept[known_browsers.COOKIE]}"}) is None
+    )
     with time_machine.travel(timezone.now() + timedelta(days=31)):
         assert lane_of_browser(kept) is None
 
@@ -198,7 +200,7 @@ async def test_a_network_from_which_somebody_signed_in_lately_keeps_its_clinics_
     assert await lanes.find({}, address) is None  # it was read a moment ago
     assert await Lanes().find({}, address) == world.clinic.pk
     await sign_in(act=Act.SIGN_IN, clinic=None, address="203.0.113.0/24")
-    assert await Lanes().find({}, address) == known.HOSTS
+    assert await Lanes().find({}, address) == known_browsers.HOSTS
 
 
 async def test_only_attempts_to_sign_in_are_counted():

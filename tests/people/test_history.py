@@ -12,7 +12,7 @@ from rehab.gestures.models import GestureStep
 from rehab.models import TRACKED
 from rehab.people.audit import history
 from rehab.people.audit.history import HistoryEntry
-from rehab.people.audit.history_text import describe_actor
+from rehab.people.audit.row_history import describe_actor
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken

@@ -11,7 +11,7 @@ from django.test import Client
 
 from rehab.people.models import User
 from rehab.people.sign_in import lockout
-from rehab.people.sign_in.backends import PasswordBackend
+from rehab.people.sign_in.authentication_backends import PasswordBackend
 from rehab.people.sign_in.factors import factors
 from tests.support.accounts import add_account, add_app, enter
 

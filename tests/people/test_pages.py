@@ -131,7 +131,7 @@ def test_a_host_makes_clinics_and_their_leads(world):
 
 
 def test_shared_rows_are_the_hosts_to_change(world):
-    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+    from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 
     client = world.lead
     for model in (MeasureDefinition, Protocol):

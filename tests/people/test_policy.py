@@ -21,7 +21,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.results import read_results
 from rehab.boards.snapshots import BoardSnapshot
 from rehab.checks import check_personal_fields
-from rehab.exports.patient_data import patient_files, session_files
+from rehab.exports.export_files import patient_files, session_files
 from rehab.patients.erasure import erase
 from rehab.people.audit import append_only_triggers
 from rehab.people.audit.audit_log import Act, record

@@ -17,7 +17,7 @@ from django.utils.translation import override
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.training.changes import ChangeKind, NotAllowed, State
 from rehab.training.controls import CONTROLS
 from rehab.training.goals import GoalRule

@@ -15,7 +15,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import attempt_counter
 from rehab.people.sign_in.attempt_counter import SignInAttempts
-from rehab.people.sign_in.browser_sessions import LAST_ACTIVITY_AT, SIGNED_IN_AT
+from rehab.people.sign_in.sign_in_expiry import LAST_ACTIVITY_AT, SIGNED_IN_AT
 from tests.support.accounts import PASSWORD, add_account, enter, is_in
 
 pytestmark = pytest.mark.django_db

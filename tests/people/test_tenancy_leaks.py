@@ -14,7 +14,7 @@ from django.views.decorators.http import require_POST
 from rehab.boards.panels import panel_rows
 from rehab.boards.ranking import results
 from rehab.people.access import for_roles, public
-from rehab.people.audit import history_text
+from rehab.people.audit import row_history
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Patient
 from rehab.people.roles import Role
@@ -158,7 +158,7 @@ def test_staff_in_a_history_and_beside_a_session_is_caught(worlds, monkeypatch):
     HistoryEntry.everywhere.create(model_name="Leaderboard", kind="changed", **who)
     researcher = researchers(worlds)
     assert find_leaks(worlds, researcher, under="/admin/rehab/leaderboard/")[0] == []
-    monkeypatch.setattr(history_text, "may_see_names", lambda role: True)
+    monkeypatch.setattr(row_history, "may_see_names", lambda role: True)
     monkeypatch.setattr(corrections, "may_see_names", lambda role: True)
     leaks, _ = find_leaks(worlds, researcher)
     url = reverse("admin:rehab_leaderboard_history", args=[board.pk])

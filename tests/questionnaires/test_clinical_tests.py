@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, Way, to_speed
+from rehab.questionnaires.standard_tests import CLINICAL_TESTS, Way, to_speed
 from rehab.training.measures import InvalidSetting
 
 

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from rehab.questionnaires.clinical_tests import ClinicalTest, Way
 from rehab.questionnaires.form_items import FormItem, read_form_items, total
+from rehab.questionnaires.standard_tests import ClinicalTest, Way
 from rehab.training.measures import InvalidSetting
 
 FORM = """

@@ -111,7 +111,7 @@ from rehab.people.models import Patient, User
 from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.presets import Preset
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station

@@ -22,7 +22,7 @@ from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
 from tests.support.walks import make_patient, strides, walk

@@ -11,8 +11,8 @@ from rehab.exports.fhir.resources import Pseudonyms, make_bundle
 from rehab.patients.erasure import erase
 from rehab.people.models import ErasureReason
 from rehab.people.roles import Role
-from rehab.sessions.assessments import Assessment, assessments_with, load_courses
-from rehab.sessions.clinic_tests import ClinicTest
+from rehab.sessions.assessment_results import Assessment, assessments_with, load_courses
+from rehab.sessions.available_tests import ClinicTest
 from tests.support.walks import HIT, make_session, walk
 from tests.support.world import NOW, build_world, client_of
 

@@ -277,7 +277,7 @@ def test_models_stand_under_headings_with_a_line_each(world):
         "People",
     ]
     assert "Who walks: code, nickname, leg" in page
-    assert "More" not in headings, "rehab/site.py says no heading for a model"
+    assert "More" not in headings, "rehab/admin_site.py says no heading for a model"
 
 
 def test_the_front_page_costs_the_same_however_much_was_walked(

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rehab.people.models import Clinic, Patient
 from rehab.people.scope import CrossClinicReference
 from rehab.sessions.live.session.aggregate import SessionAggregate, StepRow
-from rehab.sessions.live.session.commits import STORED_COLUMNS, LogDiffers
+from rehab.sessions.live.session.commit_transaction import STORED_COLUMNS, LogDiffers
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session

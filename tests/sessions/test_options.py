@@ -64,14 +64,14 @@ def sent(patient: Patient, by: User, **others: Any) -> dict[str, str]:
 def codebook_of_today() -> list[tuple[Any, ...]]:
     """Return the codebook of exports that a server would have that starts now."""
     fresh: dict[str, Any] = {}
-    for name in ("rehab.exports.session_table", "rehab.exports.tables"):
+    for name in ("rehab.exports.session_table", "rehab.exports.codebook"):
         spec = find_spec(name)
         assert spec is not None
         assert spec.loader is not None
         with mock.patch.dict(sys.modules, fresh):
             fresh[name] = module_from_spec(spec)
             spec.loader.exec_module(fresh[name])
-    return list(fresh["rehab.exports.tables"].codebook_rows())
+    return list(fresh["rehab.exports.codebook"].codebook_rows())
 
 
 def test_a_new_option_is_one_entry(stage: Option, world: World, rosa: Patient) -> None:

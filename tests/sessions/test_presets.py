@@ -13,7 +13,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from tests.support.marks import mark
 from tests.support.world import World, build_world, client_of

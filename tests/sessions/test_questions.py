@@ -18,7 +18,7 @@ from rehab.sessions.questionnaires import (
     ask,
     find_instrument,
 )
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.stations.models import Station
 from rehab.training.measures import InvalidSetting
 from tests.support.walks import make_session

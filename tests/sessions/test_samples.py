@@ -8,7 +8,7 @@ from django.urls import reverse
 
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.sessions.setup.recordings import check_upload, recordings_folder
 from rehab.sources.recording import read_recording
 from rehab.sources.recording.sample_recordings import is_sample

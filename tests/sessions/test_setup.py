@@ -11,7 +11,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import MEASURES, InvalidSetting

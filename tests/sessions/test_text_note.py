@@ -9,7 +9,7 @@ from django.core.exceptions import ValidationError
 
 from rehab.people.models.clinics import NOTE_PLACEHOLDERS
 from rehab.people.roles import Role
-from rehab.sessions.assessments import Assessment
+from rehab.sessions.assessment_results import Assessment
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.reports.text_note import usual_template
 from tests.support.walks import HIT, MISS, walk

@@ -1,7 +1,7 @@
 """An intake with all that goes in and comes out of it."""
 
 from rehab.gait import LegSamples, measure_strides
-from rehab.gait.recordings.columns import REQUIRED, SIDES, SIGNAL_LAYOUTS
+from rehab.gait.recordings.column_mapping import REQUIRED, SIDES, SIGNAL_LAYOUTS
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake import Intake, IntakeSettings
 from rehab.training.steps import Side

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.sources.intake.devices import decode_treadmill, encode_treadmill, read_devices
 from rehab.sources.intake.rows import BadRow
+from rehab.sources.intake.treadmill_and_heart_rate import (
+    decode_treadmill,
+    encode_treadmill,
+    read_devices,
+)
 from rehab.sources.synthetic.source import find_heart_rate, find_speed
 from tests.sources.intake_harness import IntakeHarness, rows_of
 

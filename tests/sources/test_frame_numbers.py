@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rehab.gait import measure_strides
-from rehab.gait.recordings.columns import read_column_map
+from rehab.gait.recordings.column_mapping import read_column_map
 from rehab.gait.recordings.readers import read_signals
 from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure, rows_of
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.gait import measure_strides
-from rehab.gait.recordings.columns import read_column_map
+from rehab.gait.recordings.column_mapping import read_column_map
 from rehab.gait.recordings.readers import read_signals
 from rehab.gait.selfcheck.shapes import SHAPES
 from rehab.sources.synthetic.signals import Sensors

@@ -11,10 +11,10 @@ from django.urls import reverse
 
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.sessions.assessments import Assessment
-from rehab.sessions.clinic_tests import ClinicTest
+from rehab.sessions.assessment_results import Assessment
+from rehab.sessions.available_tests import ClinicTest
 from rehab.sessions.questionnaires import QuestionnaireResponse, ask
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.models import Study

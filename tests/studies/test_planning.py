@@ -12,7 +12,7 @@ from django.urls import reverse
 from rehab.feedback.models import FeedbackType
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study
 from rehab.studies.registration.allocation_secret import seal, unseal

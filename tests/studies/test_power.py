@@ -13,7 +13,7 @@ from django.urls import reverse
 
 from rehab.management.commands import studypower
 from rehab.people.roles import Role
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.studies.models import Arm
 from rehab.studies.power_runs import PowerRun, plan_run, usual_settings, work
 from rehab.studies.simulation.power import SimulatedDifference, summarize, wilson

@@ -20,8 +20,8 @@ from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment, StudyEvent
 from rehab.studies.record.adverse_events import AdverseEvent, record
 from rehab.studies.record.checklists import BY_HAND, ITEMS, checklist_rows
-from rehab.studies.record.found import find
-from rehab.studies.record.known import UNMASKED
+from rehab.studies.record.prefilled_answers import UNMASKED
+from rehab.studies.record.report_statements import find
 from rehab.studies.registration.estimands import estimands
 from rehab.studies.registration.facts import ASKED, BEFORE
 from rehab.studies.registration.lifecycle import close, register, revise

@@ -13,7 +13,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.default_protocols import install_defaults
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import take_mark
 from rehab.studies.models import StudyMark, StudyState

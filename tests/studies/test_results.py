@@ -10,7 +10,7 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
-from rehab.exports.research.package import sessions_for
+from rehab.exports.research.resumable_export import sessions_for
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic
 from rehab.people.roles import Role

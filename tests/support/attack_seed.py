@@ -16,7 +16,7 @@ def seed() -> dict[str, Any]:
 
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import prepare_database
-    from rehab.people.sign_in.flow import SECOND_FACTOR_VERIFIED
+    from rehab.people.sign_in.two_stage_sign_in import SECOND_FACTOR_VERIFIED
     from tests.support.identities import identifying_texts
     from tests.support.programs import bearer_token
     from tests.support.tenancy import all_routes, enter

@@ -19,7 +19,7 @@ from rehab.sessions.live.protocol.frames import READ_NOW
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
-from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.sessions.setup.protocol_models import MeasureDefinition
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rehab.feedback.admin import initial_bands
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.stations.models import Station
 from rehab.training.valences import VALENCES
 

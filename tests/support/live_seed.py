@@ -25,7 +25,7 @@ def seed(count: int, *, apart: bool = False, ready: bool = False) -> list[dict[s
     from rehab.people.models import Clinic, Patient, User
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic, prepare_database
-    from rehab.people.sign_in.flow import BACKEND
+    from rehab.people.sign_in.two_stage_sign_in import BACKEND
     from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.stations.models import Device, Station

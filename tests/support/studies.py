@@ -11,7 +11,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.studies.agreements import StudyConsent
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark

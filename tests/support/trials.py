@@ -26,8 +26,8 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient, ServerUserManager, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import browser_sessions
-from rehab.people.sign_in.browser_sessions import digest_of
+from rehab.people.sign_in import sign_in_expiry
+from rehab.people.sign_in.sign_in_expiry import digest_of
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.corrections import SessionCorrection
@@ -83,7 +83,7 @@ LEFT_OUT: dict[str, tuple[Any, str, Any, set[str]]] = {
         lambda _: Patient.everywhere.none(),
         AS_ACCOUNT,
     ),
-    "a sign-in ends": (browser_sessions, "timezone", YESTERDAY, {STALE}),
+    "a sign-in ends": (sign_in_expiry, "timezone", YESTERDAY, {STALE}),
     "a family sees nothing": (family, "refusal_reason", lambda _: "", {FAMILY}),
 }
 # What differs each time, whatever a patient walks: tokens, nonces, times, room on the disk, and

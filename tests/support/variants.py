@@ -9,7 +9,7 @@ import pytest
 
 from robot.behavior.cue import QUIET, QUIET_PACE
 from robot.motion.gesture import Gesture
-from robot.motion.pools import POOLS, TABLE, VARIANTS, variants
+from robot.motion.gesture_variants import POOLS, TABLE, VARIANTS, variants
 
 # A strong answer, one to a weak window, and one in a quiet room: share of the size, and pace.
 LEVELS = {"full": (1.0, 1.0), "least": (0.5, 1.0), "gentle": (QUIET, QUIET_PACE)}

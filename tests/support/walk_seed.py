@@ -129,8 +129,8 @@ def browser_session(user: User) -> str:
     from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
     from django.utils import timezone
 
-    from rehab.people.sign_in.flow import BACKEND
     from rehab.people.sign_in.step_up import CONFIRMED_AT
+    from rehab.people.sign_in.two_stage_sign_in import BACKEND
 
     cookies = import_module(settings.SESSION_ENGINE).SessionStore()
     cookies[SESSION_KEY] = str(user.pk)
@@ -147,7 +147,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic
     from rehab.sessions.services import SessionRequest, create_session
-    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+    from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
     from rehab.stations.models import Device, Station
     from rehab.stations.pins import set_pin
     from rehab.training.goals import GoalRule, Target

@@ -23,7 +23,6 @@ from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.audit.moves import ClinicMove
 from rehab.people.audit.seals import LogSeal
-from rehab.people.chores import Chore
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.consent.tombstones import ImportTombstone
@@ -34,12 +33,13 @@ from rehab.people.sign_in.attempt_counter import SignInAttempts
 from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
+from rehab.people.upkeep_runs import Chore
 from rehab.questionnaires.instrument import Instrument, Item
-from rehab.sessions.assessments import Assessment
-from rehab.sessions.clinic_tests import ClinicTest
+from rehab.sessions.assessment_results import Assessment
+from rehab.sessions.available_tests import ClinicTest
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate
-from rehab.sessions.live.session.commits import Job, commit
+from rehab.sessions.live.session.commit_transaction import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.ownership import ClinicOwner
@@ -48,7 +48,7 @@ from rehab.sessions.robot_incidents import RobotIncident
 from rehab.sessions.seals import SessionSeal, seal_sessions
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.stations.tablets import COOKIE
 from rehab.studies.models import StudyMark, StudyVersion

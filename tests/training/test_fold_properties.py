@@ -12,8 +12,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rehab.training.bands import Band, Confetti, bands_to_json
 from rehab.training.changes import Change, ChangeKind, PauseReason
+from rehab.training.feedback_bands import Band, Confetti, bands_to_json
 from rehab.training.fold import SessionFold
 from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
 from rehab.training.fold.tallies import STRIDES, Tally

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from rehab.training.bands import bands_to_json
 from rehab.training.changes import (
     STATE_LABELS,
     Change,
@@ -19,6 +18,7 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
+from rehab.training.feedback_bands import bands_to_json
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase

@@ -10,7 +10,7 @@ import re
 
 import pytest
 
-from rehab.training.bands import Band, Confetti, bands_from_json, bands_to_json
+from rehab.training.feedback_bands import Band, Confetti, bands_from_json, bands_to_json
 from rehab.training.measures import InvalidSetting
 from rehab.training.phrases import NOTHING_LOST
 from rehab.training.valences import (

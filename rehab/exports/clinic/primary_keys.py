@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.exports.clinic.tables import Table, moving_tables
+from rehab.exports.clinic.clinic_models import Table, moving_tables
 
 MARGIN = 10_000  # keys that others may take between reading and reserving
 

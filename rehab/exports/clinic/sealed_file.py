@@ -22,10 +22,10 @@ from django.db import connection
 from pyrage.x25519 import Identity, Recipient
 
 from rehab.exports.backup import GZIP_WBITS, consistent_read, tables_version
+from rehab.exports.clinic.clinic_models import moving_tables
 from rehab.exports.clinic.primary_keys import last_keys
-from rehab.exports.clinic.rows import CannotMove, ClinicRows, Digest, to_json
+from rehab.exports.clinic.row_serialization import CannotMove, ClinicRows, Digest, to_json
 from rehab.exports.clinic.shared_rows import describe_shared
-from rehab.exports.clinic.tables import moving_tables
 from rehab.exports.encryption import CannotDecrypt, decrypt, encrypt
 from rehab.people.audit import seals
 from rehab.people.commands import command

@@ -7,8 +7,8 @@ from typing import Any
 from django.apps import apps
 from django.db.models import Model
 
-from rehab.exports.clinic.rows import shared_references
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.exports.clinic.row_serialization import shared_references
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 
 NAMES = {"rehab.measuredefinition": "slug", "rehab.protocol": "name"}
 

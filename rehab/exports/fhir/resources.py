@@ -16,7 +16,7 @@ from django.conf import settings
 from rehab.exports.session_table import CONDITIONS, WALKED, SessionRow
 from rehab.people.commands import garry_version
 from rehab.people.models import Patient, User
-from rehab.sessions.assessments import assessments_with
+from rehab.sessions.assessment_results import assessments_with
 from rehab.sessions.log import PartEntry, SessionEvent, SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse

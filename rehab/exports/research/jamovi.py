@@ -14,7 +14,7 @@ from struct import pack
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from rehab.exports.table import Column, Type
+from rehab.exports.column_definitions import Column, Type
 
 META = (
     "Manifest-Version: 1.0\nData-Archive-Version: 1.0.2\njamovi-Archive-Version: 11.0\n"

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from rehab.exports.archive import write_csv
+from rehab.exports.codebook import STUDY_VISITS
+from rehab.exports.column_definitions import Column, Table, Type
 from rehab.exports.session_table import SESSIONS
-from rehab.exports.table import Column, Table, Type
-from rehab.exports.tables import STUDY_VISITS
 
 TABLES = (SESSIONS, STUDY_VISITS)
 COLUMNS: tuple[Column, ...] = (*SESSIONS.columns, *STUDY_VISITS.own)

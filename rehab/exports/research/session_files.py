@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from rehab.exports.codebook import EVENTS, INCIDENTS, TABLES
 from rehab.exports.fhir.resources import Pseudonyms, make_bundle
 from rehab.exports.research.bids import EventSink, MotionSink
 from rehab.exports.research.dates import SINCE_1970_S, shift_of, shift_rows
@@ -17,7 +18,6 @@ from rehab.exports.research.sinks import CsvSink, Sink, available_formats, pump
 from rehab.exports.selection import Selection
 from rehab.exports.session_table import PARTICIPANT, SESSIONS
 from rehab.exports.step_tables import FEEDBACK, STEPS
-from rehab.exports.tables import EVENTS, INCIDENTS, TABLES
 from rehab.people.models import User
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession

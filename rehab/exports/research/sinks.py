@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from rehab.exports.table import Table, Type
+from rehab.exports.column_definitions import Table, Type
 from rehab.people.web.csv_tables import CsvWriter
 from robot.plugins import Registry, check_class
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rehab.gait.recordings.c3d_parameters import read_labels, read_values
-from rehab.gait.recordings.columns import CHANNELS, MEDIAL, SIDES, SIGNAL_LAYOUTS
+from rehab.gait.recordings.column_mapping import CHANNELS, MEDIAL, SIDES, SIGNAL_LAYOUTS
 from rehab.gait.recordings.inverse_dynamics import add_computed
 from rehab.gait.recordings.markers import ANKLES, CENTERS, PLACES, find_markers
 from rehab.gait.recordings.plates import assign_plates

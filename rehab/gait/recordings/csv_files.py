@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, NamedTuple, TextIO, cast
 
 import numpy as np
 
-from rehab.gait.recordings.columns import (
+from rehab.gait.recordings.column_mapping import (
     CHANNELS,
     OVERGROUND,
     REQUIRED,

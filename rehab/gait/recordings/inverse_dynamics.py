@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rehab.gait.recordings.columns import MARKED, MEDIAL, REQUIRED
+from rehab.gait.recordings.column_mapping import MARKED, MEDIAL, REQUIRED
 from rehab.gait.signals.filters import Floats
 from rehab.gait.stances.kinetics import compute_ankle_moment
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
-from rehab.gait.recordings.columns import (
+from rehab.gait.recordings.column_mapping import (
     OVERGROUND,
     ColumnMap,
     find_layout,

@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 from rehab.gait.offline import measure_strides
-from rehab.gait.recordings.columns import (
+from rehab.gait.recordings.column_mapping import (
     CHANNELS,
     FILTERED_HZ,
     REQUIRED,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.recordings.columns import REQUIRED
+from rehab.gait.recordings.column_mapping import REQUIRED
 from rehab.gait.recordings.readers import says_overground
 from rehab.gait.recordings.table import Table, find_time
 from rehab.gait.selfcheck.shapes import (

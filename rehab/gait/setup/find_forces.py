@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehab.gait.one_leg import GRAVITY_M_S2, STRIDE_MAX_S
-from rehab.gait.recordings.columns import SIDES
+from rehab.gait.recordings.column_mapping import SIDES
 from rehab.gait.recordings.table import Table
 from rehab.gait.selfcheck.checks import CERTAIN_LOAD
 from rehab.gait.selfcheck.shapes import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.gait.recordings.columns import SignalColumn
+from rehab.gait.recordings.column_mapping import SignalColumn
 from rehab.gait.setup.check import SetupCheck
 from rehab.gait.setup.guess import Guess
 

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from rehab.gait.strides import GaitInputError
 from rehab.gait.wearables.axis import SagittalAxis
+from rehab.gait.wearables.axis_sign import STRIDES_SURE, find_sign
+from rehab.gait.wearables.doubtful_strides import Reading
 from rehab.gait.wearables.history import History, Moment
 from rehab.gait.wearables.mounting import Mounting
 from rehab.gait.wearables.orientation import NOWHERE, Orientation, Vector, dot
-from rehab.gait.wearables.readings import Reading
-from rehab.gait.wearables.sign import STRIDES_SURE, find_sign
 from rehab.gait.wearables.standing import Standing
 from rehab.gait.wearables.strides import Doubt, Place, WearableStride
 from rehab.gait.wearables.swings import GAP_S

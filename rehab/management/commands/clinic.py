@@ -13,8 +13,8 @@ from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 from django.utils import timezone
 
-from rehab.exports.clinic.arrival import import_clinic
-from rehab.exports.clinic.departure import (
+from rehab.exports.clinic.clinic_import import import_clinic
+from rehab.exports.clinic.clinic_removal import (
     LEAVES_WITHIN_S,
     PENDING,
     compare_with_file,
@@ -23,7 +23,7 @@ from rehab.exports.clinic.departure import (
     make_receipt,
     remove_clinic,
 )
-from rehab.exports.clinic.rows import CannotMove, ClinicRows
+from rehab.exports.clinic.row_serialization import CannotMove, ClinicRows
 from rehab.exports.clinic.sealed_file import inspect, write_clinic
 from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_recipients
 from rehab.management.files import new_file, opened, read_key_file

@@ -26,10 +26,10 @@ from rehab.management.files import new_file
 from rehab.management.problem_report import write_report
 from rehab.people.audit import append_only_triggers, seals
 from rehab.people.audit.seals import LogSeal
-from rehab.people.chores import TASK, Chore
 from rehab.people.commands import command, reinstall
 from rehab.people.server_keys import ServerKey
 from rehab.people.sign_in.first_start import count_pending_migrations
+from rehab.people.upkeep_runs import TASK, Chore
 from rehab.sessions import seals as session_seals
 from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.aggregate import SessionAggregate

@@ -11,8 +11,8 @@ from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
 from rehab.exports.archive import Files, save_zip
-from rehab.exports.patient_data import patient_files, session_files
-from rehab.exports.research.package import Package
+from rehab.exports.export_files import patient_files, session_files
+from rehab.exports.research.resumable_export import Package
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.commands import command

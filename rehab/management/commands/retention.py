@@ -12,7 +12,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from rehab.boards.cache_invalidation import delete_old_changes
-from rehab.exports.research.package import discard_old
+from rehab.exports.research.resumable_export import discard_old
 from rehab.patients.closure import SessionStillOpen
 from rehab.patients.erasure import erase
 from rehab.patients.retention import delete_old_logs, patients_past_retention

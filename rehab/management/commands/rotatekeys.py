@@ -12,7 +12,7 @@ from django.apps import apps
 from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 
-from rehab.exports.clinic.rows import ENCRYPTED
+from rehab.exports.clinic.row_serialization import ENCRYPTED
 from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.management.files import read_key_file
 from rehab.people.server_keys import Purpose, ServerKey, add_key, close_keys_again, encrypt_again

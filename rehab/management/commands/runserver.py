@@ -2,7 +2,7 @@
 
 from daphne.management.commands.runserver import Command as DaphneCommand
 
-from rehab.sessions.live.server import LiveServer
+from rehab.sessions.live.daphne_server import LiveServer
 
 
 class Command(DaphneCommand):  # type: ignore[misc]

@@ -24,8 +24,8 @@ from rehab.sessions.live.headless import (
     simulate_strides,
 )
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.payloads import describe_cue
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.state_messages import describe_cue
 from rehab.sources.recording import Recording, RecordingError, read_recording
 from rehab.sources.recording.sample_recordings import is_sample
 from rehab.sources.synthetic import PROFILES, SyntheticWalker

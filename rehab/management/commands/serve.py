@@ -165,7 +165,7 @@ def prepare_https(*, make: bool) -> None:
 
 def run_server(host: str, port: int, on_ready: Callable[[], None]) -> None:
     """Serve until stopped."""
-    from rehab.sessions.live.server import LiveServer  # installs a reactor: not at import
+    from rehab.sessions.live.daphne_server import LiveServer  # installs a reactor: not at import
 
     LiveServer(
         get_default_application(),

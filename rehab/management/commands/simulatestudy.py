@@ -17,7 +17,7 @@ from django.db import connection
 from django.utils import timezone, translation
 
 from rehab.exports.archive import save_zip
-from rehab.exports.research.package import Package
+from rehab.exports.research.resumable_export import Package
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.commands import command

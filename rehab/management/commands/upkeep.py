@@ -25,7 +25,7 @@ from rehab.management.commands.doctor import (
     examine_seals,
 )
 from rehab.management.restore_test import restore_newest
-from rehab.people.chores import record_chore
+from rehab.people.upkeep_runs import record_chore
 
 NAMED = "garry-{:%Y-%m-%d}.backup"
 RENEWED = timedelta(days=14)  # before a certificate ends; certbot does so 30 days before

@@ -12,7 +12,7 @@ from django.utils.translation import gettext_lazy
 
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
-from rehab.people.audit.history_text import describe_actor
+from rehab.people.audit.row_history import describe_actor
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, rights_for
 

@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import clinic_of, for_roles, get_patient, user_of
+from rehab.people.consent.forms import ConsentTextForm
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (
     active_consents,
@@ -24,7 +25,6 @@ from rehab.people.consent.services import (
     record_consent,
     withdraw_consent,
 )
-from rehab.people.forms import ConsentTextForm
 from rehab.people.models import BoardsConsent, Patient
 from rehab.people.roles import Role
 

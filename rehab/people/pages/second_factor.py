@@ -23,7 +23,7 @@ from rehab.people.networks import client_address
 from rehab.people.pages.confirm import ask_again
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
-from rehab.people.sign_in import flow, step_up
+from rehab.people.sign_in import step_up, two_stage_sign_in
 from rehab.people.sign_in.factors import factors, passkeys, totp
 from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm
 
@@ -34,7 +34,7 @@ def enrolling_user(request: HttpRequest) -> User:
     """Return the account that may enroll a factor. Raises PermissionDenied for a stranger."""
     if isinstance(request.user, User):
         return request.user
-    user = flow.pending_enrollment(request, timezone.now())
+    user = two_stage_sign_in.pending_enrollment(request, timezone.now())
     if user is None:
         raise PermissionDenied
     return user
@@ -106,9 +106,11 @@ def _finish_enrollment(request: HttpRequest, user: User, new: list[str]) -> Http
     next_url = reverse("account")
     if request.user.is_authenticated:
         update_session_auth_hash(request, user)  # this sign-in goes on, no other one
-        request.session[flow.SECOND_FACTOR_VERIFIED] = True
+        request.session[two_stage_sign_in.SECOND_FACTOR_VERIFIED] = True
     else:
-        next_url = flow.finish(request, user, timezone.now(), second_factor_verified=True)
+        next_url = two_stage_sign_in.finish(
+            request, user, timezone.now(), second_factor_verified=True
+        )
     if not new:
         messages.success(request, _("Added."))
         return redirect(next_url)

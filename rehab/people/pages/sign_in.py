@@ -20,7 +20,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 from rehab.people.access import public
 from rehab.people.models import User
 from rehab.people.roles import DEMO_ACCOUNTS, Role
-from rehab.people.sign_in import flow, sign_on
+from rehab.people.sign_in import sign_on, two_stage_sign_in
 from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import FactorForm, SignInForm
 
@@ -33,7 +33,7 @@ def landing_page(user: User) -> str:
 
 def go_on(request: HttpRequest, user: User, next_url: str) -> HttpResponse:
     """Sign in a person whose account is proven, or lead on to the second factor."""
-    if flow.begin(request, user, next_url, timezone.now()):
+    if two_stage_sign_in.begin(request, user, next_url, timezone.now()):
         return HttpResponseRedirect(next_url)
     has_factor = factors.authenticators_of(user).exists()
     return redirect("second-factor" if has_factor else "set-up-second-factor")
@@ -67,12 +67,14 @@ sign_in = public(SignIn.as_view())
 def verify_second_factor(request: HttpRequest) -> HttpResponse:
     """Verify the code or passkey of a pending sign-in; without a pending one, start over."""
     now = timezone.now()
-    user = flow.pending_second_factor(request, now)
+    user = two_stage_sign_in.pending_second_factor(request, now)
     if user is None:
         return redirect("sign-in")
     form = FactorForm(request, user, request.POST if request.method == "POST" else None)
     if form.is_valid():
-        return HttpResponseRedirect(flow.finish(request, user, now, second_factor_verified=True))
+        return HttpResponseRedirect(
+            two_stage_sign_in.finish(request, user, now, second_factor_verified=True)
+        )
     context = {"form": form, "passkey": passkeys.authentication_options(request, user)}
     return render(request, "people/sign_in/second_factor.html", context)
 

@@ -17,7 +17,7 @@ from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import User
 from rehab.people.pages.sign_in import go_on, landing_page
 from rehab.people.roles import Role
-from rehab.people.sign_in import flow, sign_on, smart_launch, step_up
+from rehab.people.sign_in import sign_on, smart_launch, step_up, two_stage_sign_in
 
 
 @public
@@ -122,7 +122,7 @@ def _sign_in(
         next_url = landing_page(user)
     if not sign_on.has_second_factor(claims):
         return go_on(request, user, next_url)
-    flow.finish(request, user, timezone.now(), second_factor_verified=True)
+    two_stage_sign_in.finish(request, user, timezone.now(), second_factor_verified=True)
     return redirect(next_url)
 
 

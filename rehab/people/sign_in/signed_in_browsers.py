@@ -18,8 +18,8 @@ from django.http import HttpRequest
 from rehab.people.audit.audit_log import truncate_address
 from rehab.people.models import User
 from rehab.people.networks import client_address
-from rehab.people.sign_in.browser_sessions import LAST_ACTIVITY_AT, SIGNED_IN_AT
-from rehab.people.sign_in.flow import is_session_valid
+from rehab.people.sign_in.sign_in_expiry import LAST_ACTIVITY_AT, SIGNED_IN_AT
+from rehab.people.sign_in.two_stage_sign_in import is_session_valid
 
 BROWSER = "browser"  # key of the browser session: its mark, program and network
 

@@ -19,7 +19,7 @@ from django.utils.translation import gettext
 
 from rehab.people.access import user_of
 from rehab.people.audit.history import clinic_id_of
-from rehab.people.audit.history_text import changes_of
+from rehab.people.audit.row_history import changes_of
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
 from rehab.people.row_values import read_key, read_values, save_changes
 from rehab.people.scope import ScopedModel, visible_rows

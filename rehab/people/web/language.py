@@ -20,7 +20,7 @@ from django.utils.cache import patch_vary_headers
 
 from rehab.people.access import tablet_of
 from rehab.people.models import LANGUAGES, Patient, User
-from rehab.people.sign_in import flow
+from rehab.people.sign_in import two_stage_sign_in
 
 API_PREFIX = "/api/"
 
@@ -35,7 +35,11 @@ def request_language(request: HttpRequest) -> str:
     if request.path_info.startswith(API_PREFIX):
         return settings.LANGUAGE_CODE
     user = request.user
-    person = user if isinstance(user, User) else flow.pending_second_factor(request, timezone.now())
+    person = (
+        user
+        if isinstance(user, User)
+        else two_stage_sign_in.pending_second_factor(request, timezone.now())
+    )
     if person is not None:
         return language_of(person)
     tablet = tablet_of(request)

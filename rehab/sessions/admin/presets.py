@@ -12,7 +12,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin
 from rehab.people.web.row_forms import ClinicForm
-from rehab.sessions.clinic_tests import ClinicTest
+from rehab.sessions.available_tests import ClinicTest
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.option import Group, Option
 from rehab.sessions.setup.options import ANSWERS, OPTIONS, options_of, preset_options

@@ -19,8 +19,13 @@ from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
 from rehab.sessions.questionnaires import questionnaire_choices
+from rehab.sessions.setup.protocol_models import (
+    MeasureDefinition,
+    Protocol,
+    ProtocolPhase,
+    display_name,
+)
 from rehab.sessions.setup.protocol_outline import STRIDE_S, protocol_minutes
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase, display_name
 
 TEMPORARY_OFFSET = (
     10_000  # of positions while phases change places; no protocol has this many phases

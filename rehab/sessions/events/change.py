@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rehab.sessions.events.event import LiveEvent, event_for
-from rehab.sessions.payloads import (
+from rehab.sessions.state_messages import (
     Message,
     change_mark,
     describe_cue,

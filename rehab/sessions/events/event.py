@@ -8,7 +8,7 @@ from collections.abc import Callable
 import msgspec
 
 from rehab.sessions.alarms import OpenAlarms
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.events.event import presence_for_patient
 from rehab.sessions.events.step import StepContext, StoredStep, patient_step
-from rehab.sessions.payloads import (
+from rehab.sessions.state_messages import (
     Message,
     describe_coaching,
     describe_now,

@@ -11,15 +11,15 @@ from typing import NamedTuple
 from rehab.feedback.translation import translate
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.log import Step
-from rehab.sessions.payloads import (
+from rehab.sessions.state_messages import (
     Message,
     describe_coaching,
     describe_rates,
     describe_walked,
 )
-from rehab.training.bands import Band
 from rehab.training.closeness import CLOSE_WORDS
 from rehab.training.controls import Audience
+from rehab.training.feedback_bands import Band
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan

@@ -13,8 +13,8 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.cue_gestures import choices_from_cue
 from rehab.sessions.setup.options import OPTIONS
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.protocol_outline import protocol_minutes
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sensors import measurable
 from rehab.sessions.setup.sources import LIVE, source_choices
 from rehab.stations.models import Station

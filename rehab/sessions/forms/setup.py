@@ -23,7 +23,7 @@ from rehab.sessions.services import (
 from rehab.sessions.setup.cue_gestures import cue_from_choices
 from rehab.sessions.setup.option import OptionForm
 from rehab.sessions.setup.options import OPTIONS, build_parts
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.sensors import measurable
 from rehab.sessions.setup.sources import LIVE, SIMULATED, build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording

@@ -21,9 +21,9 @@ from django.utils.module_loading import import_string
 from rehab.people.consent.services import is_remote_view_allowed
 from rehab.people.models import Patient, User
 from rehab.people.networks import is_outside, resolve_client_address
-from rehab.people.sign_in import browser_sessions
-from rehab.people.sign_in.flow import is_session_valid
+from rehab.people.sign_in import sign_in_expiry
 from rehab.people.sign_in.tokens import LAST_SEEN_RESOLUTION
+from rehab.people.sign_in.two_stage_sign_in import is_session_valid
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.stations import tablets
 from rehab.stations.device_trust import is_trusted
@@ -117,7 +117,7 @@ def browser_session_key(scope: Mapping[str, Any]) -> str | None:
 
 def browser_session_digest(scope: Mapping[str, Any]) -> str:
     """Return the digest under which a socket's browser session is stored."""
-    return browser_sessions.digest_of(browser_session_key(scope) or "")
+    return sign_in_expiry.digest_of(browser_session_key(scope) or "")
 
 
 def _signed_in(scope: Mapping[str, Any]) -> User | None:
@@ -192,7 +192,7 @@ def _session_id(scope: Mapping[str, Any]) -> int:
 def extend_sign_ins(scopes: Sequence[Mapping[str, Any]], now: datetime) -> None:
     """Extend the sign-ins of these sockets, whose pages show a running session."""
     keys = {key for scope in scopes if (key := browser_session_key(scope))}
-    browser_sessions.extend_sessions(keys, now)
+    sign_in_expiry.extend_sessions(keys, now)
 
 
 @database_sync_to_async

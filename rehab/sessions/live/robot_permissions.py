@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from rehab.people.models import User
 from rehab.sessions.live.auth import Actor
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 from rehab.training.controls import Audience
 from robot.wire.frames import BadFrame
 

@@ -20,10 +20,10 @@ from rehab.sessions.live.database import clinic_owners, server_lease
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
 from rehab.sessions.live.orders import Order, carry_out
+from rehab.sessions.live.peer_servers import Servers
+from rehab.sessions.live.periodic_tasks import Routines
 from rehab.sessions.live.recovery import Recovery
-from rehab.sessions.live.routines import Routines
-from rehab.sessions.live.servers import Servers
-from rehab.sessions.live.session.commits import Fenced
+from rehab.sessions.live.session.commit_transaction import Fenced
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import Loader

@@ -10,7 +10,7 @@ from django.utils import timezone
 from rehab.people.models import User
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.robot_orders import RobotStop
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 
 
 class StationRobots:

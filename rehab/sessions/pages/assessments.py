@@ -20,10 +20,10 @@ from rehab.people.ranges import NumberField, WholeNumberField, range_message
 from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
-from rehab.questionnaires.clinical_tests import LAP_TEST_S, ClinicalTest, Way, to_speed
 from rehab.questionnaires.form_items import MAX_LETTERS, FormItem, total
-from rehab.sessions.assessments import Assessment, format_result, load_courses
-from rehab.sessions.clinic_tests import fix_tests
+from rehab.questionnaires.standard_tests import LAP_TEST_S, ClinicalTest, Way, to_speed
+from rehab.sessions.assessment_results import Assessment, format_result, load_courses
+from rehab.sessions.available_tests import fix_tests
 from rehab.sessions.formatting import format_number
 from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS
 from rehab.training.measures import InvalidSetting

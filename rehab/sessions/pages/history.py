@@ -20,7 +20,7 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.alarms import find_incidents
-from rehab.sessions.assessments import load_courses
+from rehab.sessions.assessment_results import load_courses
 from rehab.sessions.formatting import (
     clinic_time,
     format_day,

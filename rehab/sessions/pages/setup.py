@@ -23,8 +23,8 @@ from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.setup.option import Group
 from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.protocol_outline import outline_protocol, protocol_minutes
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import SIMULATED
 from rehab.stations.builtin import first_station
 from rehab.stations.tablets import has_tablet

@@ -25,8 +25,8 @@ from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
-from rehab.training.bands import TEXT_MAX, bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
+from rehab.training.feedback_bands import TEXT_MAX, bands_to_json
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Valence
 

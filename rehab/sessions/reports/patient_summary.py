@@ -34,7 +34,7 @@ from rehab.sessions.reports.better_or_worse import (
     judge,
     load_results,
 )
-from rehab.sessions.reports.earned import find_earned
+from rehab.sessions.reports.earned_number import find_earned
 from rehab.training.measures import A2
 
 MILESTONES = (5, 10, 25, 50)  # sessions, and each further hundred

@@ -37,9 +37,9 @@ from rehab.sessions.log import (
 from rehab.sessions.log_fold import DamagedLog, log_rows, to_change
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.noted_conditions import planned_conditions
-from rehab.sessions.payloads import Message
 from rehab.sessions.reports.incident import review_incident
 from rehab.sessions.robot_incidents import RobotIncident
+from rehab.sessions.state_messages import Message
 from rehab.training.controls import CONTROLS, Audience
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting

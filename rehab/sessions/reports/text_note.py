@@ -9,7 +9,7 @@ from django.utils.translation import gettext
 
 from rehab.people.models import User
 from rehab.people.models.clinics import NOTE_PLACEHOLDERS, PLACEHOLDER
-from rehab.sessions.assessments import assessments_with
+from rehab.sessions.assessment_results import assessments_with
 from rehab.sessions.formatting import MISSING, clinic_time
 from rehab.sessions.log import EVENTS
 from rehab.sessions.models import TrainingSession

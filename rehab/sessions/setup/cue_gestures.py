@@ -17,8 +17,8 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_variants import POOLS, VARIANTS
 from robot.motion.gestures import GESTURES, ORIGINALS, known_names
-from robot.motion.pools import POOLS, VARIANTS
 from robot.wire.cue_limits import VARIED
 
 # Choices beside gestures, whose names have no parentheses.

@@ -137,7 +137,7 @@ def install_defaults(using: str = "default", **_signal: Any) -> None:
     Sessions are scored by their own plans, registered studies by their own documents
     (`studies.registration.document`): neither changes.
     """
-    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+    from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
         for slug, measure in MEASURES.items():

@@ -17,7 +17,7 @@ from rehab.sessions.formatting import format_quantity, format_rate
 from rehab.sessions.setup.cue_gestures import DEFAULT_GESTURE, known_gesture_choices
 from rehab.sessions.setup.option import OptionForm
 from rehab.sessions.setup.options import build_parts, preset_options
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.sources import LIVE, SIMULATED
 from rehab.sources.synthetic import PROFILES
 from rehab.training.measures import InvalidSetting

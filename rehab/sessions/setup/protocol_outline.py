@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from django.utils.translation import gettext
 
 from rehab.sessions.formatting import format_duration
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.training.phases import Phase
 
 # Typical stride time of the recordings (docs/reference/gait.md#phases), for the duration of a phase

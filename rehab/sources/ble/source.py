@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from types import ModuleType
 from typing import Any
 
-from rehab.gait.recordings.columns import SignalColumn
+from rehab.gait.recordings.column_mapping import SignalColumn
 from rehab.sources.ble.adapter import AXES, Adapter, Row
 from rehab.sources.ble.heart_rate import HeartRate
 from rehab.sources.ble.host_clock import HostClock

@@ -13,7 +13,7 @@ from rehab.sources.client.step_queue import add_own_reason
 from rehab.training.measures import A2
 from rehab.training.phases import make_phase
 from rehab.training.steps import InvalidReason, Measurement, Side
-from robot.wire.late_steps import RemoteClock
+from robot.wire.remote_clock import RemoteClock
 
 
 class LiveFeed:

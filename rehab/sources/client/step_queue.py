@@ -13,8 +13,8 @@ from rehab.sources.client.journal import Journal
 from rehab.sources.client.journal_state import JournalState
 from rehab.training.steps import InvalidReason, Measurement
 from robot.wire.frames import NAME
-from robot.wire.late_steps import LATE_STEP_S
 from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
+from robot.wire.remote_clock import LATE_STEP_S
 
 Message = dict[str, Any]
 

@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rehab.gait.recordings.columns import find_required
+from rehab.gait.recordings.column_mapping import find_required
 
 Floats = NDArray[np.float64]
-Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.ALL_CHANNELS
+Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.column_mapping.ALL_CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
 FRAME: Channel = ("", "frame")  # the device's count of samples, of no leg

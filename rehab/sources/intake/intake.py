@@ -10,12 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from rehab.gait import Stride
-from rehab.gait.recordings.columns import SIDES
+from rehab.gait.recordings.column_mapping import SIDES
 from rehab.gait.recordings.inverse_dynamics import add_computed
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
-from rehab.sources.intake.devices import NAMES, read_devices
 from rehab.sources.intake.measurements import from_wearable, to_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.quality import SignalQuality
@@ -29,7 +28,8 @@ from rehab.sources.intake.rows import (
     read_stride,
 )
 from rehab.sources.intake.settings import IntakeSettings
-from rehab.sources.intake.tables import TablePlans
+from rehab.sources.intake.table_columns import TablePlans
+from rehab.sources.intake.treadmill_and_heart_rate import NAMES, read_devices
 from rehab.sources.intake.wearable_pipeline import Sided, WearablePipeline
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import HEART_RATE, Measurement, Side

@@ -16,7 +16,7 @@ from rehab.gait import (
     check_signals,
     make_detector,
 )
-from rehab.gait.recordings.columns import CHANNELS, REQUIRED, SIDES
+from rehab.gait.recordings.column_mapping import CHANNELS, REQUIRED, SIDES
 from rehab.gait.settings import check_rate
 from rehab.gait.signals.clock import estimate_rate
 from rehab.sources.intake.alignment import FRAME, Channel, Floats, Samples

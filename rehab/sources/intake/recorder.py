@@ -7,7 +7,7 @@ from typing import TextIO
 
 import numpy as np
 
-from rehab.gait.recordings.columns import OVERGROUND, SIGNAL_LAYOUTS
+from rehab.gait.recordings.column_mapping import OVERGROUND, SIGNAL_LAYOUTS
 from rehab.gait.recordings.csv_files import write_rows
 from rehab.sources.intake.alignment import FRAME, Channel, Floats
 from rehab.sources.reporting import Notify, SourceError

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from rehab.gait.recordings.columns import (
+from rehab.gait.recordings.column_mapping import (
     ALL_CHANNELS,
     SIDES,
     SIGNAL_LAYOUTS,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rehab.sources.client import Display, NextStride
-from rehab.sources.intake.devices import decode_treadmill, encode_treadmill
+from rehab.sources.intake.treadmill_and_heart_rate import decode_treadmill, encode_treadmill
 from rehab.sources.reporting import Notify
 from rehab.sources.source import PlayedSource
 from rehab.sources.synthetic.measured import express, show_goal

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 
-from rehab.questionnaires.clinical_tests import ClinicalTest
+from rehab.questionnaires.standard_tests import ClinicalTest
 from robot.marking import gettext_noop
 
 # Ours: a result tells of a visit for so many days after it, a baseline for so many before.

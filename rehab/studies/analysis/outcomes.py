@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
+from rehab.questionnaires.standard_tests import CLINICAL_TESTS, ClinicalTest
 from rehab.studies.analysis import walk_figures as figures
 from rehab.studies.analysis.clinical_outcomes import SLUGS, meaning_of, slug_of
 from rehab.studies.analysis.walk_figures import ENDS, FIRST_AFTER, SUCCESS, WINDOW, History

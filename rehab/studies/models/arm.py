@@ -12,7 +12,7 @@ from rehab.feedback.translation import valence_choices
 from rehab.people.scope import Scope, ScopedModel
 from rehab.sessions.formatting import format_schedule
 from rehab.sessions.setup.options import OPTIONS, build_parts
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.studies.arms import ArmRule, Condition
 from rehab.studies.models.study import SCHEDULE_FIELDS, Study
 from rehab.training.measures import InvalidSetting

@@ -16,7 +16,7 @@ from rehab.people.append_only import ACCOUNT_DELETED, AppendOnlyModel
 from rehab.people.models import Clinic, User
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
-from rehab.sessions.clinic_tests import own_tests
+from rehab.sessions.available_tests import own_tests
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
 from rehab.studies.allocation.groups_and_strata import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from textwrap import fill
 
 from rehab.studies.models import Study
-from rehab.studies.record.known import UNMASKED, know
+from rehab.studies.record.prefilled_answers import UNMASKED, know
 from rehab.studies.registration.facts import ASKED
 from rehab.studies.registration.problems import find_doubts
 from rehab.studies.results.results import Results

@@ -13,7 +13,7 @@ from typing import Any
 
 from rehab.feedback.models import FeedbackType
 from rehab.questionnaires.instrument import Instrument
-from rehab.sessions.clinic_tests import own_tests
+from rehab.sessions.available_tests import own_tests
 from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.analysis.clinical_outcomes import SLUGS, slug_of
 from rehab.studies.models import Arm, Study

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rehab.questionnaires.clinical_tests import ClinicalTest
+from rehab.questionnaires.standard_tests import ClinicalTest
 from rehab.studies.analysis.outcomes import Outcome, outcomes_with
 from rehab.studies.models import NOT
 

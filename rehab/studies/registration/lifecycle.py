@@ -10,7 +10,7 @@ from django.utils.translation import gettext
 
 from rehab.people.audit import seals
 from rehab.people.models import Patient, User
-from rehab.sessions.clinic_tests import fix_tests
+from rehab.sessions.available_tests import fix_tests
 from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyMark, StudyState, StudyVersion

@@ -16,7 +16,7 @@ from typing import Any
 
 from django.db.models import Count, F, Max, Q, Sum
 
-from rehab.sessions.assessments import Assessment
+from rehab.sessions.assessment_results import Assessment
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.log_fold import fold_log

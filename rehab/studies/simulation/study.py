@@ -10,7 +10,7 @@ from functools import partial
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.setup.default_protocols import install_defaults
-from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.models import Arm, Study, StudyState
 from rehab.studies.participants import Enrollment

@@ -7,9 +7,9 @@ from dataclasses import asdict, replace
 from enum import Enum
 from typing import Any
 
-from rehab.training.bands import bands_from_json, bands_to_json
 from rehab.training.changes import PauseReason, State
 from rehab.training.controls import CONTROLS
+from rehab.training.feedback_bands import bands_from_json, bands_to_json
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Block, Tally
 from rehab.training.goal_adaptation import Staircase

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 
-from rehab.training.bands import bands_from_json
 from rehab.training.changes import NotAllowed
+from rehab.training.feedback_bands import bands_from_json
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import Valence

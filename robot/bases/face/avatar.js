@@ -1,6 +1,6 @@
 // The avatar: shows what the robot's program tells it, and never decides anything.
 
-// Of its acts (robot/motion/looks.py), those that sound glad or sad.
+// Of its acts (robot/motion/face_and_arms.py), those that sound glad or sad.
 const MOODS = { rest: "rest", celebrating: "celebrate", drooping: "droop" };
 // Notes [Hz]: success rises, a miss falls, softly; neither ever has the other's.
 const CUES = { calm: [440], celebrate: [523, 659, 784], droop: [392, 330, 262] };

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection, serve
 
-from robot.motion.looks import REST, to_message
+from robot.motion.face_and_arms import REST, to_message
 
 SOCKET_PATH = "/avatar"
 FILES = {

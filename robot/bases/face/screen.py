@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from robot.bases.base import Answer, BadOption, BaseLost, Indication
 from robot.bases.face.page_server import PageServer
-from robot.motion.looks import REST, Script, find_act, look_at, to_message
+from robot.motion.face_and_arms import REST, Script, find_act, look_at, to_message
 from robot.motion.pose import Pose
 
 

@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 from robot.bases.base import Answer, BaseLost, BaseState, Indication, MobileBase
-from robot.bases.rosbridge.client import BaseClient
+from robot.bases.rosbridge.base_client import BaseClient
 from robot.bases.rosbridge.options import add_topic_arguments, read_topics
 from robot.bases.rosbridge.topics import DEFAULT_PROFILE, PROFILES, Topics
 from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL, Twist
-from robot.ros.bridge import Bridge, find_bridge
+from robot.ros.rosbridge_connection import Bridge, find_bridge
 
 GREETING_S = 3.0  # a bridge that is there has sent odometry by then
 HOLD_WITHIN_S = 0.6  # how long the end waits for head and arms to be held, at most

@@ -35,10 +35,10 @@ from robot.bases.kobuki_protocol.feedback import Version
 from robot.bases.kobuki_protocol.frames import FRAME_S
 from robot.bases.twin.bodies import KinematicBody, WheeledBody
 from robot.bases.twin.bullet import BulletBody, redirect_output
-from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
 from robot.bases.twin.lines import Line, PtyLine, SocketLine
+from robot.bases.twin.picture_process import Camera
 from robot.bases.twin.process import Twin
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from PIL import Image, ImageDraw
 
-from robot.motion.looks import HAPPY, MOUTHS, Look
+from robot.motion.face_and_arms import HAPPY, MOUTHS, Look
 
 # The head of the avatar's drawing (robot/bases/face/page.html), with room to tilt [px].
 LEFT, TOP, WIDTH, HEIGHT = 94, 72, 212, 150

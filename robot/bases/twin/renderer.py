@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from robot.bases.twin.face import draw_face
-from robot.motion.looks import REST, Look
+from robot.motion.face_and_arms import REST, Look
 from robot.motion.pose import Pose
 
 # The screen on the mast (kobuki.urdf): how far ahead, half its width, its middle, half its height.

@@ -1,4 +1,4 @@
-// The strides of a leg with one sign of its axis: rehab/gait/wearables/readings.py, line by line.
+// The strides of a leg with one sign of its axis: rehab/gait/wearables/doubtful_strides.py, line by line.
 
 import { scale } from "garry/sensor/orientation";
 import { GAP_S, SwingDetector } from "garry/sensor/swings";

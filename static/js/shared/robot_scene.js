@@ -8,7 +8,7 @@ const BASE_M = 0.175;
 const HALF_M = 0.5; // of the drawing, to each side
 const MOVE_MS = 250; // between two reports of a robot that moves
 export const COLORS = { off: "none", green: "#1f9d55", orange: "#e0861a", red: "#d03434" };
-// The mouth of each look (robot/motion/looks.py), seen as the robot's face is seen by who stands before it.
+// The mouth of each look (robot/motion/face_and_arms.py), seen as the robot's face is seen by who stands before it.
 const MOUTHS = {
   calm: "M-.045 -.02h.09",
   smile: "M-.05 -.03q.05 .05 .1 0",

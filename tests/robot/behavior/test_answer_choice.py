@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from robot.behavior.answer_choice import APART, AnswerChooser, pick
 from robot.behavior.cue import QUIET_PACE
 from robot.behavior.window_decider import Decision
-from robot.motion.pools import POOLS, VARIANTS, variants
+from robot.motion.gesture_variants import POOLS, VARIANTS, variants
 from robot.wire.cue_limits import VARIED
 from tests.support.robot_stage import CUE, WELCOME, Stage
 

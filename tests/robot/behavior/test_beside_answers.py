@@ -9,8 +9,8 @@ from robot.bases.kinematic import KinematicBase
 from robot.behavior.beside_answers import MOMENTS
 from robot.behavior.idle import IdleLife
 from robot.behavior.safety import ANNOUNCE_S
-from robot.motion.looks import ACT_OF
-from robot.motion.pools import IDLE
+from robot.motion.face_and_arms import ACT_OF
+from robot.motion.gesture_variants import IDLE
 from robot.wire.cue_limits import VARIED
 from tests.support.robot_stage import CUE, WELCOME, RealBase, Stage
 

@@ -4,9 +4,9 @@ import pytest
 
 from robot.bases.base import Abilities
 from robot.bases.kinematic import Imperfections, KinematicBase
+from robot.motion.gesture_variants import VARIANTS
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
-from robot.motion.pools import VARIANTS
 from robot.motion.twist import Twist
 from tests.support.robot_stage import CUE, WELCOME, Stage
 from tests.support.variants import cases

@@ -4,7 +4,7 @@ import pytest
 
 from robot.bases import SensorState
 from robot.behavior.safety import BATTERY_EMPTY_V
-from robot.motion.pools import POOLS
+from robot.motion.gesture_variants import POOLS
 from robot.motion.twist import STILL
 from robot.wire.cue_limits import VARIED
 from tests.support.robot_stage import CUE, WELCOME, FeelingBase, Stage

@@ -1,7 +1,7 @@
 """What the therapist's page says while a gesture plays (static/js/monitor/robot_text.js)."""
 
+from robot.motion.gesture_variants import IDLE, VARIANTS
 from robot.motion.gestures import GESTURES
-from robot.motion.pools import IDLE, VARIANTS
 from tests.support.node import run_node
 
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot.motion.gesture import Gesture, Waypoint
+from robot.motion.gesture_variants import VARIANTS
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import TETHER_M, Limits
 from robot.motion.player import BAD_ODOMETRY, DONE, LATE_PACE, OUT_OF_TIME, Player
-from robot.motion.pools import VARIANTS
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
 from tests.support.extent import examples

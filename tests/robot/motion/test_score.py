@@ -13,10 +13,19 @@ from robot.behavior.expression import Expression
 from robot.motion.composed_gestures import Move, parse_gesture, to_data
 from robot.motion.dry_run import dry_run
 from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_variants import IDLE, POOLS
 from robot.motion.gestures import BUILT_IN, GESTURES
-from robot.motion.pools import IDLE, POOLS
+from robot.motion.lights_and_sounds import (
+    MAX_ENTRIES,
+    NEUTRAL,
+    Color,
+    Light,
+    Melody,
+    Note,
+    Score,
+    read_score,
+)
 from robot.motion.preview import ANNOUNCED_S, preview
-from robot.motion.score import MAX_ENTRIES, NEUTRAL, Color, Light, Melody, Note, Score, read_score
 from tests.support.json_values import ANYTHING
 from tests.support.variants import cases
 

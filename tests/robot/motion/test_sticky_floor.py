@@ -4,8 +4,8 @@ import pytest
 
 from robot.bases.kinematic import Imperfections
 from robot.motion.base_response import AT_ONCE
+from robot.motion.gesture_variants import VARIANTS
 from robot.motion.gestures import BUILT_IN
-from robot.motion.pools import VARIANTS
 from tests.support.gesture_runs import OrdinaryBase, play_in_a_row, play_seen
 from tests.support.robot_stage import CUE, WELCOME, Stage
 from tests.support.variants import GENTLE, at_level, cases

@@ -7,9 +7,9 @@ import pytest
 from robot.bases.kinematic import Imperfections
 from robot.behavior.cue import QUIET_PACE
 from robot.motion.dry_run import dry_run
+from robot.motion.gesture_variants import POOLS, VARIANTS, variants
 from robot.motion.limits import REACH_M
 from robot.motion.path import Drive, plan_path
-from robot.motion.pools import POOLS, VARIANTS, variants
 from robot.motion.pose import HOME
 from tests.support.gesture_runs import play_in_a_row
 from tests.support.variants import SHOWN, at_level, levels_of

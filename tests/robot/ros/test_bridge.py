@@ -18,10 +18,10 @@ from robot.bases.rosbridge.orders import IN_FLIGHT
 from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
-from robot.original_topics import OriginalTopics
+from robot.original_connection import OriginalTopics
 from robot.play_gesture import main, play_gesture
-from robot.ros.bridge import TIMING, Bridge
 from robot.ros.original_nodes import OriginalTopicClient
+from robot.ros.rosbridge_connection import TIMING, Bridge
 from tests.support.driven_ros import (
     come_back,
     lose_while_moving,

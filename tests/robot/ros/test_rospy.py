@@ -9,7 +9,7 @@ from websockets.sync.client import connect
 
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
-from robot.original_topics import OriginalTopics
+from robot.original_connection import OriginalTopics
 from robot.play_gesture import play_gesture
 from tests.support.driven_ros import come_back, lose_while_moving, open_base, wired_base
 from tests.support.fake_ros import (

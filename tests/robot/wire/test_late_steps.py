@@ -7,7 +7,7 @@ from itertools import count, takewhile
 
 import pytest
 
-from robot.wire.late_steps import DRIFT_MAX, LATE_STEP_S, RemoteClock
+from robot.wire.remote_clock import DRIFT_MAX, LATE_STEP_S, RemoteClock
 
 HOUR_S = 3600.0
 STRIDE_S = 1.1

@@ -14,7 +14,7 @@ from asgiref.sync import sync_to_async
 from django.db import connections
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.session import commits
+from rehab.sessions.live.session import commit_transaction
 from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -82,7 +82,7 @@ async def live_path(
 @pytest.fixture
 def stall(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stall]:
     """Return the hand on the writer."""
-    hold, commit = Stall(), commits.commit
+    hold, commit = Stall(), commit_transaction.commit
 
     def commit_when_open(jobs: Any) -> None:
         hold.wait()

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from rehab.sessions.live import routines
+from rehab.sessions.live import periodic_tasks
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.session.live_session import LiveSession
@@ -99,7 +99,7 @@ async def test_how_long_a_step_took_is_counted(place, begun):
 
 
 async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.005)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.005)
     session = await begun(place)
     robot = await place.robot().dial()
     welcome = await robot.hello()
@@ -140,23 +140,23 @@ async def test_robots_hear_heartbeats_in_parts_one_after_the_other(live_path, mo
         outbox = SimpleNamespace(queue_text=lambda text: heard.append((number, text)))
         return SimpleNamespace(outbox=outbox)
 
-    robots = range(21, 21 + 7 * routines.PARTS)
+    robots = range(21, 21 + 7 * periodic_tasks.PARTS)
     for number in range(1, robots.stop):
         robot = make_robot(number) if number in robots else None
         live = SimpleNamespace(id=number, robot=robot, is_watched=False)
         monkeypatch.setitem(runtime.sessions, number, live)
     counts = []
-    for _ in range(routines.PARTS):
+    for _ in range(periodic_tasks.PARTS):
         before = len(heard)
         await runtime.routines._send_robot_heartbeats()
         counts.append(len(heard) - before)
-    assert counts == [7] * routines.PARTS
+    assert counts == [7] * periodic_tasks.PARTS
     text = '{"type":"heartbeat","watched":false}'
     assert sorted(heard) == [(number, text) for number in robots]
 
 
 async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.002)
     disk, database = threading.Event(), asyncio.Event()
     waiting: set[str] = set()
 
@@ -174,8 +174,8 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
 
     session = await begun(place)
     robot, tablet = await place.robot().open(), await place.tablet(session).open()
-    monkeypatch.setattr(routines, "move_database_log", move_log)
-    monkeypatch.setattr(routines, "extend_sign_ins", extend_sign_ins)
+    monkeypatch.setattr(periodic_tasks, "move_database_log", move_log)
+    monkeypatch.setattr(periodic_tasks, "extend_sign_ins", extend_sign_ins)
     monkeypatch.setattr(clinic_owners, "note_ends", release)
     await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
     while len(waiting) < 3:
@@ -192,7 +192,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
 
 
 async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, monkeypatch, caplog):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.002)
     failed: Counter[str] = Counter()
 
     def fail(what: str) -> Callable[..., None]:
@@ -205,7 +205,7 @@ async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, mo
     session = await begun(place)
     robot = await place.robot().open()
     for name in ("move_database_log", "extend_sign_ins"):
-        monkeypatch.setattr(routines, name, fail(name))
+        monkeypatch.setattr(periodic_tasks, name, fail(name))
     with monkeypatch.context() as patch:
         patch.setattr(LiveSession, "is_watched", property(fail("robots")))
         patch.setattr(LiveSession, "presence", fail("pages"))

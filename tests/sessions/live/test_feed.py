@@ -10,10 +10,16 @@ from contextlib import asynccontextmanager
 import pytest
 
 from rehab.sessions.events.event import LiveEvent
-from rehab.sessions.live import routines
+from rehab.sessions.live import periodic_tasks
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.protocol.outgoing import Outbox
-from rehab.sessions.live.session.hub import MAX_UNCONFIRMED, RING, EventFeed, Lagged, Subscriber
+from rehab.sessions.live.session.subscribers import (
+    MAX_UNCONFIRMED,
+    RING,
+    EventFeed,
+    Lagged,
+    Subscriber,
+)
 from rehab.training.controls import Audience
 
 
@@ -59,7 +65,7 @@ async def test_what_a_subscriber_misses_is_limited():
 async def test_pages_have_a_heartbeat_each_interval_unless_they_were_just_sent_a_step(
     place, elsewhere, begun, monkeypatch
 ):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.005)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.005)
     tablets, sessions = [], []
     for somewhere in (place, elsewhere):
         session = await begun(somewhere)

@@ -15,10 +15,10 @@ from opentelemetry.sdk.trace import TracerProvider
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 
-from rehab.sessions.live.session import commits, prometheus_metrics
+from rehab.sessions.live.session import commit_transaction, prometheus_metrics
 from rehab.sessions.live.session import group_commit as writers
 from rehab.sessions.live.session.aggregate import SessionAggregate
-from rehab.sessions.live.session.commits import EarlierWriteFailed, Fenced, Job
+from rehab.sessions.live.session.commit_transaction import EarlierWriteFailed, Fenced, Job
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -37,7 +37,7 @@ class Bench:
         self.stall = stall
         self.batches: list[list[int]] = []
         self.done: list[tuple[int, Exception | None]] = []
-        commit = commits.commit
+        commit = commit_transaction.commit
 
         def counted(jobs: Any) -> None:
             self.batches.append([job.session_id for job in jobs])
@@ -90,14 +90,14 @@ async def until_done(bench: Bench, count: int) -> None:
 
 def fail_on(monkeypatch: pytest.MonkeyPatch, session_id: int, problem: Exception) -> None:
     """Let writes of one session fail until ``monkeypatch`` takes it back."""
-    insert = commits._insert_steps
+    insert = commit_transaction._insert_steps
 
     def failing(rows: Any) -> None:
         if any(row.session_id == session_id for row in rows):
             raise problem
         insert(rows)
 
-    monkeypatch.setattr(commits, "_insert_steps", failing)
+    monkeypatch.setattr(commit_transaction, "_insert_steps", failing)
 
 
 async def test_what_is_queued_is_committed_in_one_transaction(bench, aggregates):

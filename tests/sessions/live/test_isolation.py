@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
+from rehab.sessions.live import peer_servers as servers_module
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live import servers as servers_module
 from rehab.sessions.live.consumers.isolation_gate import IsolationGate
 from rehab.sessions.live.database import clinic_owners
 from rehab.sessions.live.database.server_lease import Server
-from rehab.sessions.live.servers import Servers, applies, ask_if_ready
+from rehab.sessions.live.peer_servers import Servers, applies, ask_if_ready
 from tests.support.callers import turns
 
 ME, OTHER = Server("me", "me:1", True), Server("other", "other:1", True)

@@ -14,8 +14,8 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
-from rehab.people.sign_in.browser_sessions import digest_of
-from rehab.sessions.live import routines
+from rehab.people.sign_in.sign_in_expiry import digest_of
+from rehab.sessions.live import periodic_tasks
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import (
     MonitorPage,
@@ -114,7 +114,7 @@ async def test_a_switched_off_account_opens_nothing(place, begun):
 
 
 async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
     source, robot = await place.source().open(), await place.robot().open()
     tablet, monitor = await place.tablet(session).open(), await place.monitor(session).open()
@@ -137,14 +137,14 @@ async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkey
 
 
 async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, ready, monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.001)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.001)
     session = await ready(place)
     runtime = runtimes.current()
     live = await runtime.session(session.pk)
     while session.pk in runtime.sessions:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     assert (await runtime.session(session.pk)) is not live
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 60)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 60)
     tablet = await place.tablet(session).open()
     await change(session, "start")
     await tablet.until(lambda event: event["kind"] == "state")

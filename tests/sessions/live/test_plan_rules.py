@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rehab.sessions.log import Step
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocol_models import Protocol
 from rehab.training.goal_adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import make_phase

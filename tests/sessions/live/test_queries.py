@@ -9,7 +9,7 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
 from rehab.sessions.live.database import clinic_owners
-from rehab.sessions.live.protocol.backlog import PAGE_STEPS
+from rehab.sessions.live.protocol.past_steps import PAGE_STEPS
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.loading import LoadedSession, find_newest_open, load_together
 from rehab.sessions.log import RobotEntry, Step

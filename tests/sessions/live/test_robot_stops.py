@@ -10,7 +10,7 @@ from django.db import OperationalError
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import NotStored
-from rehab.sessions.live.session import commits
+from rehab.sessions.live.session import commit_transaction
 from rehab.sessions.live.session import group_commit as writers
 from tests.support.callers import change, restart, turns
 from tests.support.robot_reports import ARM, STOP, is_stopped, log_of
@@ -137,7 +137,7 @@ async def test_a_stop_waits_for_no_disk_and_overtakes_an_arming(place, begun, st
 
 def break_disk(patch: pytest.MonkeyPatch, session_id: int | None = None) -> None:
     """Let nothing, or nothing of a session, be committed until ``patch`` takes it back."""
-    sound = commits.commit
+    sound = commit_transaction.commit
 
     def commit(jobs: Any) -> None:
         if any(session_id in (None, job.session_id) for job in jobs):

@@ -11,7 +11,7 @@ from asgiref.sync import sync_to_async
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Clinic
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.session import hub
+from rehab.sessions.live.session import subscribers
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.training.valences import CueGestures
@@ -144,7 +144,7 @@ async def test_a_robot_is_told_whether_a_pt_looks_on(place, begun, monkeypatch):
 
 
 async def test_a_page_that_confirms_nothing_is_nobody_looking_on(place, begun, monkeypatch):
-    monkeypatch.setattr(hub, "INATTENTIVE_S", 0.2)
+    monkeypatch.setattr(subscribers, "INATTENTIVE_S", 0.2)
     session = await begun(place)
     await place.monitor(session).open()
     robot = await place.robot().open()

@@ -12,7 +12,7 @@ from asgiref.sync import sync_to_async
 
 from rehab.management.commands.doctor import examine_tasks
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.routines import Routines
+from rehab.sessions.live.periodic_tasks import Routines
 from rehab.sessions.live.session.prometheus_metrics import REGISTRY
 from rehab.sessions.ownership import ClinicOwner
 from rehab.sessions.seals import SessionSeal

@@ -13,8 +13,8 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
-from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
-from rehab.sessions.live import auth, routines
+from rehab.people.sign_in.sign_in_expiry import SIGNED_IN_AT, SessionStore, digest_of
+from rehab.sessions.live import auth, periodic_tasks
 from rehab.sessions.live import runtime as runtimes
 from rehab.stations.models import Device
 from tests.support.callers import sign_in
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.django_db(transaction=True)
 
 @pytest.fixture(autouse=True)
 def _hasty(monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.002)
 
 
 async def end_in(key: str, minutes: float) -> None:
@@ -151,8 +151,8 @@ async def test_a_clinic_that_comes_to_ask_for_a_second_factor_closes_sockets(pla
 
 
 async def test_all_sign_ins_are_checked_a_few_at_a_time(place, begun, monkeypatch):
-    monkeypatch.setattr(routines, "CHECKED_SOCKETS", 1)
-    monkeypatch.setattr(routines, "CHECK_PAUSE_S", 0.0)
+    monkeypatch.setattr(periodic_tasks, "CHECKED_SOCKETS", 1)
+    monkeypatch.setattr(periodic_tasks, "CHECK_PAUSE_S", 0.0)
     session = await begun(place)
     pages = [place.monitor(session) for _ in range(3)]
     for page in pages:

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 from rehab.sessions.live.consumers import source as source_module
-from rehab.sessions.live.session.source_clock import SourceClock
+from rehab.sessions.live.session.delayed_steps import SourceClock
 from rehab.sessions.log import Step
-from robot.wire.late_steps import DRIFT_MAX, LATE_STEP_S
+from robot.wire.remote_clock import DRIFT_MAX, LATE_STEP_S
 from tests.support.callers import a_step, change
 
 

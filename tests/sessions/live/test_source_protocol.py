@@ -8,7 +8,7 @@ import pytest
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Socket
-from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.sessions.setup.protocol_models import MeasureDefinition
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase

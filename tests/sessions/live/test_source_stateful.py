@@ -12,7 +12,7 @@ from hypothesis.stateful import run_state_machine_as_test
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers import source as source_consumers
-from rehab.sessions.live.session import commits
+from rehab.sessions.live.session import commit_transaction
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.live.session.group_commit import Writer
 from rehab.sessions.live.session.live_session import LiveSession
@@ -80,7 +80,7 @@ def acknowledge_before_the_commit(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def check_no_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commits, "_check_logs", lambda epochs, firsts: None)
+    monkeypatch.setattr(commit_transaction, "_check_logs", lambda epochs, firsts: None)
 
 
 def take_other_content_for_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,13 +23,13 @@ from django.db import (
 )
 from django.test import Client
 
-from rehab.sessions.live import process, routines
+from rehab.sessions.live import periodic_tasks, process
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database import own_connection as own_connections
 from rehab.sessions.live.database import server_lease
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.session import group_commit as writers
-from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.commit_transaction import Job
 from rehab.sessions.live.session.group_commit import LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS, Writer
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import a_step, numbers, turns
@@ -51,7 +51,7 @@ async def figures() -> str:
 
 
 async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeypatch, caplog):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.01)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.01)
     session = await begun(place)
     monitor, robot = place.monitor(session), await place.robot().dial()
     assert (await monitor.watch())["presence"]["storage"] == ""
@@ -76,7 +76,7 @@ async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeyp
 
 
 async def test_a_full_disk_is_said_in_words(place, sourced, stall, monkeypatch):
-    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.01)
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.01)
     session, source = await sourced(place)
     stall.problem = OperationalError("database or disk is full")
     await source.say(a_step(1))

@@ -7,8 +7,8 @@ import random
 import pytest
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.protocol.backlog import PAGE_STEPS
-from rehab.sessions.live.session import hub
+from rehab.sessions.live.protocol.past_steps import PAGE_STEPS
+from rehab.sessions.live.session import subscribers
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     Caller,
@@ -160,13 +160,13 @@ async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, sourced):
     source.number = count
     beside = await place.monitor(session).open()
     slow = await place.tablet(session, "?after=0").open()
-    while len(frames_of_past(slow)) < hub.MAX_UNCONFIRMED_BACKLOG:
+    while len(frames_of_past(slow)) < subscribers.MAX_UNCONFIRMED_BACKLOG:
         await slow.hear("steps")
     await source.walk(*[4.0] * 20)
     await beside.until_step(count + 20)
     await Caller.overhear(slow)
     past = frames_of_past(slow)
-    assert len(past) == hub.MAX_UNCONFIRMED_BACKLOG  # not one more before it has read one
+    assert len(past) == subscribers.MAX_UNCONFIRMED_BACKLOG  # not one more before it has read one
     assert max(len(frame["steps"]) for frame in past) <= PAGE_STEPS
     while len(numbers_of(slow)) < count:
         await slow.say({"type": "seen", "frame": frames_of_past(slow)[-1]["frame"]})
@@ -176,7 +176,7 @@ async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, sourced):
 
 
 async def test_a_page_that_reads_none_of_its_past_is_let_go(place, sourced, monkeypatch):
-    monkeypatch.setattr(hub, "CONFIRM_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(subscribers, "CONFIRM_TIMEOUT_S", 0.05)
     session, source = await sourced(place)
     for first in range(1, 2000, 200):
         await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})
@@ -240,25 +240,25 @@ async def test_a_slow_page_gets_fewer_and_larger_frames(place, sourced):
     slow.confirms = False
     await slow.watch()
     await quick.watch()
-    for _ in range(hub.MAX_UNCONFIRMED + 30):
+    for _ in range(subscribers.MAX_UNCONFIRMED + 30):
         await source.walk(4.0)
         await quick.until_step(source.number)
     await slow.overhear()
     frames = [m for m in slow.heard if m["type"] == "events"]
-    assert len(frames) == hub.MAX_UNCONFIRMED
+    assert len(frames) == subscribers.MAX_UNCONFIRMED
     await slow.say({"type": "seen", "frame": frames[-1]["frame"]})
     await slow.until_step(source.number)
     frames = [m for m in slow.heard if m["type"] == "events"]
-    assert len(frames) == hub.MAX_UNCONFIRMED + 1
+    assert len(frames) == subscribers.MAX_UNCONFIRMED + 1
     assert len(frames[-1]["events"]) >= 28
     assert slow.steps == quick.steps == list(range(1, source.number + 1))
 
 
 async def test_a_page_that_confirms_nothing_is_sent_away_alone(place, sourced, monkeypatch):
-    monkeypatch.setattr(hub, "CONFIRM_TIMEOUT_S", 0.02)
+    monkeypatch.setattr(subscribers, "CONFIRM_TIMEOUT_S", 0.02)
     session, source = await sourced(place)
     deaf, quick = await place.tablet(session).open(), await place.monitor(session).open()
-    for _ in range(hub.MAX_UNCONFIRMED + 2):
+    for _ in range(subscribers.MAX_UNCONFIRMED + 2):
         await source.walk(4.0)
         await quick.until_step(source.number)
     code, error = await deaf.sent_away()
@@ -275,7 +275,7 @@ async def test_a_page_that_lags_beyond_the_ring_begins_anew(place, sourced):
     slow = place.tablet(session)
     slow.confirms = False
     await slow.watch()
-    for _ in range(hub.MAX_UNCONFIRMED):
+    for _ in range(subscribers.MAX_UNCONFIRMED):
         await source.walk(4.0)
     for first in range(source.number + 1, source.number + 600, 200):
         await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})

@@ -20,7 +20,7 @@ SCRIPT = """
 import asyncio, json, sys
 import django
 django.setup()
-from rehab.sessions.live.server import LiveServer
+from rehab.sessions.live.daphne_server import LiveServer
 from rehab.sessions.live.websockets import MAX_WAITING_BYTES, DirectProtocol
 
 SIZES = json.loads(sys.argv[1])

@@ -7,7 +7,7 @@ import time
 from asgiref.sync import sync_to_async
 
 from rehab.sessions.log import Step
-from rehab.sessions.setup.protocols import MeasureDefinition
+from rehab.sessions.setup.protocol_models import MeasureDefinition
 from rehab.stations.models import Device
 from rehab.training.goals import GoalRule
 from tests.support.callers import SourceCaller, a_step, numbers

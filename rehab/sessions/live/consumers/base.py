@@ -24,7 +24,7 @@ from rehab.sessions.live.protocol.messages import read_frame
 from rehab.sessions.live.protocol.outgoing import Outbox
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.log_fold import DamagedLog
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame
 

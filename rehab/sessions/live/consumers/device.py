@@ -22,7 +22,7 @@ from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.protocol.fields import PartOf
 from rehab.sessions.live.protocol.messages import read_frame
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES
 from robot.wire.close_codes import CloseCode

@@ -19,10 +19,10 @@ from rehab.sessions.live.protocol.messages import (
     read_incident,
     read_report,
 )
-from rehab.sessions.live.session.hub import Lagged, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.payloads import Message, describe_cue
+from rehab.sessions.live.session.subscribers import Lagged, Subscriber
 from rehab.sessions.robot_incidents import store_incident
+from rehab.sessions.state_messages import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.frames import BadFrame

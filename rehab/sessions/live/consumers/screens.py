@@ -21,7 +21,6 @@ from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.orders import ChangeOrder, Order, RemarkOrder
-from rehab.sessions.live.protocol.backlog import read_backlog
 from rehab.sessions.live.protocol.messages import (
     is_mirror,
     read_after,
@@ -30,10 +29,11 @@ from rehab.sessions.live.protocol.messages import (
     read_remark,
     read_seen,
 )
+from rehab.sessions.live.protocol.past_steps import read_backlog
 from rehab.sessions.live.robot_permissions import RobotOrder, read_robot_order
-from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.payloads import Message
+from rehab.sessions.live.session.subscribers import Lagged, Stalled, Subscriber
+from rehab.sessions.state_messages import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, NotAllowed, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester

@@ -20,9 +20,9 @@ from rehab.sessions.live.protocol.messages import (
 )
 from rehab.sessions.live.protocol.resent_steps import check_same
 from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
+from rehab.sessions.live.session.delayed_steps import SourceClock
 from rehab.sessions.live.session.live_session import LiveSession
-from rehab.sessions.live.session.source_clock import SourceClock
-from rehab.sessions.payloads import Message, describe_source_phase
+from rehab.sessions.state_messages import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State
 from rehab.training.measures import InvalidSetting, check_worn

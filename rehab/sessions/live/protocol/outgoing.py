@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable
 from weakref import WeakKeyDictionary
 
 from rehab.sessions.events.event import to_text
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 
 # By event loop, those that have something to write at the end of its turn.
 _due: WeakKeyDictionary[asyncio.AbstractEventLoop, list[Outgoing]] = WeakKeyDictionary()

@@ -22,7 +22,7 @@ from rehab.sessions.log import (
 from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.noted_conditions import CONDITIONS, planned_conditions
-from rehab.sessions.payloads import change_mark
+from rehab.sessions.state_messages import change_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
 from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold

@@ -21,7 +21,7 @@ from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, conne
 
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.database.trouble import Trouble, classify_failure, concerns_all
-from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
+from rehab.sessions.live.session.commit_transaction import EarlierWriteFailed, Job, commit
 from rehab.sessions.live.session.prometheus_metrics import (
     DELIVERY_S,
     WRITE_FAILURES,

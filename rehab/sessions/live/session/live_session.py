@@ -23,11 +23,11 @@ from rehab.sessions.live.database.trouble import WORDS, NotStored, classify_fail
 from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.protocol.messages import Played, SensorState, SensorTrouble
 from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
-from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.commit_transaction import Job
+from rehab.sessions.live.session.delayed_steps import SourceClock
 from rehab.sessions.live.session.group_commit import Writer
-from rehab.sessions.live.session.hub import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.live.session.robot_orders import RobotOrders
-from rehab.sessions.live.session.source_clock import SourceClock
+from rehab.sessions.live.session.subscribers import EventFeed, Subscriber, SubscriptionGate
 from rehab.sessions.log import (
     ALARM_KINDS,
     RULE_PAUSES,
@@ -37,7 +37,7 @@ from rehab.sessions.log import (
     Step,
 )
 from rehab.sessions.noted_conditions import find_reported
-from rehab.sessions.payloads import Message, type_mark
+from rehab.sessions.state_messages import Message, type_mark
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, State
 from rehab.training.controls import Audience
 from rehab.training.measures import MEASURES

@@ -16,9 +16,9 @@ from rehab.sessions.events.event import (
 )
 from rehab.sessions.live.devices import ConnectedDevice
 from rehab.sessions.live.session.aggregate import SessionAggregate
-from rehab.sessions.live.session.hub import EventFeed
+from rehab.sessions.live.session.subscribers import EventFeed
 from rehab.sessions.log import RobotEntry
-from rehab.sessions.payloads import Message
+from rehab.sessions.state_messages import Message
 
 LOGGED_REPORTS = {
     "decision": RobotEntry.DECISION,

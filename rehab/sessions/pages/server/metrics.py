@@ -19,7 +19,7 @@ from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
 from rehab.people.access import public
-from rehab.people.chores import Chore
+from rehab.people.upkeep_runs import Chore
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.session.prometheus_metrics import REGISTRY

@@ -14,8 +14,8 @@ from robot.bases.avatar import AvatarBase
 from robot.bases.base import Answer, BaseLost, Indication
 from robot.bases.face import FaceScreen
 from robot.bases.kobuki import KobukiBase
+from robot.motion.face_and_arms import REST, to_message
 from robot.motion.gestures import GESTURES
-from robot.motion.looks import REST, to_message
 from robot.motion.pose import HOME
 from robot.motion.twist import Twist
 from robot.play_gesture import play_gesture

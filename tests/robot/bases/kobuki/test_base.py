@@ -20,8 +20,8 @@ from robot.bases.kobuki_protocol.commands import (
     decode_commands,
 )
 from robot.bases.kobuki_protocol.frames import FrameReader
+from robot.motion.lights_and_sounds import Color, Melody, Note
 from robot.motion.pose import HOME, Pose
-from robot.motion.score import Color, Melody, Note
 from robot.motion.twist import STILL, Twist
 from tests.support.extent import EVERYTHING
 from tests.support.fake_kobuki import FakeKobuki

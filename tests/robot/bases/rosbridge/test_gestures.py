@@ -5,8 +5,8 @@ import math
 import pytest
 
 from robot.behavior.safety import OPEN_LOOP_MAX_GESTURES
+from robot.motion.gesture_variants import VARIANTS
 from robot.motion.gestures import BUILT_IN, GESTURES, ORIGINALS
-from robot.motion.pools import VARIANTS
 from robot.play_gesture import play_gesture
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import OPEN, Stage, moving

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robot.bases.twin.__main__ import main
-from robot.bases.twin.camera import Camera
+from robot.bases.twin.picture_process import Camera
 from robot.motion.pose import HOME, Pose
 
 pytest.importorskip("pybullet")

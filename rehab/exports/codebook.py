@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 from django.utils.translation import gettext_lazy as _
 
+from rehab.exports.column_definitions import Column, Table, Type
 from rehab.exports.selection import Selection
 from rehab.exports.session_table import SESSIONS
 from rehab.exports.step_tables import FEEDBACK, STEPS
-from rehab.exports.table import Column, Table, Type
-from rehab.questionnaires.clinical_tests import CLINICAL_TESTS
 from rehab.questionnaires.instrument import Instrument, Item
-from rehab.sessions.assessments import Assessment, assessments_with
+from rehab.questionnaires.standard_tests import CLINICAL_TESTS
+from rehab.sessions.assessment_results import Assessment, assessments_with
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession

@@ -15,15 +15,15 @@ from rehab.boards.cache import read_lists
 from rehab.boards.models import Leaderboard
 from rehab.boards.snapshots import shared_boards
 from rehab.exports.archive import write_csv, write_json
+from rehab.exports.codebook import CODEBOOK, TABLES, codebook_rows
 from rehab.exports.selection import Selection
-from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
 from rehab.people.field_policy import describe
 from rehab.people.models import Patient, User
-from rehab.sessions.assessments import Assessment
+from rehab.sessions.assessment_results import Assessment
 from rehab.sessions.models import TrainingSession
 from rehab.studies.participants import Enrollment, Screening
 from rehab.studies.record.adverse_events import AdverseEvent

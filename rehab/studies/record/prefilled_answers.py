@@ -8,7 +8,7 @@ from django.db.models import Max, Min
 
 from rehab.studies.models import Study, StudyMark
 from rehab.studies.participants import StudyEvent
-from rehab.studies.record.found import find
+from rehab.studies.record.report_statements import find
 from rehab.studies.registration.document import FIRST_A2, describe
 from rehab.studies.registration.estimands import (
     HARMS_FOLLOWED,

@@ -20,9 +20,10 @@ from django.db import connection, transaction
 from django.db.models import DateField, DateTimeField, TimeField
 from pyrage.x25519 import Identity
 
-from rehab.exports.clinic.departure import delete_rows, transaction_and_rest
+from rehab.exports.clinic.clinic_models import STAYS, Table, clinic_paths, moving_tables
+from rehab.exports.clinic.clinic_removal import delete_rows, transaction_and_rest
 from rehab.exports.clinic.primary_keys import reserve_keys
-from rehab.exports.clinic.rows import (
+from rehab.exports.clinic.row_serialization import (
     ENCRYPTED,
     TOKENS,
     CannotMove,
@@ -38,7 +39,6 @@ from rehab.exports.clinic.sealed_file import (
     read_parts,
 )
 from rehab.exports.clinic.shared_rows import place_shared
-from rehab.exports.clinic.tables import STAYS, Table, clinic_paths, moving_tables
 from rehab.people.aliases import draw_alias
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act

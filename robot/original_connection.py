@@ -7,9 +7,9 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any, Self
 
 from robot.behavior.safety import LAPSED_S
-from robot.ros.bridge import Bridge
 from robot.ros.holder import DrivenBase
 from robot.ros.original_nodes import TOPICS, OriginalTopicClient
+from robot.ros.rosbridge_connection import Bridge
 
 
 class OriginalTopics:

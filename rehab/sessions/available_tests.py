@@ -14,8 +14,8 @@ from rehab.people.models import Clinic
 from rehab.people.ranges import between
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.web.refusals import format_refusal
-from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest, Way
 from rehab.questionnaires.form_items import read_form_items
+from rehab.questionnaires.standard_tests import CLINICAL_TESTS, ClinicalTest, Way
 from rehab.training.measures import InvalidSetting
 
 OWN = "own-"  # begins the slug of a clinic's own test

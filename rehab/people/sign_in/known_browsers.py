@@ -1,7 +1,7 @@
 """Where somebody has signed in lately: the networks, and the browsers, which keep a cookie.
 
-They keep their clinic's lane through a flood of sign-ins (`gate`). A lane says nothing of who may
-sign in.
+They keep their clinic's lane through a flood of sign-ins (`flood_gate`). A lane says nothing of who
+may sign in.
 """
 
 from __future__ import annotations

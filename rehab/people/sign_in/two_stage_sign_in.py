@@ -15,16 +15,16 @@ from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.people.sign_in import browser_sessions, lockout
+from rehab.people.sign_in import lockout, sign_in_expiry
 from rehab.people.sign_in.factors import factors
-from rehab.people.sign_in.known import remember_browser
+from rehab.people.sign_in.known_browsers import remember_browser
 
 # Keys of the browser session.
 PENDING = "pending_second_factor"
 SECOND_FACTOR_VERIFIED = "second_factor_verified"
 
 PENDING_LIFETIME_S = 10 * 60
-BACKEND = "rehab.people.sign_in.backends.PasswordBackend"
+BACKEND = "rehab.people.sign_in.authentication_backends.PasswordBackend"
 
 
 def begin(request: HttpRequest, user: User, next_url: str, now: datetime) -> bool:
@@ -71,8 +71,8 @@ def finish(request: HttpRequest, user: User, now: datetime, *, second_factor_ver
     pending = request.session.pop(PENDING, {})
     login(request, user, backend=BACKEND)
     request.session[SECOND_FACTOR_VERIFIED] = second_factor_verified
-    request.session[browser_sessions.SIGNED_IN_AT] = int(now.timestamp())
-    request.session[browser_sessions.LAST_ACTIVITY_AT] = int(now.timestamp())
+    request.session[sign_in_expiry.SIGNED_IN_AT] = int(now.timestamp())
+    request.session[sign_in_expiry.LAST_ACTIVITY_AT] = int(now.timestamp())
     lockout.forget_failures(request, user, now)
     return str(pending.get("next_url", ""))
 
@@ -107,7 +107,7 @@ class SessionValidationMiddleware:
             data = cast(Mapping[str, Any], request.session)
             if is_session_valid(data, request.user):
                 if WATCHING not in request.headers:
-                    browser_sessions.record_activity(request, timezone.now())
+                    sign_in_expiry.record_activity(request, timezone.now())
             else:
                 logout(request)
         response = self.get_response(request)

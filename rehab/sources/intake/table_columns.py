@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.recordings.columns import SignalColumn
+from rehab.gait.recordings.column_mapping import SignalColumn
 from rehab.sources.intake.alignment import Channel, Floats
 
 PLANS = 64  # kept at most; streams have one or two

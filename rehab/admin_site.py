@@ -124,4 +124,4 @@ class GarryAdminSite(AdminSite):
 class GarryAdminConfig(AdminConfig):
     """Django's admin application with our site."""
 
-    default_site = "rehab.site.GarryAdminSite"
+    default_site = "rehab.admin_site.GarryAdminSite"

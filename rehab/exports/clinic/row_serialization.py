@@ -13,7 +13,7 @@ from cryptography.fernet import InvalidToken
 from django.contrib.auth.hashers import UNUSABLE_PASSWORD_PREFIX
 from django.db.models import Model, Q, QuerySet
 
-from rehab.exports.clinic.tables import Table, clinic_paths, moving_tables
+from rehab.exports.clinic.clinic_models import Table, clinic_paths, moving_tables
 from rehab.people.audit.moves import ClinicMove, Translate, same_key
 from rehab.people.audit.row_digests import with_floats
 from rehab.people.commands import command

@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 from robot.marking import gettext_noop
 from robot.motion.gesture import GESTURE_MAX_S, Gesture, Waypoint, needed_time_s, stages
-from robot.motion.limits import DEFAULT_LIMITS
-from robot.motion.score import (
+from robot.motion.lights_and_sounds import (
     ASKING,
     FALLING,
     LOW_FALLING,
@@ -29,6 +28,7 @@ from robot.motion.score import (
     Light,
     Score,
 )
+from robot.motion.limits import DEFAULT_LIMITS
 
 # Shares of a row's way ahead and of its turn; then home. By this a base without a face is read:
 # joy turns to both sides, fast; disappointment to one, slowly; a greeting comes near.

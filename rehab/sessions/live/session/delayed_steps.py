@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robot.wire.late_steps import RemoteClock
+from robot.wire.remote_clock import RemoteClock
 
 
 class SourceClock:

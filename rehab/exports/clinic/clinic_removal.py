@@ -16,14 +16,14 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.utils import timezone
 
-from rehab.exports.clinic.rows import CannotMove, ClinicRows
+from rehab.exports.clinic.clinic_models import clinic_paths, removed_models
+from rehab.exports.clinic.row_serialization import CannotMove, ClinicRows
 from rehab.exports.clinic.sealed_file import (
     Content,
     check_no_session_runs,
     recordings_of,
     seal_everything,
 )
-from rehab.exports.clinic.tables import clinic_paths, removed_models
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic, User

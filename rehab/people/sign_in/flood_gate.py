@@ -3,7 +3,7 @@
 It stands before Django, so that an attempt which is refused costs next to nothing: training
 sessions run in the same process. Its counts are in memory; those that lock accounts are in the
 database (`attempts`). However many strangers try, each clinic has a lane for the networks and
-browsers from which it signed in lately (`known`).
+browsers from which it signed in lately (`known_browsers`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation.trans_real import parse_accept_lang_header
 
 from rehab.people.networks import resolve_client_address
-from rehab.people.sign_in.known import Lanes
+from rehab.people.sign_in.known_browsers import Lanes
 from rehab.people.token_buckets import TokenBucket, TokenBuckets
 
 PATH = "/sign-in/"

@@ -14,7 +14,7 @@ from django.utils import timezone
 
 from rehab.outbox.delivery import deliver_due, is_due
 from rehab.people.audit.seals import seal_logs
-from rehab.people.chores import record_tasks
+from rehab.people.upkeep_runs import record_tasks
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized, note_heard
 from rehab.sessions.live.database import clinic_owners

@@ -1,4 +1,4 @@
-"""Results of standard tests and of a clinic's own (`clinic_tests`), and their course."""
+"""Results of standard tests and of a clinic's own (`available_tests`), and their course."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicModel
-from rehab.questionnaires.clinical_tests import CLINICAL_TESTS, ClinicalTest
-from rehab.sessions.clinic_tests import find_test, own_tests
+from rehab.questionnaires.standard_tests import CLINICAL_TESTS, ClinicalTest
+from rehab.sessions.available_tests import find_test, own_tests
 from rehab.sessions.formatting import MISSING, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS

@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 from django.db.models import QuerySet
 
 from rehab.exports.archive import write_csv
-from rehab.exports.patient_data import README_TEXT
+from rehab.exports.codebook import CODEBOOK, TABLES, codebook_rows
+from rehab.exports.export_files import README_TEXT
 from rehab.exports.research.bids import dataset_files
 from rehab.exports.research.jamovi import write_omv
 from rehab.exports.research.k_anonymity import write_anonymity
@@ -27,7 +28,6 @@ from rehab.exports.research.ro_crate import write_crate
 from rehab.exports.research.session_files import ABOUT, KINDS, write_part
 from rehab.exports.research.sinks import FORMATS, available_formats
 from rehab.exports.research.study_files import groups_of, studies_of, study_files
-from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.people.commands import garry_version
 from rehab.people.models import User
 from rehab.sessions.models import TrainingSession

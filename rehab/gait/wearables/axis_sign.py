@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rehab.gait.wearables.axis import SagittalAxis
-from rehab.gait.wearables.readings import Reading
+from rehab.gait.wearables.doubtful_strides import Reading
 
 STRIDES_MIN, STRIDES_SURE = 3, 5  # of a sign that may be right; of the one with more of them
 # A leg moves less in the middle of a stance than in what is taken for one with the wrong sign; by
