@@ -153,7 +153,7 @@ class ScreenForm(_SpokenForm):
         ]
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
         help_texts: ClassVar = {
-            "screen_side": _("In one half, words are largest on a tablet that lies on its long side.")
+            "screen_side": _("In one half, words are largest on a tablet that lies on its side.")
         }
 
 
