@@ -43,7 +43,7 @@ export function createFeedback(body) {
     const step = session.last;
     setLines(words, phraseOf(step));
     emblem.dataset.emblem = step?.kind === "missing" ? "none" : (step?.emblem ?? "");
-    emblem.toggleAttribute("data-hit", Boolean(step?.hit && !step.close));
+    emblem.toggleAttribute("data-hit", Boolean(session.has_points && step?.hit && !step.close));
     const isMoreWanted = step?.points === 0 && !step.hit && !step.close;
     emblem.toggleAttribute("data-more", isMoreWanted);
     const sign = step?.points ? signed(step.points) : "";

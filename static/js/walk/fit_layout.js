@@ -21,7 +21,7 @@ const AIR = 16; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 170;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
-const NARROW = 600; // the total has no room beside the thermometer: it is below
+const NARROW = 600; // the total has no room beside the thermometer: it is below it
 const SCALE_LEAST = 260; // of the thermometer
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
@@ -87,7 +87,8 @@ export function createFitting(body, scene) {
     const isRow = landscape.matches && (!column || column === "center"); // the badge is beside the total
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
-    const stand = bottom - (width < NARROW ? total : 0);
+    const isBelow = width < NARROW || (column === "center" && !isRow); // the total
+    const stand = bottom - (isBelow ? total : 0);
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
@@ -96,9 +97,9 @@ export function createFitting(body, scene) {
     const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
     const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
-    // In the middle stands the thermometer together with what is beside it.
-    const beside = isRow ? wide + (badge && GAP + badgeWidth()) : Math.max(wide, badge);
-    const inset = column === "center" ? Math.max(0, (width - beside - GAP - SCENE) / 2 - EDGE) : 0;
+    // In the middle stands the thermometer, together with a total that is beside it.
+    const beside = isBelow ? 0 : wide + (badge && GAP + badgeWidth()) + GAP;
+    const inset = column === "center" ? Math.max(0, (width - beside - SCENE) / 2 - EDGE) : 0;
     const below = goal + reach + AIR - main.offsetTop / u;
     return { width, height, isWide, inset, top, zero, goal, reach, below };
   }

@@ -8,8 +8,7 @@ const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 94;
 const EDGE = 24;
-const UNDER = 26; // the least gap that is seen between a miss and the goal line, at 2 m
-const OVER = 12;
+const CLEAR = 26; // the least gap that is seen between a step and the goal line, at 2 m
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: beside the thermometer where there is room, else on the horizon before it.
 const BESIDE = { sign: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0, turn: 1 };
@@ -54,7 +53,7 @@ export function createScene(svg) {
     dots.layOut({
       left: 60,
       right: end,
-      y: (performance) => Math.min(Math.max(y(performance), goal - swing), goal + swing),
+      y: (stride) => Math.min(Math.max(levelOf(stride), goal - swing), goal + swing),
       beyond: (performance) => Math.sign(Math.trunc((y(performance) - goal) / (swing + 1))),
     });
     if (shown) show(shown);
@@ -66,11 +65,11 @@ export function createScene(svg) {
     for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   }
 
-  // Return how high a step stands: plainly below the goal line if it missed, over it if it hit.
-  function levelOf(performance, hit, close) {
+  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit.
+  function levelOf({ performance, hit, close }) {
     const level = y(performance ?? 0);
     if (performance == null || close) return level;
-    return hit ? Math.min(level, layout.goal - OVER) : Math.max(level, layout.goal + UNDER);
+    return hit ? Math.min(level, layout.goal - CLEAR) : Math.max(level, layout.goal + CLEAR);
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
@@ -79,7 +78,7 @@ export function createScene(svg) {
     shown = { performance, hit, close, strides: entries, isCut };
     if (!layout) return; // no room for it
     thermometer.toggleAttribute("data-cut", isCut);
-    const level = levelOf(performance, hit, close);
+    const level = levelOf(shown);
     const height = performance === null ? layout.zero + 60 : level;
     liquid.style.transform = `translateY(${height}px)`;
     ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));

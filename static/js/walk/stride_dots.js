@@ -31,13 +31,14 @@ export function createDots(svg) {
     let joined = false;
     let before = 0;
     dots.forEach((dot, i) => {
-      const { performance = null, hit, close = false } = recent[i - first] ?? {};
+      const stride = recent[i - first] ?? {};
+      const { performance = null, hit, close = false } = stride;
       const gap = performance === null;
       const beyond = gap ? 0 : layout.beyond(performance); // −1 above, 1 below
       arrows[i].setAttribute("d", "");
       dot.classList.toggle("gap", gap);
       if (!gap) {
-        const y = layout.y(performance).toFixed(1);
+        const y = layout.y(stride).toFixed(1);
         dot.setAttribute("cy", y);
         dot.classList.toggle("hit", hit && !close);
         dot.classList.toggle("close", close);

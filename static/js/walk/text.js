@@ -34,7 +34,10 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "still":
       return [_("No steps measured."), sentences(KEEP_WALKING, safe)];
     case "paused":
-      return [_("Pause."), sentences(_("Rest now."), isAlone && _("Your therapist will start again."), safe)];
+      return [
+        _("Pause."),
+        sentences(_("Rest once you stand safely."), isAlone && _("Your therapist will start again."), safe),
+      ];
     case "ask":
       return [_("End this session?"), safe];
     case "offline":
