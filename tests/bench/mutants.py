@@ -16,6 +16,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if not 0 <= (self.hit_points or 1) <= POINTS_MAX:",
     ): "0 and 1 are both between the bounds",
     (
+        "rehab/gait/setup/find_forces.py",
+        "return float(np.median(gaps)) <= 0.1",
+    ): "a leg's columns are at most a few ms apart, two legs' half a second",
+    (
         "rehab/gait/signals/buffer.py",
         "self._room, self._wide = (4 * keep, len(self.layout.order))",
     ): "more room moves the same samples more seldom",

@@ -203,6 +203,10 @@ def test_who_comes_back_without_having_gone_there_is_refused(world, client):
     assert "_auth_user_id" not in client.session
 
 
+def test_who_signed_in_with_a_password_signs_out_here_alone(pt):
+    assert pt.post(reverse("sign-out")).url == reverse("sign-in")
+
+
 def test_without_a_hospital_its_addresses_do_not_exist(world, client, settings):
     settings.OIDC_ISSUER = ""
     for name in ("sign-on", "sign-on-complete"):
