@@ -117,8 +117,8 @@ class Tree:
             duration_s[test] = float(seconds)
         came: list[set[str]] = [set() for _ in chosen]
         for line in notes["HITS"].read_text().splitlines():
-            number, _, test = line.partition("\t")
-            came[int(number)].add(test or self.mirror(chosen[int(number)].file))
+            place, _, test = line.partition("\t")
+            came[int(place)].add(test or self.mirror(chosen[int(place)].file))
         return [_themselves_first(tests, duration_s) for tests in came]
 
     def mirror(self, file: str) -> str:
