@@ -139,6 +139,14 @@ def test_without_it_the_own_second_factor_is_asked_for(back, client):
     assert client.get(reverse("account")).status_code == 302
 
 
+@pytest.mark.parametrize("subject", ["4711", None])
+def test_only_an_account_that_is_linked_can_confirm_there(linked, subject):
+    linked.subject = subject
+    linked.save()
+    page = signed_in(linked).get(reverse("confirm")).content.decode()
+    assert (reverse("sign-on-confirm") in page) is bool(subject)
+
+
 @pytest.mark.parametrize(
     ("claims", "confirmed"),
     [({}, True), ({"sub": "4712"}, False), ({"auth_time": 1}, False)],
