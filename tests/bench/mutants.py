@@ -20,6 +20,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "return usual is not None and (not USUAL_MIN <= stance_s / usual < USUAL_MAX)",
     ): "measured times are never exactly at the bound",
     (
+        "rehab/gait/wearables/detector.py",
+        "if self._held[0].time_s <= time_s - HELD_S:",
+    ): "one sample less of those that wait for the axis",
+    (
         "rehab/gait/detector.py",
         "count = len(channels[1])",
     ): "where the channels differ in length nothing is written",
