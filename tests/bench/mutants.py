@@ -16,6 +16,26 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if not 0 <= (self.hit_points or 1) <= POINTS_MAX:",
     ): "0 and 1 are both between the bounds",
     (
+        "rehab/gait/one_leg.py",
+        "return usual is not None and (not USUAL_MIN <= stance_s / usual < USUAL_MAX)",
+    ): "measured times are never exactly at the bound",
+    (
+        "rehab/gait/wearables/detector.py",
+        "if self._held[0].time_s <= time_s - HELD_S:",
+    ): "one sample less of those that wait for the axis",
+    (
+        "rehab/gait/detector.py",
+        "count = len(channels[1])",
+    ): "where the channels differ in length nothing is written",
+    (
+        "rehab/sessions/live/server.py",
+        "await asyncio.sleep(0.03)",
+    ): "how often it looks whether the sockets are closed is no promise",
+    (
+        "rehab/gait/setup/find_forces.py",
+        "return float(np.median(gaps)) <= 0.1",
+    ): "a leg's columns are at most a few ms apart, two legs' half a second",
+    (
         "rehab/gait/signals/buffer.py",
         "self._room, self._wide = (4 * keep, len(self.layout.order))",
     ): "more room moves the same samples more seldom",

@@ -3,9 +3,10 @@
 Each mutant is one small change (a comparison, a number, a condition, a call that goes, …) in a copy
 of the tree. One run of all tests tells which of them come to the changed statements (for what runs
 while a module is imported: those in the folder that mirrors its own); a mutant meets those, the
-quick files first, and is killed where one fails that passed before. Those that none comes to meet
-the tests of PostgreSQL (DATABASE_URL); where no server answers they do not count. Which mutants are
-made depends on the seed and on the code alone, so that two runs of one tree agree.
+quick files first, then all others of their files (which may share what one of them computed), and
+is killed where one fails that passed before. Those that none comes to meet the tests of PostgreSQL
+(DATABASE_URL); where no server answers they do not count. Which mutants are made depends on the
+seed and on the code alone, so that two runs of one tree agree.
 
 `--seed`, `--each` (mutants a package), `--only` (a package), `--tree` (another checkout).
 """
@@ -28,6 +29,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 import psycopg
+import pytest
 
 from tests.bench import mutation_probe
 from tests.bench.mutants import Mutant, mutants, probed
@@ -88,11 +90,12 @@ class Tree:
         except subprocess.TimeoutExpired:
             return f"No end within {timeout_s} s."
         # What breaks before a test begins is told on the other stream.
-        return (result.stdout + result.stderr).decode()[-2000:] if result.returncode else ""
+        failed = result.returncode not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+        return (result.stdout + result.stderr).decode()[-2000:] if failed else ""
 
     def tests_of(self, chosen: list[Mutant]) -> list[dict[str, float]]:
-        """Return the tests that come to each mutant and pass without it, and what each takes [s];
-        quick files first.
+        """Return the tests that pass without each mutant, of files that come to it, and what each
+        takes [s]: those that come to it themselves first, and of these quick files.
         """
         places: dict[str, dict[int, int]] = defaultdict(dict)
         for number, mutant in enumerate(chosen):
@@ -100,27 +103,23 @@ class Tree:
         for name, numbers in places.items():
             source = (self.snapshot / name).read_text()
             (self.folder / name).write_text(probed(source, numbers))
-        hits, passed = self.notes / "hits", self.notes / "passed"
-        hits.write_text("")
-        passed.write_text("")
-        self.run(
-            "-n", "2", "--dist", "worksteal", "tests", timeout_s=3600, HITS=hits, PASSED=passed
-        )
+        notes = {name: self.notes / name.lower() for name in ("HITS", "PASSED", "FAILED")}
+        for note in notes.values():
+            note.write_text("")
+        self.run("-n", "2", "--dist", "worksteal", "tests", timeout_s=3600, **notes)
+        for test in dict.fromkeys(notes["FAILED"].read_text().splitlines()):
+            print(f"does not count, since it fails without a mutant, too: {test}", flush=True)
         for name in places:
             shutil.copy2(self.snapshot / name, self.folder / name)
         duration_s: dict[str, float] = {}
-        for line in passed.read_text().splitlines():
+        for line in notes["PASSED"].read_text().splitlines():
             seconds, _, test = line.partition("\t")
             duration_s[test] = float(seconds)
-        found: list[list[str]] = [[] for _ in chosen]
-        for line in hits.read_text().splitlines():
-            mutant_number, _, test = line.partition("\t")
-            if test in duration_s:
-                found[int(mutant_number)].append(test)
-            else:  # at import, once for all tests, or in a server
-                some = test or self.mirror(chosen[int(mutant_number)].file)
-                found[int(mutant_number)] += [one for one in duration_s if one.startswith(some)]
-        return [_quick_files_first(tests, duration_s) for tests in found]
+        came: list[set[str]] = [set() for _ in chosen]
+        for line in notes["HITS"].read_text().splitlines():
+            place, _, test = line.partition("\t")
+            came[int(place)].add(test or self.mirror(chosen[int(place)].file))
+        return [_themselves_first(tests, duration_s) for tests in came]
 
     def mirror(self, file: str) -> str:
         """Return the folder of tests that mirrors a module's, or the innermost one around it."""
@@ -130,29 +129,42 @@ class Tree:
         return f"{folder.as_posix()}/"
 
     def killer(self, mutant: Mutant, tests: dict[str, float]) -> str:
-        """Return the test that notices, or ""."""
-        chosen, failed = self.notes / "chosen", self.notes / "failed"
+        """Return the test that notices, twice, or ""."""
         (self.folder / mutant.file).write_text(mutant.source)
         try:
             for some in _in_rounds(list(tests)):
-                timeout_s = TIMEOUT_S + 3 * sum(map(tests.__getitem__, some))
-                chosen.write_text("\n".join(some))
-                failed.write_text("")
-                files = dict.fromkeys(test.partition("::")[0] for test in some)
-                if self.run("-x", *files, timeout_s=timeout_s, CHOSEN=chosen, FAILED=failed):
-                    return (*failed.read_text().splitlines(), "(no end, or no start)")[0]
+                while failed := self.fails(some, tests):
+                    if failed not in some or self.fails([failed], tests):
+                        return failed
+                    some.remove(failed)  # it failed by chance
             return ""
         finally:
             shutil.copy2(self.snapshot / mutant.file, self.folder / mutant.file)
 
+    def fails(self, some: list[str], duration_s: dict[str, float]) -> str:
+        """Return the first of these tests that fails, or ""."""
+        chosen, failed = self.notes / "chosen", self.notes / "failed"
+        chosen.write_text("\n".join(some))
+        failed.write_text("")
+        files = dict.fromkeys(test.partition("::")[0] for test in some)
+        timeout_s = TIMEOUT_S + 3 * sum(map(duration_s.__getitem__, some))
+        if not self.run("-x", *files, timeout_s=timeout_s, CHOSEN=chosen, FAILED=failed):
+            return ""
+        return (*failed.read_text().splitlines(), "(no end, or no start)")[0]
 
-def _quick_files_first(tests: list[str], duration_s: dict[str, float]) -> dict[str, float]:
-    by_file: dict[str, list[str]] = defaultdict(list)
-    for test in dict.fromkeys(tests):
-        by_file[test.partition("::")[0]].append(test)
-    took = {file: sum(map(duration_s.__getitem__, by_file[file])) for file in by_file}
-    quick_first = sorted(by_file, key=took.__getitem__)
-    return {test: duration_s[test] for file in quick_first for test in by_file[file]}
+
+def _themselves_first(came: set[str], duration_s: dict[str, float]) -> dict[str, float]:
+    places = tuple(test.partition("::")[0] for test in came)
+    file_of = {test: test.partition("::")[0] for test in duration_s if test.startswith(places)}
+    took: dict[tuple[bool, str], float] = defaultdict(float)
+    for test, file in file_of.items():
+        took[test not in came, file] += duration_s[test]
+
+    def order(test: str) -> tuple[bool, float, str]:
+        others, file = key = test not in came, file_of[test]
+        return others, took[key], file
+
+    return {test: duration_s[test] for test in sorted(file_of, key=order)}
 
 
 def _in_rounds(tests: list[str]) -> Iterator[list[str]]:

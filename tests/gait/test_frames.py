@@ -234,6 +234,16 @@ def test_a_count_may_begin_anew_twice_and_samples_may_come_twice():
     assert late_s.max() == 0
 
 
+def test_a_count_by_twos_may_begin_anew():
+    stamps, frames = make_stamps()
+    frames *= 2
+    frames[700:] -= 11_400
+    clock, times, _ = run(stamps, frames)
+
+    assert clock.problem == ""
+    assert np.abs(times - stamps).max() < 0.0025
+
+
 def test_a_clock_that_is_set():
     stamps, frames = make_stamps()
     stamps[1000:] -= 500

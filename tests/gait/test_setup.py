@@ -119,6 +119,13 @@ def test_a_knee_is_not_taken_for_an_ankle(walk):
     assert ("left", "angle") not in check_setup(columns).proposal.guesses
 
 
+def test_of_two_columns_that_look_alike_the_first_is_doubted(walk):
+    columns = columns_of(walk)
+    guess = check_setup(columns | {"A9": columns["A1"]}).proposal.guesses["left", "angle"]
+
+    assert (guess.column, guess.doubt) == ("A1", "A9 looks the same")
+
+
 @pytest.mark.parametrize("lag_s", [-0.02, 0.02])
 @pytest.mark.parametrize(("row", "channel"), [(1, "moment"), (2, "angle")])
 def test_each_channel_has_its_own_time_and_no_delay_is_given_as_a_cure(walk, row, channel, lag_s):

@@ -139,6 +139,14 @@ def test_without_it_the_own_second_factor_is_asked_for(back, client):
     assert client.get(reverse("account")).status_code == 302
 
 
+@pytest.mark.parametrize("subject", ["4711", None])
+def test_only_an_account_that_is_linked_can_confirm_there(linked, subject):
+    linked.subject = subject
+    linked.save()
+    page = signed_in(linked).get(reverse("confirm")).content.decode()
+    assert (reverse("sign-on-confirm") in page) is bool(subject)
+
+
 @pytest.mark.parametrize(
     ("claims", "confirmed"),
     [({}, True), ({"sub": "4712"}, False), ({"auth_time": 1}, False)],
@@ -201,6 +209,10 @@ def test_who_comes_back_without_having_gone_there_is_refused(world, client):
     answer = client.get(reverse("sign-on-complete"), {"code": "x", "state": "y"}, follow=True)
     assert "was not completed" in answer.content.decode()
     assert "_auth_user_id" not in client.session
+
+
+def test_who_signed_in_with_a_password_signs_out_here_alone(pt):
+    assert pt.post(reverse("sign-out")).url == reverse("sign-in")
 
 
 def test_without_a_hospital_its_addresses_do_not_exist(world, client, settings):

@@ -73,6 +73,13 @@ def test_a_robot_is_normal_gentle_or_off() -> None:
         make_plan(robot_intensity=0.7)
 
 
+@pytest.mark.parametrize("intensity", [0.0, 0.5])
+@pytest.mark.parametrize("phase", [False, True])
+def test_a_robot_takes_part_unless_it_is_off_and_no_phase_has_it(intensity, phase) -> None:
+    plan = make_plan(make_phase("baseline", robot=phase), robot_intensity=intensity)
+    assert plan.has_robot is (intensity > 0 or phase)
+
+
 @pytest.mark.parametrize(
     "phases",
     [

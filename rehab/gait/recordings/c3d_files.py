@@ -46,10 +46,8 @@ def read_table(path: Path) -> Table:
     rate_hz = max(rates)
     if not 0 < rate_hz < RATE_MOST_HZ:
         raise GaitInputError(f"{path.name} has no usable rate. Export it again.")
-    seconds = max(
-        points.shape[2] / rates[0] if rates[0] else 0.0,
-        analogs.shape[1] / rates[1] if rates[1] else 0.0,
-    )
+    counts = (points.shape[2], analogs.shape[1])
+    seconds = max(count / rate for count, rate in zip(counts, rates, strict=True) if rate)
     time: Floats = np.arange(round(seconds * rate_hz)) / rate_hz
     table = Table({"time": time}, mass_kg=read_mass(file))
     units = [str(unit) for unit in read_values(file, "ANALOG", "UNITS")]

@@ -106,7 +106,7 @@ def make_profile(time_s: Floats, values: Floats, stances: Stances) -> Floats | N
         Of one leg.
     """
     known = np.isfinite(values)
-    if not len(stances) or known.sum() < POINTS / 2:
+    if known.sum() < POINTS / 2:
         return None
     most = slice(0, STRIDES_MOST)
     ends = (stances.begin_s[most], stances.end_s[most], stances.next_s[most])

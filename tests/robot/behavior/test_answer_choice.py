@@ -4,12 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robot.bases import Abilities
 from robot.behavior.answer_choice import APART, AnswerChooser, pick
 from robot.behavior.cue import QUIET_PACE
 from robot.behavior.window_decider import Decision
 from robot.motion.gesture_variants import POOLS, VARIANTS, variants
 from robot.wire.cue_limits import VARIED
-from tests.support.robot_stage import CUE, WELCOME, Stage
+from tests.support.robot_stage import CUE, WELCOME, FeelingBase, Stage
 
 VARIED_CUE = CUE | {"above": VARIED, "below": VARIED}
 
@@ -124,6 +125,16 @@ def test_every_varied_answer_is_as_large_as_is_seen(intensity, mean):
     stage.walk(*[mean] * 21)
     for one in stage.of("decision"):
         assert one["intensity"] >= VARIANTS[one["gesture"]].least - 1e-3
+
+
+@pytest.mark.parametrize("closed_loop", [True, False])
+def test_face_and_voice_answer_as_strongly_as_the_robot_moves(closed_loop, monkeypatch):
+    abilities = Abilities(simulated=True, moves=True, closed_loop=closed_loop)
+    monkeypatch.setattr(FeelingBase, "abilities", abilities)
+    stage = Stage(FeelingBase)
+    stage.hear(**WELCOME | {"cue": VARIED_CUE | {"intensity": 0.8}})
+    stage.walk(*[1.2] * 6)
+    assert [one.strength for one in stage.base.answered] == [0.8 if closed_loop else 0.4]
 
 
 @pytest.mark.parametrize(("intensity", "is_quiet"), [(1.0, False), (0.5, True)])

@@ -137,6 +137,15 @@ def test_whole_texts_are_taken_past_the_queue():
     assert (taken, daphne.texts()) == (TEXTS, [])
 
 
+def test_who_sends_a_text_need_not_answer_a_ping():
+    protocol, _ = connect(keep([]))
+    protocol.autoPingTimeout = 30
+    protocol._sendAutoPing()
+    assert protocol.autoPingTimeoutCall
+    protocol.dataReceived(Frame(Opcode.TEXT, b"here").serialize(mask=True))
+    assert not protocol.autoPingTimeoutCall
+
+
 @pytest.mark.parametrize("waiting", [b"", b"earlier"])
 def test_nothing_overtakes_what_the_kernel_has_not_taken(waiting):
     protocol, _ = connect(keep([]))

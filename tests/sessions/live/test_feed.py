@@ -21,6 +21,7 @@ from rehab.sessions.live.session.subscribers import (
     Subscriber,
 )
 from rehab.training.controls import Audience
+from robot.wire.limits import PAGE_HEARTBEAT_S
 
 
 def an_event(number: int) -> LiveEvent:
@@ -85,6 +86,10 @@ async def test_pages_have_a_heartbeat_each_interval_unless_they_were_just_sent_a
     await tablets[1].hear("heartbeat")
     await tablets[1].hear("heartbeat")
     assert not queued
+    page._sent_s -= PAGE_HEARTBEAT_S / 2  # long ago, as a page sees it
+    for _ in range(routines.PAGE_BEATS):
+        await runtimes.current().routines._send_page_heartbeats()
+    assert queued
 
 
 class Page:

@@ -179,6 +179,9 @@ def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkey
     assert not own.may_judge
     monkeypatch.setattr(server_lease, "_held", own)
     assert clinic_owners.is_alive("f" * 32)
+    own._unbroken_since_s -= 2 * server_lease.RENEW_S  # the others have had time to come back
+    own._renewed_s = time.monotonic()
+    assert own.may_judge
     own.release()
 
 
