@@ -87,7 +87,7 @@ async def test_pages_have_a_heartbeat_each_interval_unless_they_were_just_sent_a
     await tablets[1].hear("heartbeat")
     assert not queued
     page._sent_s -= PAGE_HEARTBEAT_S / 2  # long ago, as a page sees it
-    for _ in range(routines.PAGE_BEATS):
+    for _ in range(periodic_tasks.PAGE_BEATS):
         await runtimes.current().routines._send_page_heartbeats()
     assert queued
 
