@@ -28,7 +28,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "count = len(channels[1])",
     ): "where the channels differ in length nothing is written",
     (
-        "rehab/sessions/live/server.py",
+        "rehab/sessions/live/daphne_server.py",
         "await asyncio.sleep(0.03)",
     ): "how often it looks whether the sockets are closed is no promise",
     (

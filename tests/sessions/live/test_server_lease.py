@@ -176,12 +176,12 @@ def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkey
     own = enter()
     monkeypatch.setattr(server_lease, "RENEW_S", 5.0)
     own._unbroken_since_s = time.monotonic()  # it has just come back
-    assert not own.may_judge
+    judged_before = own.may_judge
     monkeypatch.setattr(server_lease, "_held", own)
     assert clinic_owners.is_alive("f" * 32)
     own._unbroken_since_s -= 2 * server_lease.RENEW_S  # the others have had time to come back
     own._renewed_s = time.monotonic()
-    assert own.may_judge
+    assert (judged_before, own.may_judge) == (False, True)
     own.release()
 
 
