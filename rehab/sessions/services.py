@@ -231,6 +231,19 @@ def acknowledge(session: TrainingSession, by: User) -> None:
         async_to_sync(_order)(session.pk, RemarkOrder(ACKNOWLEDGMENTS[Alarm(event.kind)], None, by))
 
 
+def stop_robot(session: TrainingSession, by: User) -> None:
+    """Stop the robot of a session, and of the others at its station.
+
+    Raises NotStored and OwnedElsewhere as `change_session` does.
+    """
+    async_to_sync(_stop_robot)(session.pk, by)
+
+
+async def _stop_robot(session_id: int, by: User) -> None:
+    live = runtime.current()
+    live.robots.stop(await live.session(session_id), by, {})
+
+
 async def _order(session_id: int, order: Order) -> None:
     in_server = runtime.peek() is not None  # else a command, which must not leave anything running
     live = runtime.current()
