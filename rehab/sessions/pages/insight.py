@@ -42,7 +42,7 @@ def show_insight(request: HttpRequest) -> HttpResponse:
         "summary": summarize_groups(found),
         "compared": KEYS[view.by][0],
         "period": PERIODS[view.weeks],
-        "goals": dict((key, label) for key, label, _count in view.bands).get(view.band),
+        "goals": {key: label for key, label, _count in view.bands}.get(view.band),
         "has_interval": any("width" in row["drawn"] for row in groups),
         "events": events[:LISTED],
         "noted": [one for one in view.shown if one.note][:LISTED],
