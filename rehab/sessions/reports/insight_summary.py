@@ -26,6 +26,8 @@ def summarize_groups(groups: Sequence[Group]) -> str:
         "worst": low[2],
         "low": format_rate(low[0]),
     }
+    if all(rate.low is None for _mean, rate, _label in rated):
+        return words  # the page says why none can be told apart
     return f"{words} {_tell_apart(high[1], low[1])}"
 
 
