@@ -132,7 +132,7 @@ def load_last_walked(user: User, now: datetime) -> list[tuple[TrainingSession, s
     walked = TrainingSession.objects.visible_to(user).filter(
         counted(), excluded=False, active_s__gt=0
     )
-    rows = with_metrics(user, walked.exclude(IS_OPEN)).select_related("patient", "clinic")
+    rows: Any = with_metrics(user, walked.exclude(IS_OPEN)).select_related("patient", "clinic")
     return [
         (
             one,

@@ -23,6 +23,8 @@ from rehab.training.changes import ChangeKind
 ANSWERED_WITHIN = timedelta(minutes=3)  # of a remark: what is done later has other reasons
 PAUSES = {ChangeKind.PAUSE.value, RuleEntry.PLANNED_REST.value, RuleEntry.HEART_RATE_LIMIT.value}
 ANSWERS = PAUSES | {Remark.REST.value, ChangeKind.FINISH.value, ChangeKind.ABORT.value}
+DRAWN: dict[str, str] = {Alarm.FALL.value: "fall", Alarm.ROBOT_STOP.value: "robot"}
+DRAWN |= {kind.value: name for kind, name in ICONS.items()}
 RESUMES = {ChangeKind.START.value, ChangeKind.RESUME.value}
 
 
@@ -41,7 +43,7 @@ class Entry:
     @property
     def icon(self) -> str:
         """The name of its drawing."""
-        return {Alarm.FALL: "fall", Alarm.ROBOT_STOP: "robot", **ICONS}[self.kind]
+        return DRAWN[self.kind]
 
     @property
     def is_counted(self) -> bool:
@@ -134,7 +136,7 @@ def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: Use
     if before and before[-1].kind in PAUSES:
         done = gettext("during a pause")
     elif after:
-        done = f"{EVENTS[after[0].kind]} {clinic_time(after[0].at, clinic):%H:%M}"  # type: ignore[index]
+        done = f"{EVENTS[after[0].kind]} {clinic_time(after[0].at, clinic):%H:%M}"
     else:
         done = gettext("walked on")
     if remark.by is None:
