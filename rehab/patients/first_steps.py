@@ -28,10 +28,11 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class FirstStep:
-    """A step: its name in addresses, its title, and what looks whether it is done."""
+    """A step: its name in addresses, its title, what it is for, and what looks if it is done."""
 
     slug: str
     title: str | Promise
+    purpose: str | Promise
     look: Callable[[User, datetime], Found]
 
 
@@ -70,10 +71,30 @@ def _look_for_patient(user: User, now: datetime) -> Found:
 
 
 STEPS = (
-    FirstStep("station", gettext_lazy("Station"), _look_for_station),
-    FirstStep("tablet", gettext_lazy("Tablet"), _look_for_tablet),
-    FirstStep("sensor", gettext_lazy("Sensor"), _look_for_sensor),
-    FirstStep("patient", gettext_lazy("First patient"), _look_for_patient),
+    FirstStep(
+        "station",
+        gettext_lazy("Station"),
+        gettext_lazy("A place with its tablet, its sensor and its robot."),
+        _look_for_station,
+    ),
+    FirstStep(
+        "tablet",
+        gettext_lazy("Tablet"),
+        gettext_lazy("It shows the patient’s page, and is let in once."),
+        _look_for_tablet,
+    ),
+    FirstStep(
+        "sensor",
+        gettext_lazy("Sensor"),
+        gettext_lazy("Force plates, a worn sensor or a phone on the shin measure the steps."),
+        _look_for_sensor,
+    ),
+    FirstStep(
+        "patient",
+        gettext_lazy("First patient"),
+        gettext_lazy("A nickname and a code are enough to begin."),
+        _look_for_patient,
+    ),
 )
 
 

@@ -97,7 +97,12 @@ class OpenAlarms:
     def describe(self) -> Message:
         """Return them as the therapist's page gets them."""
         alarms = [
-            {"kind": event.kind, "at": event.at.isoformat(), "reason": event.data.get("reason", "")}
+            {
+                "kind": event.kind,
+                "at": event.at.isoformat(),
+                "by": str(event.by or ""),
+                "reason": event.data.get("reason", ""),
+            }
             for event in self.events
         ]
         return {"alarms": alarms, "stop_reason": self.stop_reason}
@@ -127,6 +132,15 @@ def find_incidents(user: User, since: datetime) -> list[Incident]:
     for _, some in groupby(chosen.order_by("session_id", "pk"), attrgetter("session_id")):
         found += fold_incidents(some)
     return sorted(found, key=lambda one: one.raised.at, reverse=True)
+
+
+def check_no_open_fall(session_id: int, now: datetime) -> None:
+    """Raise NotAllowed where a fall of a session's patient is open, in whichever session."""
+    rows = SessionEvent.everywhere.filter(
+        session__patient__sessions=session_id, kind__in=ALARM_KINDS, at__gte=now - SHOWN_FOR
+    )
+    for _, some in groupby(rows.order_by("session_id", "pk"), attrgetter("session_id")):
+        OpenAlarms(some).check_seen_to_fall()
 
 
 def fold_incidents(events: Iterable[SessionEvent]) -> list[Incident]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import AsyncIterator, Iterable, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
 
@@ -231,11 +232,31 @@ def acknowledge(session: TrainingSession, by: User) -> None:
         async_to_sync(_order)(session.pk, RemarkOrder(ACKNOWLEDGMENTS[Alarm(event.kind)], None, by))
 
 
+def stop_robot(session: TrainingSession, by: User) -> None:
+    """Stop the robot of a session, and of the others at its station.
+
+    Raises NotStored and OwnedElsewhere as `change_session` does.
+    """
+    async_to_sync(_stop_robot)(session.pk, by)
+
+
+async def _stop_robot(session_id: int, by: User) -> None:
+    async with _running() as live:
+        live.robots.stop(await live.session(session_id), by, {})
+
+
 async def _order(session_id: int, order: Order) -> None:
-    in_server = runtime.peek() is not None  # else a command, which must not leave anything running
+    async with _running() as live:
+        await live.order(session_id, order)
+
+
+@asynccontextmanager
+async def _running() -> AsyncIterator[runtime.Runtime]:
+    """Return the server's runtime; of a command one that leaves nothing running."""
+    in_server = runtime.peek() is not None
     live = runtime.current()
     try:
-        await live.order(session_id, order)
+        yield live
     finally:
         if not in_server:
             await live.drain()

@@ -16,6 +16,7 @@ from rehab.sessions.pages import (
     screen_size,
     session,
     setup,
+    stations,
     tablet,
     walk,
     words,
@@ -53,6 +54,8 @@ urlpatterns = [
         name="add-questionnaire",
     ),
     path("sessions/<int:session_id>/replay/", replay.show_replay, name="replay"),
+    path("stations/", stations.list_stations, name="stations"),
+    path("sessions/<int:session_id>/robot/stop/", stations.stop_robot_of, name="stop-robot"),
     path("alarms/", alarms.show_alarms, name="alarms"),
     path(
         "sessions/<int:session_id>/alarms/seen/",

@@ -13,7 +13,6 @@ urlpatterns = [
     path("certificate/garry.crt", https.download_certificate, name="certificate-file"),
     path("sensor/", phones.show_sensor, name="sensor"),
     path("sensor/trial.json", phones.trial_walk, name="trial-walk"),
-    path("stations/", stations.list_stations, name="stations"),
     path("stations/new/", stations.edit_station, name="new-station"),
     path("stations/<int:station_id>/", stations.edit_station, name="edit-station"),
     path("stations/<int:station_id>/devices/", stations.add_device, name="new-device"),

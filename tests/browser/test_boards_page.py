@@ -116,7 +116,7 @@ def walk_a_demo(pt: Page, tablet: Page) -> None:
     pt.goto("/start/")
     pt.click("text=Try a demo")
     pt.click("text=Change something")
-    pt.click("text=Therapist’s page")
+    pt.click("[name=then][value=monitor]")
     tablet.wait_for_selector("body[data-look=ready]")
     pt.click("[data-main]")
     tablet.wait_for_function("() => document.body.dataset.step >= 6")

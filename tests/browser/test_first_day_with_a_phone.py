@@ -145,7 +145,7 @@ def test_from_the_first_start_to_a_leg_that_walks(new_clinic: Server, browser: B
     day.walk(phone, tablet)
     day.check(MOST_HERE)
     day.pt.click("[data-robot=stop]")  # of a robot that nobody has
-    expect(day.pt.locator("[data-show=robot-stop]")).to_have_text("No robot here")
+    expect(day.pt.locator("[data-show=no-robot]")).to_have_text("No robot here")
     expect(day.pt.locator("[data-robot=arm]")).to_be_hidden()
     expect(day.pt.locator("[data-show=robot-why]")).to_have_text("")
     steps = read_steps(new_clinic, 1)

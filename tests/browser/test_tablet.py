@@ -21,7 +21,8 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         pt, tablet = visit("/start/", size="laptop"), alone.new_page()
         set_screen(tablet, "tablet-portrait")
         tablet.goto("/tablet/")
-        pt.click("text=Tablets")
+        pt.click("text=Stations")
+        pt.click("text=Let a tablet in")
         pt.fill("#code", tablet.inner_text(".code").lower())
         pt.click("text=It shows this code")
         expect(pt.locator(".notes")).to_contain_text("belongs to Station 1")
@@ -31,7 +32,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         assert patients["y"] == pytest.approx(notes["y"] + notes["height"], abs=1)  # no gap
         pt.get_by_role("button", name="Try a demo").click()
         pt.click("text=Change something")
-        pt.click("text=Therapist’s page")
+        pt.click("[name=then][value=monitor]")
         tablet.wait_for_selector("body[data-look=ready]")
         expect(tablet.locator("header b")).to_have_text("Demo")
         assert not tablet.is_visible("[data-change=start]")  # that is the therapist's
@@ -50,7 +51,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         pt.goto("/start/")  # somebody else is next, while these scores are still shown
         pt.click("text=Try a demo")
         pt.click("text=Change something")
-        pt.click("text=Therapist’s page")
+        pt.click("[name=then][value=monitor]")
         pt.wait_for_selector("[data-main]:not([disabled])")
         asked_at = time.monotonic()
         tablet.wait_for_selector("body[data-look=ready]")

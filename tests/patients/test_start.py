@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 import pytest
 
+from rehab.patients.visits import Visit, plan_visit
 from rehab.people.models import Patient
-from tests.support.walks import make_patient
-from tests.support.world import World
+from tests.support.clock import HERE
+from tests.support.walks import HIT, make_patient, walk
+from tests.support.world import NOW, World
 
 pytestmark = pytest.mark.django_db
 
@@ -27,3 +31,24 @@ def test_patients_are_found_by_name_or_code(pt, patient):
     for words in ("ros", "K7-2"):
         assert "Rosa" in pt.get("/start/", {"q": words}).content.decode()
     assert "No patient is called" in pt.get("/start/", {"q": "xyz"}).content.decode()
+
+
+def test_who_is_late_is_not_proposed(pt, world, patient):
+    Visit.everywhere.all().delete()
+    plan_visit(patient, HERE.date(), (HERE - timedelta(hours=1)).time())
+    page = pt.get("/start/")
+    assert "late" in page.content.decode()
+    assert "next" not in page.context
+    later = make_patient(world.clinic, "Omar", code="K7-300")
+    plan_visit(later, HERE.date(), (HERE + timedelta(hours=1)).time())
+    assert pt.get("/start/").context["next"].patient == later
+
+
+def test_the_last_sessions_are_listed_with_their_hits(pt, patient):
+    session = walk(patient, "positive", [HIT, HIT], now=NOW)
+    type(session).everywhere.filter(pk=session.pk).update(active_s=540)
+    listed = pt.get("/start/").context["lately"]
+    first, day, rate = listed[0]
+    assert (first, day, rate) == (session, "today", "100\xa0%")
+    type(session).everywhere.filter(pk=session.pk).update(excluded=True)
+    assert session.pk not in [one.pk for one, *_ in pt.get("/start/").context["lately"]]

@@ -71,7 +71,7 @@ SILENT = {
     ),
     *("check-recording", "add-recording-part", "first-steps", "first-steps-state"),
     "trial-state",
-    *("stations", "new-station", "edit-station", "new-device"),
+    *("new-station", "edit-station", "new-device"),
     *("own-sign-ins", "end-sign-ins", "help", "help-page", "problem-report"),
     *("studies", "new-study", "plan-study", "study-protocol", "study-protocol-pdf"),
     *("study-power", "study-size"),

@@ -129,6 +129,33 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
         assert "Robot stopped by itself" in text
 
 
+def test_what_is_counted_is_listed_with_what_was_done_then(world, session):
+    by = world.people[Role.PT]
+    note(session, "pain", value=0)  # none
+    note(session, "near_fall", by=by)
+    assert f"noted by {by} · walked on" in seen(client_of(world), "incidents")
+    note(session, "pain", value=6)
+    note(session, "pause")
+    note(session, "dizziness")
+    listed = words(seen(client_of(world), "incidents"))
+    assert "Falls 0 Robot stopped by itself 0 Near fall 1 Pain 1 Dizziness 1" in listed
+    for line in (
+        f"Iris: near fall {{}} noted by {by} · pause {NOW:%H:%M}",
+        f"Iris: pain 6 of 10 {{}} pause {NOW:%H:%M}",
+        "Iris: dizziness {} during a pause",
+    ):
+        assert re.search(re.escape(line).replace(r"\{\}", r"[^:]* \d\d:\d\d"), listed), line
+    assert "pain 0" not in listed
+
+
+def test_what_was_only_simulated_is_listed_and_not_counted(world, session):
+    TrainingSession.everywhere.filter(pk=session.pk).update(simulated=True)
+    note(session, "fall")
+    listed = words(seen(client_of(world), "incidents"))
+    assert "Falls 0" in listed
+    assert "· simulated" in listed
+
+
 def test_a_withdrawn_fall_is_no_mark(world, session):
     note(session, "fall")
     note(session, "fall_withdrawn")

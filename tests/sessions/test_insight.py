@@ -11,6 +11,7 @@ from scipy import stats
 from rehab.people.models import Patient
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.reports.insight import Walked, compare, goal_bands
+from rehab.sessions.reports.insight_summary import summarize_groups
 from rehab.sessions.reports.intervals import mean_interval
 from tests.support.world import NOW, client_of
 
@@ -57,6 +58,30 @@ def test_several_patients_are_compared_by_their_means(world):
     changed = [*rows, walked_like(world.session, changed_to="binary", hit_rate=1.0)]
     types = [(one.label, one.valence) for one in compare(changed, "type")]
     assert types == [("Positive", "positive"), ("changed during the session", "")]
+
+
+@pytest.mark.parametrize(
+    ("rates", "told"),
+    [
+        (((0.8, 0.82, 0.81), (0.3, 0.31, 0.29)), "Their intervals do not overlap."),
+        (((0.8, 0.2, 0.81), (0.3, 0.31, 0.29)), "Their intervals overlap"),
+        (((0.8,), (0.3, 0.31, 0.29)), "Too few for intervals of both"),
+        (((0.8,), (0.3, 0.3)), "Lowest: Negative, 30 %."),
+        (((0.8, 0.7),), ""),
+    ],
+)
+def test_a_sentence_says_what_the_table_shows(world, rates, told):
+    types = [
+        walked_like(world.session, valence=valence, hit_rate=rate)
+        for valence, of_type in zip(("positive", "negative"), rates, strict=False)
+        for rate in of_type
+    ]
+    sentence = summarize_groups(compare(types, "type"))
+    assert told in sentence.replace("\xa0", " ")
+    assert bool(told) is bool(sentence)
+    if told:
+        assert sentence.startswith("Highest: Positive, ")
+        assert "Lowest: Negative, 30 %" in sentence.replace("\xa0", " ")
 
 
 def test_page_tells_what_went_wrong_and_leads_to_the_moment(world):

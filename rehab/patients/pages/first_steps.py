@@ -57,6 +57,9 @@ def first_steps(request: HttpRequest) -> HttpResponse:
     context: dict[str, Any] = {
         "steps": [(step, found[step.slug], step.slug in skipped) for step in STEPS],
         "slug": slug,
+        "following": next(
+            (one for one in STEPS if one.slug in open_ones and one.slug != slug), None
+        ),
         "now": found.get(slug),
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
     }

@@ -22,20 +22,29 @@ from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.consent.services import current_text
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.people.simulated import counted
 from rehab.sessions.alarms import Alarm, open_alarms
 from rehab.sessions.feedback_text_updates import change_language
-from rehab.sessions.formatting import clinic_time, format_day, format_number, format_quantity
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_day,
+    format_number,
+    format_quantity,
+    format_rate,
+)
 from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
-from rehab.sessions.reports.trend import load_trend, summarize_trend
+from rehab.sessions.reports.day.today import IS_OPEN
+from rehab.sessions.reports.trend import load_trend, summarize_trend, with_metrics
 from rehab.sessions.spark import draw_spark
 from rehab.stations.builtin import first_station
 from rehab.stations.tablets import has_tablet
 from rehab.training.changes import OPEN_STATES
 
 MAX_PATIENTS = 60  # patients on one page
+MAX_LAST_WALKED = 4  # sessions on the start page
 MAX_PROGRESS = 10  # sessions in the line on a patient's page
 DEMO_CODE = "demo"
 
@@ -118,6 +127,22 @@ def load_progress(user: User, patient: Patient, now: datetime) -> dict[str, Any]
     }
 
 
+def load_last_walked(user: User, now: datetime) -> list[tuple[TrainingSession, str, str]]:
+    """Return the clinic's last sessions, each with its day and its hit rate."""
+    walked = TrainingSession.objects.visible_to(user).filter(
+        counted(), excluded=False, active_s__gt=0
+    )
+    rows: Any = with_metrics(user, walked.exclude(IS_OPEN)).select_related("patient", "clinic")
+    return [
+        (
+            one,
+            format_day(clinic_time(one.began_at, one.clinic).date(), now.date()),
+            format_rate(one.metric_hit_rate),
+        )
+        for one in rows.order_by("-created_at", "-pk")[:MAX_LAST_WALKED]
+    ]
+
+
 @for_roles(Role.LEAD, Role.PT)
 @never_cache  # so that going back shows the present state
 @require_safe
@@ -129,9 +154,10 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
         "q": query,
         "first_steps": list_first_steps(request),
     }
+    context["lately"] = load_last_walked(user, context["now"])
     coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
-    if coming:
-        following = next((row for row in coming if not row.is_late), coming[0])
+    following = next((row for row in coming if not row.is_late), None)
+    if following is not None:  # who is late may not come: one tap in the list, when they do
         context |= {"next": following} | begin_context(user, following.patient)
     return render(request, "patients/start.html", context)
 

@@ -13,7 +13,8 @@ from django.utils import timezone
 from msgspec import Struct
 
 from rehab.people.models import User
-from rehab.sessions.alarms import ACKNOWLEDGMENTS
+from rehab.sessions.alarms import ACKNOWLEDGMENTS, check_no_open_fall
+from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.host import Host
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.session.loading import find_newest_open
@@ -62,6 +63,7 @@ async def carry_out(host: Host, session_id: int, order: Order) -> None:
 async def _change(host: Host, live: LiveSession, order: ChangeOrder) -> None:
     if CONTROLS[order.kind].leads_to is State.RUNNING:
         _check_room(host, live)
+        await _check_no_open_fall(host, live)
         if live.source_clock is not None:
             live.source_clock.resume()
     await live.change(Change(order.kind, order.value), order.by, timezone.now())
@@ -72,6 +74,17 @@ async def _change(host: Host, live: LiveSession, order: ChangeOrder) -> None:
         waiting = await sync_to_async(find_newest_open)(live.station_id)
         if waiting is not None:
             host.announce(waiting, live.station_id)
+
+
+async def _check_no_open_fall(host: Host, live: LiveSession) -> None:
+    """Raise NotAllowed where the patient's fall is open, also in another session.
+
+    Steps and orders that come meanwhile take effect after this one.
+    """
+    with live.gate.closed():
+        await sync_to_async(check_no_open_fall)(live.id, timezone.now())
+    if host.sessions.get(live.id) is not live:
+        raise NotStored("It could not be stored. Try again.")
 
 
 def _check_room(host: Host, live: LiveSession) -> None:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from datetime import datetime, timedelta
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
-from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
 from rehab.people.access import clinic_of, for_roles, user_of
-from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.simulated import counted, is_counted
-from rehab.sessions.alarms import Alarm, Incident, find_incidents, open_alarms
+from rehab.people.simulated import counted
+from rehab.sessions.alarms import open_alarms
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.database.trouble import NotStored
-from rehab.sessions.log import EVENTS, Remark, SessionEvent
+from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.remarks import ADVERSE
+from rehab.sessions.reports.incident_list import count_adverse, list_adverse
 from rehab.sessions.services import acknowledge
 from rehab.training.changes import OPEN_STATES, State
 
@@ -68,41 +65,17 @@ def acknowledge_alarms(request: HttpRequest, session_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def list_incidents(request: HttpRequest) -> HttpResponse:
-    """List falls and robots that stopped by themselves: how they ended, and who saw them when."""
+    """List what went wrong: what was done then, how it ended, and who saw it when."""
     user, now = user_of(request), timezone.now()
     clinic, since = clinic_of(user), now - LISTED
-    incidents = find_incidents(user, since)
-    rows = [
-        (one, clinic_time(one.raised.at, clinic), one.ended and clinic_time(one.ended.at, clinic))
-        for one in incidents[:MAX_INCIDENTS]
-    ]
+    entries = list_adverse(user, since)
     walked = TrainingSession.objects.visible_to(user).filter(counted(), active_s__gt=0)
     sessions = walked.filter(created_at__gte=since).count()
     context = {
-        "rows": rows,
+        "entries": entries[:MAX_INCIDENTS],
         "now": clinic_time(now, clinic),
         "since": clinic_time(since, clinic),
-        "fall": Alarm.FALL.value,
         "sessions": sessions,
-        "figures": [
-            (gettext("Sessions"), sessions),
-            *_count_adverse(user, since, [one for one in incidents if one.was_one]),
-        ],
+        "figures": [(gettext("Sessions"), sessions), *count_adverse(entries)],
     }
     return render(request, "sessions/incidents.html", context)
-
-
-def _count_adverse(user: User, since: datetime, incidents: list[Incident]) -> list[tuple[str, int]]:
-    """Return how often each thing went wrong in sessions that count: incidents, then remarks."""
-    raised = Counter(
-        one.raised.kind for one in incidents if is_counted(one.raised.session.simulated)
-    )
-    remarks = SessionEvent.objects.visible_to(user).filter(
-        counted("session__"), kind__in=ADVERSE, at__gte=since
-    )
-    noted = Counter(remarks.exclude(kind=Remark.PAIN, value=0).values_list("kind", flat=True))
-    return [
-        (gettext("Falls"), raised[Alarm.FALL]),
-        (gettext("Robot stopped by itself"), raised[Alarm.ROBOT_STOP]),
-        *((capfirst(str(EVENTS[kind])), noted[kind]) for kind in ADVERSE if kind != Remark.FALL),
-    ]

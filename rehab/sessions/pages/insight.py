@@ -13,6 +13,7 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
 from rehab.sessions.formatting import format_change, format_number, format_rate
 from rehab.sessions.reports.insight import ANY_GOAL, KEYS, PERIODS, Group, compare, read_view
+from rehab.sessions.reports.insight_summary import summarize_groups
 from rehab.sessions.reports.replay import start_of
 
 LISTED = 40  # events and notes, the newest
@@ -30,13 +31,18 @@ def show_insight(request: HttpRequest) -> HttpResponse:
         for adverse in one.adverse
     ]
     events.sort(key=lambda entry: entry[0].at, reverse=True)
-    groups = [_to_row(group) for group in compare(view.shown, view.by)]
+    found = compare(view.shown, view.by)
+    groups = [_to_row(group) for group in found]
     context = {
         "view": view,
         "any_goal": ANY_GOAL,
         "keys": {key: label for key, (label, *_functions) in KEYS.items()},
         "periods": PERIODS,
         "groups": groups,
+        "summary": summarize_groups(found),
+        "compared": KEYS[view.by][0],
+        "period": PERIODS[view.weeks],
+        "goals": {key: label for key, label, _count in view.bands}.get(view.band),
         "has_interval": any("width" in row["drawn"] for row in groups),
         "events": events[:LISTED],
         "noted": [one for one in view.shown if one.note][:LISTED],

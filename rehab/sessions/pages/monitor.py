@@ -24,6 +24,7 @@ from rehab.sessions.control_text import chart_marks
 from rehab.sessions.corrections import add_note
 from rehab.sessions.log import EVENTS, FallSeverity, Remark
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.remarks import ICONS
 from rehab.sessions.setup.options import OPTIONS
 from rehab.sessions.setup.walking_conditions import BELT_M_S, SUPPORT_PERCENT
 from rehab.training.changes import OPEN_STATES
@@ -37,15 +38,6 @@ ASSISTANCE_SHORT = {
     Remark.ORTHOSIS: pgettext_lazy("what helps to walk", "Orthosis"),
     Remark.HANDRAIL: pgettext_lazy("what helps to walk", "Rail"),
     Remark.HELPING_HAND: pgettext_lazy("what helps to walk", "Hand"),
-}
-# The icon of each remark that is noted and no more, in the order of the buttons. A fall does more.
-ICONS = {
-    Remark.REST: "rest",
-    Remark.PAIN: "pain",
-    Remark.DIZZINESS: "dizzy",
-    Remark.NEAR_FALL: "nearfall",
-    Remark.VERBAL_CUE: "voice",
-    Remark.BORG: "borg",
 }
 
 

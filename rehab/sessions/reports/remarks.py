@@ -20,6 +20,16 @@ ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
 ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # part of the fall, not of their own
 REMARKS = frozenset(Remark) - {*ABOUT_A_FALL, *ACKNOWLEDGMENTS.values()}
 
+# The icon of each remark that is noted and no more, in the order of the buttons. A fall does more.
+ICONS = {
+    Remark.REST: "rest",
+    Remark.PAIN: "pain",
+    Remark.DIZZINESS: "dizzy",
+    Remark.NEAR_FALL: "nearfall",
+    Remark.VERBAL_CUE: "voice",
+    Remark.BORG: "borg",
+}
+
 
 @dataclass(slots=True, eq=False)
 class Noted:

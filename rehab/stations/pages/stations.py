@@ -1,4 +1,4 @@
-"""The clinic's stations and their devices: named, added, given tokens, revoked."""
+"""Stations are named; their devices added, given tokens, revoked."""
 
 from __future__ import annotations
 
@@ -6,44 +6,20 @@ from typing import Any
 
 from django.contrib import messages
 from django.core.exceptions import PermissionDenied
-from django.db.models import Prefetch
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
+from django.views.decorators.http import require_http_methods, require_POST
 
-from rehab.people.access import clinic_of, for_roles, user_of
-from rehab.people.roles import Right, Role, rights_of
+from rehab.people.access import for_roles, user_of
+from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import renew_token
-from rehab.stations.builtin import first_station
-from rehab.stations.device_trust import with_trust
 from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import JUST_NOW, format_device_states
 from rehab.stations.sensor_programs import PROGRAMS
-
-
-@for_roles(Role.LEAD, Role.PT, patients=False)
-@require_safe
-def list_stations(request: HttpRequest) -> HttpResponse:
-    """List the clinic's stations with their devices, and how well each is heard."""
-    user, now = user_of(request), timezone.now()
-    first_station(clinic_of(user))
-    devices = (
-        with_trust(Device.objects.visible_to(user))
-        .select_related("approver")
-        .order_by("kind", "name")
-    )
-    stations = Station.objects.visible_to(user).prefetch_related(Prefetch("devices", devices))
-    context = {
-        "lately": now - JUST_NOW,
-        "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
-        "stations": [(one, format_device_states(list(one.devices.all()), now)) for one in stations],
-    }
-    return render(request, "stations/stations.html", context)
 
 
 @for_roles(Role.LEAD, patients=False)

@@ -50,6 +50,7 @@ function describeFall(session, { robot }) {
   const { station } = document.getElementById("monitor").dataset;
   const cure = `${_("Stay with the patient and call for help.")} ${_("If the belt still runs, stop it by hand.")}`;
   const facts = [
+    alarm.by && fill(_("Noted by %(who)s at %(time)s"), { who: alarm.by, time: timeOf(alarm) }),
     minutesAgo(alarm.at),
     session.state === "paused" && _("Paused"),
     robot.isHere && robot.isStopped && _("Robot stopped"),

@@ -162,8 +162,10 @@ export class RobotPanel {
   draw() {
     const { show } = this.#page;
     show("robot-state", this.#describeState());
-    const stopped = this.isHere ? _("Robot stopped") : _("No robot here");
-    show("robot-stop", this.isStopped ? stopped : _("Stop robot"));
+    const isAbsent = this.isStopped && !this.isHere; // nothing to stop any more: plain words
+    show("no-robot", isAbsent ? _("No robot here") : "");
+    show("robot-stop", this.isStopped ? _("Robot stopped") : _("Stop robot"));
+    this.#button("stop").hidden = isAbsent;
     this.#button("stop").classList.toggle("done", this.isStopped);
     this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
     show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");

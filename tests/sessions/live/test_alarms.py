@@ -71,6 +71,27 @@ async def test_nothing_moves_before_a_fall_is_acknowledged(place, sourced):
     assert (await monitor.change("resume"))["type"] == "done"
 
 
+async def test_no_other_session_of_who_fell_starts_before_that(place, sourced, ready):
+    fallen, _ = await sourced(place)
+    monitor = await place.monitor(fallen).open()
+    await monitor.say(FELL)
+    await until_open(monitor, "fall")
+    await change(fallen, "finish")
+    waiting = await place.monitor(await ready(place)).open()
+    refused = await waiting.change("start")
+    assert "take care of the fall: its button" in refused["message"]
+    async with ThreadSensitiveContext():
+        await sync_to_async(acknowledge)(fallen, place.pt)
+    assert (await waiting.change("start"))["type"] == "done"
+
+
+async def test_a_session_does_not_start_with_its_own_fall(place, ready):
+    monitor = await place.monitor(await ready(place)).open()
+    await monitor.say(FELL)
+    await until_open(monitor, "fall")
+    assert "take care of the fall" in (await monitor.change("start"))["message"]
+
+
 async def test_a_withdrawn_fall_takes_back_no_earlier_one(place, sourced):
     session, _ = await sourced(place)
     monitor = await place.monitor(session).open()

@@ -78,7 +78,7 @@ class SessionAggregate:
         marked = SessionEvent.everywhere.filter(session=session, kind__in=kinds_with_marks())
         aggregate.add_marks(reversed(marked.order_by("-pk")[:MARKS]))
         alarms = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS)
-        aggregate.alarms = OpenAlarms(alarms.order_by("pk"))
+        aggregate.alarms = OpenAlarms(alarms.select_related("by").order_by("pk"))
         noted = SessionEvent.everywhere.filter(session=session, kind__in=CONDITIONS)
         for kind, value in noted.order_by("pk").values_list("kind", "value"):
             if value is not None:
@@ -134,7 +134,7 @@ class SessionAggregate:
         """
         control = CONTROLS[change.kind]
         control.check_lock(self.fold.plan, change.value)
-        if change.kind == ChangeKind.RESUME:
+        if control.leads_to is State.RUNNING:
             self.alarms.check_seen_to_fall()
         old = control.value_for_log(self.fold)
         self.fold.change(change)

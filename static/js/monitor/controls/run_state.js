@@ -36,7 +36,7 @@ export function createRunState({ state, show, onPress, change }) {
 
   function drawButtons(session) {
     const [kind, label, iconId] = MAIN[session.state] ?? [""];
-    const waits = kind === "resume" && hasFallen(session);
+    const waits = ["start", "resume"].includes(kind) && hasFallen(session);
     end.disabled = !kind;
     main.disabled = !kind || waits;
     const drawn = `${kind} ${waits}`;

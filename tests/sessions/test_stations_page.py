@@ -1,0 +1,42 @@
+"""The page of the clinic's stations: who walks there, and the robot's stop."""
+
+from __future__ import annotations
+
+import pytest
+from django.urls import reverse
+
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.roles import Role
+from rehab.sessions.log import SessionEvent
+from rehab.stations.models import Station
+from tests.support.page_text import plain, words
+from tests.support.world import build_world, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+def test_a_station_says_who_walks_there_and_its_robot_is_stopped(transactional_db, world):
+    session = world.session
+    station = world.rows[Station]
+    type(session).everywhere.filter(pk=session.pk).update(station=station, state="running")
+    pt = client_of(world)
+    page = pt.get(reverse("stations")).content.decode()
+    assert f"{session.patient.nickname}, running" in words(plain(page))
+    assert reverse("monitor", args=[session.pk]) in page
+    address = reverse("stop-robot", args=[session.pk])
+    assert address in page
+    assert client_of(build_world("oak")).post(address).status_code == 404
+    assert not SessionEvent.everywhere.filter(session=session, kind="robot_stop").exists()
+
+    answer = pt.post(address, follow=True)
+    assert f"Robot stopped: {station}." in plain(answer.content.decode())
+    stop = SessionEvent.everywhere.get(session=session, kind="robot_stop")
+    assert stop.by == world.people[Role.PT]
+    assert AuditEntry.everywhere.filter(act="robot_stop", by_id=stop.by_id).exists()
+
+
+def test_the_robot_of_a_session_that_has_ended_is_not_stopped(world):
+    session = world.session
+    type(session).everywhere.filter(pk=session.pk).update(state="finished")
+    address = reverse("stop-robot", args=[session.pk])
+    assert client_of(world).post(address).status_code == 404
