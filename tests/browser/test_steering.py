@@ -127,7 +127,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
             expect(legend).to_contain_text(told)
         monitor.locator("[data-main]").click()
         expect(monitor.locator("[data-alarm=why]")).to_have_text("Paused by the therapist.")
-        expect(tablet.locator(".sub")).to_contain_text("Rest once you stand safely.")
+        expect(tablet.locator(".sub")).to_contain_text("Walk until the belt stops.")
         expect(monitor.locator("[data-presence=source]")).to_contain_text("✓ 14 of 14 valid")
 
 
@@ -192,7 +192,7 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
         expect(monitor.locator("[data-alarm=restart]")).to_have_text(
             "The server was restarted; nothing was lost. Resume when ready."
         )
-        expect(tablet.locator(".sub")).to_contain_text("Rest once you stand safely.")
+        expect(tablet.locator(".sub")).to_contain_text("Walk until the belt stops.")
         monitor.locator("[data-main]").click()
         expect(monitor.locator("[data-alarm=restart]")).to_have_count(0)
         expect(tablet.locator("body")).not_to_have_attribute("data-look", "paused")

@@ -48,7 +48,7 @@ function describeFall(session, { robot }) {
   if (!alarm) return "";
   const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
   const { station } = document.getElementById("monitor").dataset;
-  const cure = `${_("Stay with the patient and call for help.")} ${_("If the belt still runs, stop it by hand.")}`;
+  const cure = `${_("If the belt still runs, stop it by hand.")} ${_("Stay with the patient and call for help.")}`;
   const facts = [
     alarm.by && fill(_("Noted by %(who)s at %(time)s"), { who: alarm.by, time: timeOf(alarm) }),
     minutesAgo(alarm.at),

@@ -32,10 +32,10 @@ const SCENE = 188; // the thermometer's width
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
 
-// Return how much goes, by the largest size of words at each level.
-export function chooseLevel(size, isMeasured, isColumn) {
+// Return how much goes, by the largest size of words at each level, at least so much.
+export function chooseLevel(size, isMeasured, least) {
   const worth = (level) => (isMeasured ? ENOUGH : WORTH[level]);
-  let level = isColumn ? CHART : 0;
+  let level = least;
   while (level < LAST && size(level) < 1 && size(level) < worth(level) * size(LAST)) level++;
   return level;
 }
@@ -94,7 +94,8 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isWide ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const badge = level < CHART ? BESIDE_CHART : level < BADGE ? BADGE_LEAST : 0;
+    const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
+    const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
     // In the middle stands the thermometer, together with a total that is beside it.
@@ -150,7 +151,9 @@ export function createFitting(body, scene) {
     const frame = (level) => frameOf(level, samples, number);
     const sizes = [];
     const size = (level) => (sizes[level] ??= largest(level, frame));
-    const level = chooseLevel(size, Boolean(body.dataset.pxPerMm), Boolean(column));
+    // In the middle, or in a half, is no room for the chart; beside a thermometer in the middle none for the badge.
+    const least = !column ? 0 : column === "center" && !landscape.matches ? BADGE : CHART;
+    const level = chooseLevel(size, Boolean(body.dataset.pxPerMm), least);
     set(level, size(level));
     const found = frame(level);
     if (!found) return; // a screen so small that nothing fits

@@ -36,7 +36,12 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "paused":
       return [
         _("Pause."),
-        sentences(_("Rest once you stand safely."), isAlone && _("Your therapist will start again."), safe),
+        sentences(
+          _("Walk until the belt stops."),
+          _("Then rest."),
+          isAlone && _("Your therapist will start again."),
+          safe,
+        ),
       ];
     case "ask":
       return [_("End this session?"), safe];
