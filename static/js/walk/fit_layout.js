@@ -22,6 +22,7 @@ const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 170;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const NARROW = 600; // the total has no room beside the thermometer: it is below it
+const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 260; // of the thermometer
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
@@ -88,7 +89,7 @@ export function createFitting(body, scene) {
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
     const isBelow = width < NARROW || (column === "center" && !isRow); // the total
-    const stand = bottom - (isBelow ? total : 0);
+    const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
@@ -96,7 +97,7 @@ export function createFitting(body, scene) {
     const goal = zero - (2 / 3) * (zero - top);
     const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (stand === bottom ? total : 0));
+    const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (isBelow ? 0 : total));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
     // In the middle stands the thermometer, together with a total that is beside it.
     const beside = isBelow ? 0 : wide + (badge && GAP + badgeWidth()) + GAP;
