@@ -134,9 +134,9 @@ FAR_BELOW = join(
     gettext_noop("Much below the goal."),
     gettext_noop("The goal is far up."),
     gettext_noop("A wide gap below."),
-    gettext_noop("Far below, points lost."),
+    gettext_noop("Still far below."),
     gettext_noop("Far below this time."),
-    gettext_noop("Low, points lost."),
+    gettext_noop("A long way to go."),
 )
 
 BELOW = join(
@@ -149,7 +149,7 @@ BELOW = join(
     gettext_noop("Not at the goal."),
     gettext_noop("Just under the goal."),
     gettext_noop("A bit below."),
-    gettext_noop("Below, points lost."),
+    gettext_noop("Not quite there."),
     gettext_noop("A little short."),
     gettext_noop("Close, but below."),
 )

@@ -17,7 +17,7 @@ const LEAST = 0.1; // of the promised size
 const HALVINGS = 8; // of the search for what fits
 
 const EDGE = 24; // of the screen
-const AIR = 16; // between words and goal line, goal line and badge
+const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 170;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
