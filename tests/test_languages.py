@@ -39,7 +39,7 @@ ALIKE_IN = {
     "de": "arm code codes design feedback hand hedges index minus monitor name normal passkey "
     "patient pause person phase plan plus sensor start tablet tablets training",
     "fr": "cadence code correction corrections date description distance effort incident incidents "
-    "migrations minutes moment normal options pages participant participants patient patients "
+    "menu migrations minutes moment normal options pages participant participants patient patients "
     "pause performance phase phases phrases plan plus point points position questionnaire "
     "questionnaires questions robot signature source test total type variation version",
 }
