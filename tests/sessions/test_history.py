@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 
 import pytest
 from django.test import Client
@@ -75,21 +75,25 @@ def test_only_a_type_that_changed_is_pointed_out(client, patient):
 
 def test_pain_and_what_else_happened_is_pointed_out(client, patient):
     session = walk(patient, "positive", [HIT] * 4)
-    for kind, value in (
-        (Remark.BELT_SPEED, 0.7),
-        (Remark.PAIN, 3),
-        (Remark.FALL, None),
-        (Remark.FALL_WITHDRAWN, None),
-        (Remark.REST, None),
+    for kind, value, after in (
+        (Remark.BELT_SPEED, 0.7, 1),
+        (Remark.REST, None, 3),
+        (Remark.PAIN, 3, 2),
+        (Remark.FALL, None, 3),
+        (Remark.FALL_WITHDRAWN, None, 3),
     ):
         SessionEvent.everywhere.create(
-            session=session, kind=kind, value=value, after_number=2, at=session.began_at
+            session=session,
+            kind=kind,
+            value=value,
+            after_number=after,
+            at=NOW + timedelta(seconds=after),
         )
     marks = read_json(detail(client, session), "session")["marks"]
-    assert [(mark["after"], mark["kind"]) for mark in marks] == [(2, "pain"), (2, "rest")]
+    assert [(mark["after"], mark["kind"]) for mark in marks] == [(2, "pain"), (3, "rest")]
     played = words(client.get(reverse("replay", args=[session.pk])).content.decode())
     assert "Pain 3 of 10" in marks[0]["words"]
-    assert marks[0]["words"] in played
+    assert played.index("Started") < played.index(marks[0]["words"]) < played.index("Finished")
 
 
 def test_the_mean_and_its_change_come_first(client, patient):

@@ -55,7 +55,7 @@ class SessionReview:
     """A session with its figures (``training.summary``), its events and the data of its chart.
 
     ``rows`` are all events of its log, ``events`` those without gestures and decisions of the
-    robot, ``gestures`` is the number of gestures that the robot began.
+    robot by time, ``gestures`` is the number of gestures that the robot began.
     """
 
     figures: dict[str, Any]
@@ -83,6 +83,7 @@ def review_session(user: User, session: TrainingSession) -> SessionReview:
         for row in rows
         if row.kind not in ROBOT_ACTIVITY
     ]
+    events.sort(key=lambda entry: entry.at)  # what was noted afterwards stands where it happened
     gestures = sum(
         event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
         for event in rows
@@ -158,7 +159,7 @@ def stride_chart(
         ],
         "marks": [
             {"after": entry.event.after_number, "kind": entry.event.kind, "words": entry.text}
-            for entry in events
+            for entry in sorted(events, key=lambda entry: entry.event.after_number)
             if entry.event.kind in marked
             or entry.event.pk in noted
             or _is_switch(entry.event, fold)
