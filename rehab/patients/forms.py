@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 from django import forms
 from django.core.exceptions import ValidationError
@@ -14,7 +14,7 @@ from rehab.people.access import clinic_of
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import offered_purposes, record_boards_consent, record_consent
 from rehab.people.field_policy import details
-from rehab.people.models import BoardsConsent, EndReason, ErasureReason, Patient, User
+from rehab.people.models import SIDES, BoardsConsent, EndReason, ErasureReason, Patient, User
 from rehab.people.ranges import say_ranges
 
 
@@ -82,13 +82,15 @@ class PatientForm(_SpokenForm):
         model = Patient
         fields: ClassVar = [*details(Patient), "language"]
         field_classes: ClassVar = {"stroke_month": MonthField}
+        widgets: ClassVar = {"paretic_side": forms.RadioSelect}
 
     def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
         super().__init__(*args, **options)
         self.instance.clinic = clinic_of(by)
         self._by, self._now = by, now
         self.offer_language()
-        self.fields["paretic_side"].required = True
+        side = cast("forms.ChoiceField", self.fields["paretic_side"])
+        side.required, side.choices = True, SIDES
         self.fields["nickname"].widget.attrs["autofocus"] = True
         if self.instance.is_new:
             self.fields["agrees"] = forms.MultipleChoiceField(

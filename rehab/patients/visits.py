@@ -27,6 +27,7 @@ MAX_AHEAD = timedelta(days=366)
 MAX_WEEKS = 26  # of visits that are planned at once
 QUARTER_MIN = 15
 LATE_AFTER = timedelta(minutes=10)  # of a visit's time
+MISSED_AFTER = timedelta(hours=3)  # who is not here then will hardly come
 
 
 class InvalidVisitDay(ValueError):
@@ -80,6 +81,7 @@ class PatientToday:
     progress: Progress
     walked_s: float = 0.0
     is_late: bool = False
+    is_missed: bool = False  # late for so long that the patient will hardly come
 
 
 PROGRESS_OF_OPEN = {
@@ -127,9 +129,12 @@ def next_visit(patient_id: int, after: datetime) -> Visit | None:
     return planned.exclude(day=after.date(), at__lt=after.time()).order_by("day", "at").first()
 
 
-def is_late(at: time | None, now: datetime) -> bool:
-    """Return whether who is expected today at a time should be here. Both in the clinic's zone."""
-    return at is not None and datetime.combine(now.date(), at, now.tzinfo) + LATE_AFTER < now
+def is_late(at: time | None, now: datetime, by: timedelta = LATE_AFTER) -> bool:
+    """Return whether who is expected today at a time is late by more than some time.
+
+    Both times are in the clinic's zone.
+    """
+    return at is not None and datetime.combine(now.date(), at, now.tzinfo) + by < now
 
 
 def suggested_time(user: User, patient: Patient, now: datetime) -> time | None:
@@ -192,4 +197,5 @@ def _to_row(
         progress[-1] if progress else ended,
         sum(session.active_s for session in sessions),
         not sessions and is_late(at, now),
+        not sessions and is_late(at, now, by=MISSED_AFTER),
     )

@@ -121,7 +121,7 @@ def test_step_5_of_a_labs_first_day(page, server, browser, file):
     page.locator("[name=nickname]").fill(f"Test {kg}")
     page.locator("[name=code]").fill(f"T-{kg}")
     page.locator("[name=body_mass_kg]").fill(kg)
-    page.locator("[name=paretic_side]").select_option("left")
+    page.get_by_label("Left", exact=True).check()
     page.get_by_role("button", name="Continue").click()
     page.get_by_text("Ten minutes at 60 %").click()
     page.locator("label:has([name=goal_by][value=value])").click()

@@ -57,7 +57,7 @@ def test_today_stands_beside_last_time(world, patient):
     words = read(world, session)
     assert "You walked" in words
     assert "Today 7 of 10 Last time 4 of 10" in words
-    assert "Longest streak 5" in words
+    assert "Last time 4 of 10 More often at the goal than last time. 5 steps in a row" in words
     assert f"{day:%A} {day.day} {day:%B}, 14:15" in words
     assert "More often at the goal than last time." in words
 
@@ -102,7 +102,7 @@ def test_a_paired_tablet_tells_the_patient_the_same(world, patient):
     plan_visit(patient, (NOW + timedelta(days=7)).date(), time(14, 15))
     words = read(world, session, tablet_at(station))
     assert "Today 7 of 10 Last time 4 of 10" in words
-    assert "Longest streak so far 7" in words
+    assert "Longest so far 7 steps in a row" in words
     assert "Next visit" in words
 
 
@@ -110,9 +110,10 @@ def test_a_longer_row_than_ever_is_told_as_one(world, patient):
     walk(patient, "binary", [HIT] * 4 + [MISS], days_ago=9)
     walk(patient, "negative", [HIT] * 3 + [MISS] * 9, days_ago=7)
     words = read(world, walk(patient, "positive", [HIT] * 4 + [MISS], days_ago=5))
-    assert "Longest streak 4" in words
+    assert "4 steps in a row" in words
+    assert "Longest so far" not in words
     words = read(world, walk(patient, "positive", [HIT] * 6 + [MISS]))
-    assert "Longest streak so far 6" in words
+    assert "Longest so far 6 steps in a row" in words
 
 
 @pytest.mark.parametrize("valence", list(VALENCES))
@@ -133,6 +134,14 @@ def test_a_type_that_only_takes_points_praises_no_row(world, patient):
     assert "Today 9 of 10" in words
     assert "Next mark: " in words
     assert "in a row" not in words
+
+
+def test_a_value_that_nothing_compares_with_has_no_bar(world, patient):
+    ending = [
+        world.pt.get(reverse("ending", args=[walk(patient, "explicit", [HIT], days_ago=ago).pk]))
+        for ago in (7, 0)
+    ]
+    assert [page.content.decode().count('class="room"') for page in ending] == [0, 2]
 
 
 def test_the_explicit_type_shows_values_and_no_verdict(world, patient):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from rehab.people.consent.services import current_text
@@ -15,6 +17,20 @@ def test_the_words_are_shown_before_they_are_agreed_to(world):
     page = client_of(world).get("/patients/new/").content.decode()
     words = current_text(world.clinic).text.split("\n")[0]
     assert page.index(words[:40]) < page.index('name="agrees"')
+
+
+def test_the_paretic_side_is_chosen_and_never_proposed(world):
+    client, sides = client_of(world), re.compile(r'<input type="radio" name="paretic_side"[^>]*>')
+    found = sides.findall(client.get("/patients/new/").content.decode())
+    assert ["checked" in each for each in found] == [False, False]
+    Patient.everywhere.filter(pk=world.patient.pk).update(paretic_side="right")
+    page = client.get(f"/patients/{world.patient.pk}/details/").content.decode()
+    assert [("right" in each, "checked" in each) for each in sides.findall(page)] == [
+        (False, False),
+        (True, True),
+    ]
+    answer = client.post("/patients/new/", {"nickname": "Mia", "code": "M-1"})
+    assert answer.context["form"].errors.keys() == {"paretic_side"}
 
 
 @pytest.mark.parametrize(("chosen", "stored"), [({}, "de"), ({"language": "fr"}, "fr")])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from rehab.patients.screen_check import LEFT, LETTERS, RIGHT, SIZES, Proposal, propose
@@ -62,3 +64,10 @@ def test_nothing_is_set_before_the_therapist_saves(world):
     client.post(address, values | {"language": "es"})
     stored.refresh_from_db()
     assert (stored.screen_side, stored.language) == (ScreenSide.IN_RIGHT, "es")
+
+
+@pytest.mark.django_db
+def test_a_screen_that_was_not_measured_is_offered_to_be(world):
+    page = client_of(world).get(f"/patients/{world.patient.pk}/screen/check/").content.decode()
+    assert "Wear your usual glasses." in page
+    assert re.search(r'<a class="btn" href="[^"]+">Measure this screen first</a>', page)

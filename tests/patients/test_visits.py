@@ -52,6 +52,15 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     assert listed[1].walked_s == pytest.approx(130, abs=3)
 
 
+def test_who_is_late_for_hours_did_not_come(world):
+    for name, at in (("Ana", time(9, 0)), ("Bo", time(11, 55)), ("Cleo", time(8, 55))):
+        plan_visit(world.add_patient(name), HERE.date(), at)
+    noon = HERE.replace(hour=12, minute=0, second=0)
+    listed = patients_today(world.people[Role.PT], noon)
+    found = [(row.patient.nickname, row.is_late, row.is_missed) for row in listed]
+    assert found == [("Cleo", True, True), ("Ana", True, False), ("Bo", False, False)]
+
+
 def test_who_was_here_today_is_next_expected_another_day(world, pt):
     cleo = world.add_patient("Cleo")
     plan_visit(cleo, HERE.date(), time(9, 0))

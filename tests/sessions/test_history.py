@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 
 import pytest
 from django.test import Client
@@ -21,7 +21,7 @@ from rehab.sessions.formatting import (
     format_number,
     format_rate,
 )
-from rehab.sessions.log import RobotEntry, SessionEvent, Step
+from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.page_text import plain, read_json, words
@@ -71,6 +71,37 @@ def test_only_a_type_that_changed_is_pointed_out(client, patient):
     session = walk(patient, "positive", [2.3, *cancelled, 2.3, switched, 2.3], phases=phases)
     marks = read_json(detail(client, session), "session")["marks"]
     assert [(mark["after"], mark["kind"]) for mark in marks] == [(1, "valence"), (2, "valence_now")]
+
+
+def test_pain_and_what_else_happened_is_pointed_out(client, patient):
+    session = walk(patient, "positive", [HIT] * 4)
+    for kind, value, after in (
+        (Remark.BELT_SPEED, 0.7, 1),
+        (Remark.REST, None, 3),
+        (Remark.PAIN, 3, 2),
+        (Remark.FALL, None, 3),
+        (Remark.FALL_WITHDRAWN, None, 3),
+    ):
+        SessionEvent.everywhere.create(
+            session=session,
+            kind=kind,
+            value=value,
+            after_number=after,
+            at=NOW + timedelta(seconds=after),
+        )
+    marks = read_json(detail(client, session), "session")["marks"]
+    assert [(mark["after"], mark["kind"]) for mark in marks] == [(2, "pain"), (3, "rest")]
+    played = words(client.get(reverse("replay", args=[session.pk])).content.decode())
+    assert "Pain 3 of 10" in marks[0]["words"]
+    assert played.index("Started") < played.index(marks[0]["words"]) < played.index("Finished")
+
+
+def test_the_mean_and_its_change_come_first(client, patient):
+    phases = (make_phase("baseline", strides=2), make_phase("training"))
+    session = walk(patient, "positive", [2.0, 2.0, 2.2, 2.3], phases=phases)
+    told = words(detail(client, session))
+    assert "Mean with feedback 2.25 W/kg, +12 % from baseline 2.00" in told
+    assert told.index("Mean with feedback") < told.index("Hit rate") < told.index("points")
 
 
 def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
@@ -177,7 +208,7 @@ def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_as
     session = walk(patient, "binary", strides(2000, 1000))
     url = reverse("session", kwargs={"session_id": session.pk})
     client.get(url)  # what is seen is noted once in some minutes
-    with django_assert_num_queries(14):
+    with django_assert_num_queries(17):
         page = client.get(url).content.decode()
     assert len(read_json(page, "session")["strides"]["number"]) == 3000
     assert len(page) < 150_000

@@ -47,7 +47,7 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     assert f"{HERE:%A} {HERE.day} {HERE:%B %Y, %H:%M}" in words
     assert "Positive · left leg" in words
     assert "Hit rate 75 % wanted 60 %" in words
-    assert "Mean with feedback 2.25 W/kg +12 % from baseline 2.00 W/kg" in words
+    assert "Mean with feedback 2.25 W/kg, +12 % from baseline 2.00" in words
     assert "Strides, trained leg 9 1 does not count" in words
     changed = (NOW + timedelta(seconds=7)).astimezone(HERE.tzinfo)
     assert f"Goal 2.00 W/kg → 2.40 W/kg ({changed:%H:%M})" in words

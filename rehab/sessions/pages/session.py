@@ -22,7 +22,12 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.review import review_session
-from rehab.sessions.reports.summary import format_incidents, format_phases, format_summary
+from rehab.sessions.reports.summary import (
+    format_incidents,
+    format_mean,
+    format_phases,
+    format_summary,
+)
 from rehab.sessions.reports.text_note import write_text_note
 from rehab.sessions.robot_incidents import RobotIncident
 from rehab.training.changes import OPEN_STATES, State
@@ -61,11 +66,12 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "review": review,
         "incidents": _list_incidents(user, session) if by_name else [],
         "figures": [
+            format_mean(user, session),
             summary.hit_rate,
-            summary.score,
             summary.goal,
             summary.duration,
             summary.strides,
+            summary.score,
         ],
         "alarms": format_incidents(review, session),
         "phases": format_phases(review),

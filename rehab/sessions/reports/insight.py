@@ -87,10 +87,21 @@ class Group:
         """What its interval is of."""
         if self.hit_rate is None:
             return ""
-        count = self.hit_rate.count
-        if self.patients > 1:
-            return ngettext("%(count)s patient", "%(count)s patients", count) % {"count": count}
-        return ngettext("%(count)s session", "%(count)s sessions", count) % {"count": count}
+        say = _say_patients if self.patients > 1 else _say_sessions
+        return say(self.hit_rate.count)
+
+    @property
+    def size(self) -> str:
+        """How many sessions of how many patients."""
+        return f"{_say_sessions(self.sessions)}, {_say_patients(self.patients)}"
+
+
+def _say_sessions(count: int) -> str:
+    return ngettext("%(count)s session", "%(count)s sessions", count) % {"count": count}
+
+
+def _say_patients(count: int) -> str:
+    return ngettext("%(count)s patient", "%(count)s patients", count) % {"count": count}
 
 
 def load_walked(user: User, sessions: QuerySet[TrainingSession]) -> list[Walked]:

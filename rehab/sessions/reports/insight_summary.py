@@ -14,10 +14,11 @@ from rehab.sessions.reports.intervals import MeanInterval
 def summarize_groups(groups: Sequence[Group]) -> str:
     """Return which group's hit rate is highest and lowest, and whether their intervals differ.
 
-    Empty where there are no two groups with a hit rate.
+    Empty where there are no two groups with a hit rate, and where none has an interval: the page
+    then says that there is too little data, and no more.
     """
     rated = [(one.hit_rate.mean, one.hit_rate, one.label) for one in groups if one.hit_rate]
-    if len(rated) < 2:
+    if len(rated) < 2 or all(rate.low is None for _mean, rate, _label in rated):
         return ""
     high, low = max(rated, key=lambda one: one[0]), min(rated, key=lambda one: one[0])
     words = gettext("Highest: %(best)s, %(high)s. Lowest: %(worst)s, %(low)s.") % {
@@ -26,8 +27,6 @@ def summarize_groups(groups: Sequence[Group]) -> str:
         "worst": low[2],
         "low": format_rate(low[0]),
     }
-    if all(rate.low is None for _mean, rate, _label in rated):
-        return words  # the page says why none can be told apart
     return f"{words} {_tell_apart(high[1], low[1])}"
 
 

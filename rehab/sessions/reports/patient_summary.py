@@ -15,6 +15,7 @@ from typing import Any
 
 from django.db.models import Count, F, Max, Q, QuerySet, Sum
 from django.utils.translation import gettext as _
+from django.utils.translation import ngettext
 
 from rehab.people.models import Patient
 from rehab.sessions.formatting import (
@@ -44,11 +45,11 @@ FAMILY_COMPARED = 3  # sessions on either side of "before"
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A session's figure as a bar; ``percent`` of the bar's room."""
+    """A session's figure as a bar; ``percent`` of its room, None where nothing compares with it."""
 
     label: str
     value: str
-    percent: float
+    percent: float | None
 
 
 # --- at a session's end ---------------------------------------------------------------------------
@@ -123,10 +124,11 @@ def _find_facts(
     facts = []
     rows = SessionMetric.everywhere.filter(slug="best_streak")
     row = rows.filter(session=session).values_list("value", flat=True).first()
-    if rewards and row:
+    if rewards and row and row > 1:
         earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
-        label = _("Longest streak so far") if earlier and row > earlier else _("Longest streak")
-        facts.append((label, format_number(row, 0)))
+        words = ngettext("%(count)s step in a row", "%(count)s steps in a row", round(row))
+        label = _("Longest so far") if earlier and row > earlier else ""
+        facts.append((label, words % {"count": format_number(row, 0)}))
     count = before.count() + 1
     if is_milestone(count):
         facts.append((_("Sessions so far"), format_number(count, 0)))
@@ -284,11 +286,15 @@ def out_of_ten(rate: float) -> int:
 
 
 def draw_means(labeled: Sequence[tuple[str, Result]], unit: str) -> list[Bar]:
-    """Return labeled means as bars, the longest over all the room."""
+    """Return labeled means as bars, the longest over all the room; a single one has no length."""
     known = [(label, one.mean) for label, one in labeled if one.mean is not None]
     longest = max((mean for _label, mean in known), default=0.0)
     return [
-        Bar(label, format_quantity(mean, unit), round(100 * max(mean, 0.0) / longest, 1))
+        Bar(
+            label,
+            format_quantity(mean, unit),
+            round(100 * max(mean, 0.0) / longest, 1) if len(known) > 1 else None,
+        )
         for label, mean in known
         if longest > 0
     ]

@@ -14,7 +14,7 @@ from rehab.sessions.alarms import ACKNOWLEDGMENTS
 from rehab.sessions.formatting import format_number
 from rehab.sessions.log import EVENTS, FallSeverity, Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.noted_conditions import format_noted
+from rehab.sessions.noted_conditions import CONDITIONS, format_noted
 
 ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
 ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # part of the fall, not of their own
@@ -57,6 +57,11 @@ class Noted:
     def is_adverse(self) -> bool:
         """Whether something went wrong; a pain of 0 is none."""
         return self.kind in ADVERSE and not (self.kind == Remark.PAIN and self.value == 0)
+
+    @property
+    def is_told(self) -> bool:
+        """Whether it is something that happened, and not how the patient walked."""
+        return self.kind not in CONDITIONS
 
     @property
     def words(self) -> str:

@@ -14,7 +14,6 @@ from django.utils.translation import ngettext
 from rehab.people.models import User
 from rehab.sessions.formatting import (
     clinic_time,
-    format_change,
     format_number,
     format_quantity,
     format_rate,
@@ -29,11 +28,13 @@ from rehab.sessions.reports.report_chart import PAPER, PHONE, draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
 from rehab.sessions.reports.summary import (
     Figure,
+    SessionSummary,
     format_incidents,
+    format_mean,
     format_phases,
     format_summary,
 )
-from rehab.sessions.reports.trend import TrendPoint, load_trend
+from rehab.sessions.reports.trend import load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import WORN
 from rehab.training.plans import SessionPlan
@@ -51,10 +52,9 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
     """Return everything that the report shows of a session."""
     plan = session.to_plan()
     review = review_session(user, session)
-    ended = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
     phases, remarks = format_phases(review), _summarize_remarks(review.rows, session)
     return {
-        "figures": _list_figures(plan, review, ended[0] if ended else None),
+        "figures": _list_figures(format_summary(plan, review), format_mean(user, session)),
         "incidents": format_incidents(review, session),
         "goals": _describe_goals(plan, review),
         "phases": phases[:MAX_PHASES],
@@ -72,24 +72,11 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
     }
 
 
-def _list_figures(
-    plan: SessionPlan, review: SessionReview, point: TrendPoint | None
-) -> list[Figure]:
-    """Return the main figures in the order of the page, with the mean beside its baseline."""
-    summary = format_summary(plan, review)
-    with_feedback, baseline = (point.with_feedback, point.baseline) if point else (None, None)
-    unit = plan.measure.unit
-    note = _("no baseline")
-    if point and baseline:
-        values = {
-            "mean": format_quantity(baseline.mean, unit),
-            "change": format_change(point.change),
-        }
-        note = _("%(change)s from baseline %(mean)s") % values
-    mean = format_quantity(with_feedback.mean if with_feedback else None, unit)
+def _list_figures(summary: SessionSummary, mean: Figure) -> list[Figure]:
+    """Return the main figures in the order of the page."""
     return [
         summary.hit_rate,
-        Figure(_("Mean with feedback"), mean, note),
+        mean,
         replace(summary.strides, label=_("Strides, trained leg")),
         summary.duration,
         summary.score,

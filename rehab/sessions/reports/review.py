@@ -18,6 +18,7 @@ from rehab.sessions.log import FallSeverity, PartEntry, Remark, RobotEntry, Sess
 from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.noted_conditions import format_noted
+from rehab.sessions.reports.remarks import read_noted
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS, marked_kinds
@@ -54,7 +55,7 @@ class SessionReview:
     """A session with its figures (``training.summary``), its events and the data of its chart.
 
     ``rows`` are all events of its log, ``events`` those without gestures and decisions of the
-    robot, ``gestures`` is the number of gestures that the robot began.
+    robot by time, ``gestures`` is the number of gestures that the robot began.
     """
 
     figures: dict[str, Any]
@@ -82,6 +83,7 @@ def review_session(user: User, session: TrainingSession) -> SessionReview:
         for row in rows
         if row.kind not in ROBOT_ACTIVITY
     ]
+    events.sort(key=lambda entry: entry.at)  # what was noted afterwards stands where it happened
     gestures = sum(
         event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
         for event in rows
@@ -114,7 +116,7 @@ def _valence_label(slug: Any) -> str:
 def stride_chart(
     user: User, session: TrainingSession, fold: SessionFold, events: list[DescribedEvent]
 ) -> dict[str, Any]:
-    """Return the chart's data: strides of the trained leg by column, phases, and changes.
+    """Return the chart's data: strides of the trained leg by column, phases, changes and remarks.
 
     Values are as measured, so that means of them agree; ``goal`` is what a value had to reach, the
     goal by the gain. ``hit`` is None where nothing was judged. An invalid stride has no value, only
@@ -140,6 +142,7 @@ def stride_chart(
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
     phases = [(plan.phases[index], [number for _, number in run]) for index, run in runs]
     marked = marked_kinds()
+    noted = {one.event.pk for one in read_noted(entry.event for entry in events) if one.is_told}
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
@@ -156,8 +159,10 @@ def stride_chart(
         ],
         "marks": [
             {"after": entry.event.after_number, "kind": entry.event.kind, "words": entry.text}
-            for entry in events
-            if entry.event.kind in marked or _is_switch(entry.event, fold)
+            for entry in sorted(events, key=lambda entry: entry.event.after_number)
+            if entry.event.kind in marked
+            or entry.event.pk in noted
+            or _is_switch(entry.event, fold)
         ],
     }
 

@@ -8,16 +8,19 @@ from typing import Any
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
+from rehab.people.models import User
 from rehab.sessions.alarms import Alarm, Incident, fold_incidents
 from rehab.sessions.formatting import (
     MISSING,
     clinic_time,
+    format_change,
     format_duration,
     format_number,
     format_rate,
 )
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import SessionReview
+from rehab.sessions.reports.trend import load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
@@ -78,6 +81,26 @@ def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
             format_number(figures["strides"], 0),
             ", ".join(_describe_not_counted(not_counted, figures["late"])),
         ),
+    )
+
+
+def format_mean(user: User, session: TrainingSession) -> Figure:
+    """Return the mean of the phases with feedback, beside its baseline."""
+    ended = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
+    point = ended[0] if ended else None
+    if point is None or point.with_feedback is None:
+        return Figure(_("Mean with feedback"), MISSING, "")
+    change = _("no baseline")
+    if point.baseline:
+        values = {
+            "mean": format_number(point.baseline.mean),
+            "change": format_change(point.change),
+        }
+        change = _("%(change)s from baseline %(mean)s") % values
+    return Figure(
+        _("Mean with feedback"),
+        format_number(point.with_feedback.mean),
+        f"{session.measure.unit}, {change}",
     )
 
 

@@ -14,7 +14,6 @@ from rehab.sessions.formatting import MISSING, clinic_time
 from rehab.sessions.log import EVENTS
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.noted_conditions import (
-    CONDITIONS,
     MEASURED,
     format_noted,
     name_assistance,
@@ -65,7 +64,7 @@ def _values(
 ) -> dict[str, str]:
     figures = format_summary(session.to_plan(), review)
     began = clinic_time(session.began_at, session.clinic)
-    noted = [one for one in read_noted(review.rows) if one.kind not in CONDITIONS]
+    noted = [one for one in read_noted(review.rows) if one.is_told]
     values = {
         "day": f"{began:%Y-%m-%d}",
         "time": f"{began:%H:%M}",
