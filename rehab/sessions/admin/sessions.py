@@ -57,10 +57,10 @@ class TrainingSessionAdmin(ScopedAdmin):
     list_filter = (
         ("valence", TypeFilter),
         PeriodFilter,
-        SimulatedFilter,
         SessionSearchFilter,
         "state",
         "excluded",
+        SimulatedFilter,
     )
     search_fields = ("patient__nickname", "patient__code", "source")
     list_select_related = ("patient", "measure", "station", "clinic")
@@ -225,9 +225,11 @@ class TrainingSessionAdmin(ScopedAdmin):
             return None
         return gettext("%(score)s points") % {"score": format_number(session.metric_score, 0)}
 
-    @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
-    def hit_rate(self, session: Any) -> str:
+    @admin.display(description=_("hit rate"), ordering="metric_hit_rate", empty_value="")
+    def hit_rate(self, session: Any) -> str | None:
         """The share of hits."""
+        if session.metric_hit_rate is None:
+            return None
         return format_html("<b>{}</b>", format_rate(session.metric_hit_rate))
 
     @admin.display(description=_("counts"), ordering="excluded", boolean=True)

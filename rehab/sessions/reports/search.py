@@ -206,16 +206,16 @@ class SimulatedFilter(SimpleListFilter):
 
     title = _("Simulated")
     parameter_name = "also"
-    template = CHIPS
+    template = "admin/switch.html"  # the choice that is not in force
 
     def lookups(self, request: HttpRequest, model_admin: Any) -> list[tuple[str, Any]]:
         """Return the one that is asked for."""
-        return [("simulated", _("With simulated"))]
+        return [("simulated", _("Show simulated"))]
 
     def choices(self, changelist: Any) -> Iterator[Any]:
         """Return the usual choice, then the other."""
         first, *others = super().choices(changelist)
-        yield {**first, "display": _("Without simulated")}
+        yield {**first, "display": _("Hide simulated")}
         yield from others
 
     def queryset(self, request: HttpRequest, queryset: QuerySet[Any]) -> QuerySet[Any]:
