@@ -17,6 +17,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import user_of
 from rehab.people.roles import may_see_names
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
+from rehab.sessions.admin.filters import PeriodFilter, SimulatedFilter, TypeFilter
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
 from rehab.sessions.formatting import (
     clinic_time,
@@ -27,12 +28,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.search import (
-    PeriodFilter,
-    SessionSearchFilter,
-    SimulatedFilter,
-    TypeFilter,
-)
+from rehab.sessions.reports.search import SessionSearchFilter
 from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.robot_incidents import RobotIncident
 from rehab.sessions.step_columns import STEP_COLUMNS
@@ -147,7 +143,7 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("date"), ordering="created_at")
     def day(self, session: TrainingSession) -> str:
         """The day, and below it the time and the place."""
-        below = (self.start_time(session), session.station and session.station.name)
+        below = (self.start_time(session), session.station.name if session.station else None)
         return format_html(
             '{}<br><span class="muted s">{}</span>',
             date_format(self.date(session), "DATE_FORMAT"),

@@ -1,4 +1,4 @@
-"""What narrows the list of sessions: type, period, and a form of day, patient and figures."""
+"""The search form of sessions in the admin: by day, patient, station and figures."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from zoneinfo import ZoneInfo
 
 from django import forms
 from django.conf import settings
-from django.contrib.admin import ChoicesFieldListFilter, ListFilter, SimpleListFilter
+from django.contrib.admin import ListFilter
 from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db.models import QuerySet
 from django.db.models.functions import Coalesce
 from django.http import HttpRequest
-from django.utils import timezone
-from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -25,10 +23,7 @@ from rehab.people.models import Patient, User
 from rehab.people.ranges import NumberField
 from rehab.people.roles import may_see_names
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.insight import PERIODS
 from rehab.stations.models import Station
-
-CHIPS = "admin/chips.html"
 
 # Name in the form → the column, and how many units of the form are one unit of the column.
 RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal": ("goal", 1)}
@@ -162,62 +157,3 @@ class SessionSearchFilter(ListFilter):
             (_("Hit rate, %"), [form["hits_min"], form["hits_max"]]),
             (_("Goal"), [form["goal_min"], form["goal_max"]]),
         ]
-
-
-class TypeFilter(ChoicesFieldListFilter):
-    """The feedback types beside each other."""
-
-    template = CHIPS
-
-    def choices(self, changelist: Any) -> Iterator[Any]:
-        """Return all types, then each."""
-        first, *others = super().choices(changelist)
-        yield {**first, "display": _("All types")}
-        yield from others
-
-
-class PeriodFilter(SimpleListFilter):
-    """The last weeks."""
-
-    title = _("Period")
-    parameter_name = "weeks"
-    template = CHIPS
-
-    def lookups(self, request: HttpRequest, model_admin: Any) -> list[tuple[str, Any]]:
-        """Return the periods in weeks."""
-        return [(weeks, capfirst(label)) for weeks, label in PERIODS.items() if weeks]
-
-    def choices(self, changelist: Any) -> Iterator[Any]:
-        """Return all time, then the periods."""
-        first, *others = super().choices(changelist)
-        yield {**first, "display": PERIODS[""]}
-        yield from others
-
-    def queryset(self, request: HttpRequest, queryset: QuerySet[Any]) -> QuerySet[Any]:
-        """Return the period's sessions."""
-        weeks = self.value()
-        if weeks not in PERIODS:
-            return queryset
-        return queryset.filter(created_at__gte=timezone.now() - timedelta(weeks=int(weeks)))
-
-
-class SimulatedFilter(SimpleListFilter):
-    """Whether sessions that nobody walked are shown as well; they are not unless asked for."""
-
-    title = _("Simulated")
-    parameter_name = "also"
-    template = "admin/switch.html"  # the choice that is not in force
-
-    def lookups(self, request: HttpRequest, model_admin: Any) -> list[tuple[str, Any]]:
-        """Return the one that is asked for."""
-        return [("simulated", _("Show simulated"))]
-
-    def choices(self, changelist: Any) -> Iterator[Any]:
-        """Return the usual choice, then the other."""
-        first, *others = super().choices(changelist)
-        yield {**first, "display": _("Hide simulated")}
-        yield from others
-
-    def queryset(self, request: HttpRequest, queryset: QuerySet[Any]) -> QuerySet[Any]:
-        """Return the sessions."""
-        return queryset if self.value() == "simulated" else queryset.filter(simulated=False)
