@@ -75,6 +75,7 @@ PT_PAGES = [
 ADMIN_PAGES = [
     "/admin/",
     "/admin/rehab/trainingsession/?hits_min=90&hits_max=10",
+    "/admin/rehab/trainingsession/?also=simulated",
     "/admin/rehab/trainingsession/{session}/change/",
     "/admin/rehab/step/?session__id__exact={session}",
     "/admin/rehab/patient/",

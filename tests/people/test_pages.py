@@ -5,6 +5,7 @@ import re
 import pytest
 from django.urls import reverse
 from django.utils.formats import date_format
+from django.utils.html import strip_tags
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -35,14 +36,16 @@ def test_pages_allow_no_foreign_script(client):
 
 def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
     row = world.pt.get("/admin/rehab/trainingsession/").content.decode()
-    cells = dict(re.findall(r'class="field-(\w+)[^"]*">(?:<a[^>]*>)?([^<]*)', row))
-    assert cells["date"] == date_format(HERE, "j M Y")
-    assert cells["start_time"] == f"{HERE:%H:%M}"
+    found = re.findall(r'<td class="field-(\w+)[^"]*">(.*?)</td>', row)
+    cells = {name: strip_tags(cell.replace("<br>", " / ")) for name, cell in found}
+    patient = world.patient
+    assert f'href="{reverse("session", args=[world.session.pk])}"' in dict(found)["who"]
+    assert cells["who"] == f"{patient.nickname} / {patient.code}"
+    assert cells["day"].startswith(f"{date_format(HERE, 'j M Y')} / {HERE:%H:%M}")
     assert cells["duration"] == "0:10"
-    assert cells["types"] == "Positive"
-    assert cells["goal_value"] == "1.00 m"
-    assert cells["score"] == "6"
-    assert cells["hit_rate"] == "67%"
+    assert cells["kind"] == "Positive / goal 1.00\N{NO-BREAK SPACE}m"
+    assert cells["score"] == "6 points"
+    assert cells["hit_rate"] == "67\N{NO-BREAK SPACE}%"
 
 
 def test_a_therapist_cannot_edit_the_log(world):

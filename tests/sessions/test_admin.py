@@ -13,6 +13,7 @@ from django.db import connection
 from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
+from django.utils import timezone
 
 from rehab.boards.models import Leaderboard
 from rehab.people.consent.models import Purpose
@@ -81,6 +82,26 @@ def test_sessions_are_found_by_day_person_place_type_and_figures(world, walked):
     assert found(client, walked, goal_min="1.5", goal_max="2") == set(walked)
     assert found(client, walked, goal_min="2.1") == set()
     assert found(client, walked, q="Omar", hits_max=50, valence__exact="negative") == {"lost"}
+
+
+def test_what_nobody_walked_is_listed_when_it_is_asked_for(world, walked):
+    TrainingSession.everywhere.filter(pk=walked["told"].pk).update(simulated=True)
+    client = client_of(world)
+    assert found(client, walked) == {"weak", "strong", "lost"}
+    assert found(client, walked, also="simulated") == set(walked)
+    assert found(client, walked, also="simulated", weeks="4", q="Omar") == {"lost", "told"}
+
+
+def test_the_last_weeks_are_listed(world, walked):
+    for name, weeks in (("weak", 13), ("strong", 5)):
+        at = timezone.now() - timedelta(weeks=weeks)
+        TrainingSession.everywhere.filter(pk=walked[name].pk).update(created_at=at)
+    now = {"created_at": timezone.now()}
+    TrainingSession.everywhere.filter(pk__in=[walked["lost"].pk, walked["told"].pk]).update(**now)
+    client = client_of(world)
+    assert found(client, walked, weeks="4") == {"lost", "told"}
+    assert found(client, walked, weeks="12") == {"strong", "lost", "told"}
+    assert found(client, walked, weeks="52") == set(walked)
 
 
 def test_days_are_the_clinics_own(world, walked):

@@ -8,15 +8,24 @@ from django.contrib import admin
 from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
-from django.utils.html import format_html_join
+from django.utils.formats import date_format
+from django.utils.html import format_html, format_html_join
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.roles import may_see_names
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
+from rehab.sessions.admin.filters import PeriodFilter, SimulatedFilter, TypeFilter
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
-from rehab.sessions.formatting import clinic_time
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_number,
+    format_quantity,
+    format_rate,
+    format_state,
+)
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.search import SessionSearchFilter
@@ -31,21 +40,25 @@ class TrainingSessionAdmin(ScopedAdmin):
     """Sessions, read-only. Researchers see pseudonyms. Corrections have their own form."""
 
     list_display = (
-        "date",
-        "start_time",
-        "patient",
-        "types",
-        "goal_value",
-        "score",
-        "hit_rate",
+        "who",
+        "day",
+        "kind",
         "duration",
-        "station",
-        "state",
-        "counts",
+        "hit_rate",
+        "score",
+        "remarks",
+        "form_link",
     )
-    list_filter = (SessionSearchFilter, "valence", "state", "simulated", "excluded")
+    list_display_links = None
+    list_filter = (
+        ("valence", TypeFilter),
+        PeriodFilter,
+        SessionSearchFilter,
+        "state",
+        "excluded",
+        SimulatedFilter,
+    )
     search_fields = ("patient__nickname", "patient__code", "source")
-    date_hierarchy = "created_at"
     list_select_related = ("patient", "measure", "station", "clinic")
     fields = (
         "patient",
@@ -114,7 +127,59 @@ class TrainingSessionAdmin(ScopedAdmin):
             return names
         # A source may be a file that is named after a person.
         shown = (name for name in names if name != "source")
-        return tuple("pseudonym" if name == "patient" else name for name in shown)
+        coded = {"patient": "pseudonym", "who": "coded"}
+        return tuple(coded.get(name, name) for name in shown)
+
+    @admin.display(description=_("patient"), ordering="patient__nickname")
+    def who(self, session: TrainingSession) -> str:
+        """The patient's name and code, which lead to the session's page."""
+        return _link_to_page(session, session.patient.nickname, session.patient.code)
+
+    @admin.display(description=_("patient"), ordering="patient__pseudonym")
+    def coded(self, session: TrainingSession) -> str:
+        """The patient's pseudonym, which leads to the session's page."""
+        return _link_to_page(session, session.patient.pseudonym)
+
+    @admin.display(description=_("date"), ordering="created_at")
+    def day(self, session: TrainingSession) -> str:
+        """The day, and below it the time and the place."""
+        below = (self.start_time(session), session.station.name if session.station else None)
+        return format_html(
+            '{}<br><span class="muted s">{}</span>',
+            date_format(self.date(session), "DATE_FORMAT"),
+            " · ".join(filter(None, below)),
+        )
+
+    @admin.display(description=_("feedback type"), ordering="valence")
+    def kind(self, session: TrainingSession) -> str:
+        """The type with its sign, and below it the goal."""
+        return format_html(
+            '<span class="row"><span class="type {0}" data-theme="{0}" aria-hidden="true"></span>'
+            '<span>{1}<br><span class="muted s">{2}</span></span></span>',
+            session.valence,
+            session.valences_label,
+            gettext("goal %(goal)s") % {"goal": format_quantity(session.goal, session.measure.unit)}
+            if session.goal is not None
+            else "",
+        )
+
+    @admin.display(description=_("state"), ordering="state", empty_value="")
+    def remarks(self, session: TrainingSession) -> str:
+        """What is unusual about it, as badges."""
+        words = [
+            format_state(session.state),
+            gettext("simulated") if session.simulated else "",
+            gettext("left out") if session.excluded else "",
+        ]
+        return format_html_join(
+            " ", '<span class="badge warn">{}</span>', ((word,) for word in words if word)
+        )
+
+    @admin.display(description=_("log"))
+    def form_link(self, session: TrainingSession) -> str:
+        """A link to the session's form, with its log."""
+        url = reverse("admin:rehab_trainingsession_change", args=[session.pk])
+        return format_html('<a href="{}">{}</a>', url, capfirst(_("log")))
 
     @admin.display(description=_("patient"), ordering="patient__pseudonym")
     def pseudonym(self, session: TrainingSession) -> str:
@@ -149,15 +214,19 @@ class TrainingSessionAdmin(ScopedAdmin):
         """The goal with its unit."""
         return None if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
 
-    @admin.display(description=_("score"), ordering="metric_score")
-    def score(self, session: Any) -> int | None:
+    @admin.display(description=_("score"), ordering="metric_score", empty_value="")
+    def score(self, session: Any) -> str | None:
         """The points; None for explicit feedback and sessions that have not ended."""
-        return None if session.metric_score is None else round(session.metric_score)
+        if session.metric_score is None:
+            return None
+        return gettext("%(score)s points") % {"score": format_number(session.metric_score, 0)}
 
-    @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
+    @admin.display(description=_("hit rate"), ordering="metric_hit_rate", empty_value="")
     def hit_rate(self, session: Any) -> str | None:
         """The share of hits."""
-        return None if session.metric_hit_rate is None else f"{session.metric_hit_rate:.0%}"
+        if session.metric_hit_rate is None:
+            return None
+        return format_html("<b>{}</b>", format_rate(session.metric_hit_rate))
 
     @admin.display(description=_("counts"), ordering="excluded", boolean=True)
     def counts(self, session: TrainingSession) -> bool:
@@ -197,6 +266,15 @@ class TrainingSessionAdmin(ScopedAdmin):
                 for entry in session.described_corrections
             ),
         )
+
+
+def _link_to_page(session: TrainingSession, name: str, code: str = "") -> str:
+    return format_html(
+        '<a href="{}"><span><b>{}</b><br><span class="muted s">{}</span></span></a>',
+        reverse("session", args=[session.pk]),
+        name,
+        code,
+    )
 
 
 class SessionLogAdmin(ReadOnlyAdmin):
