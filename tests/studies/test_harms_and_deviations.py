@@ -90,6 +90,7 @@ def test_the_page_of_a_studys_session_does_not_offer_what_is_locked(world):
 def test_harms_and_deviations_are_counted_by_themselves_on_the_page_and_in_files(world):
     study = running_study(world)
     session = study_session(world, study)
+    change_session(session, ChangeKind.START)
     for kind, value in (
         (Remark.FALL, None),
         (Remark.FALL_SEVERITY, 2.0),
@@ -106,7 +107,6 @@ def test_harms_and_deviations_are_counted_by_themselves_on_the_page_and_in_files
         SessionEvent.everywhere.create(
             session=session, after_number=0, kind=str(kind), value=value, at=NOW
         )
-    change_session(session, ChangeKind.START)
     change_session(session, ChangeKind.ABORT)
     enrollment = study.enrollments.get()
     reveal_arms(enrollment, "She fell.", emergency=True, by=world.people[Role.LEAD], now=NOW)

@@ -65,17 +65,19 @@ export function createScene(svg) {
     for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   }
 
-  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit.
+  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit. Where steps are only
+  // shown, and not judged, it is as measured.
   function levelOf({ performance, hit, close }) {
     const level = y(performance ?? 0);
-    if (performance == null || close) return level;
+    if (performance == null || close || !shown.isJudged) return level;
     return hit ? Math.min(level, layout.goal - CLEAR) : Math.max(level, layout.goal + CLEAR);
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
-  // `isCut`: whether the scale begins above 0.
-  function show({ performance, hit, close, strides: entries, isCut }) {
-    shown = { performance, hit, close, strides: entries, isCut };
+  // `isCut`: whether the scale begins above 0; `isJudged`: whether hits and misses are told apart.
+  function show(step) {
+    shown = step;
+    const { performance, hit, close, strides: entries, isCut } = step;
     if (!layout) return; // no room for it
     thermometer.toggleAttribute("data-cut", isCut);
     const level = levelOf(shown);
