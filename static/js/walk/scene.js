@@ -65,16 +65,15 @@ export function createScene(svg) {
     for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   }
 
-  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit. Where steps are only
-  // shown, and not judged, it is as measured.
+  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit.
   function levelOf({ performance, hit, close }) {
     const level = y(performance ?? 0);
-    if (performance == null || close || !shown.isJudged) return level;
+    if (performance == null || close) return level;
     return hit ? Math.min(level, layout.goal - CLEAR) : Math.max(level, layout.goal + CLEAR);
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
-  // `isCut`: whether the scale begins above 0; `isJudged`: whether hits and misses are told apart.
+  // `isCut`: whether the scale begins above 0.
   function show(step) {
     shown = step;
     const { performance, hit, close, strides: entries, isCut } = step;

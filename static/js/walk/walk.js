@@ -100,7 +100,6 @@ function draw() {
       close: last?.close ?? false,
       strides: steps.map((stride) => ({ ...stride, performance: stretch(stride.performance) })),
       isCut: session.span < 1,
-      isJudged: session.has_points,
     });
     celebrate(confetti);
   } else clear();
