@@ -100,6 +100,7 @@ def test_the_last_weeks_are_listed(world, walked):
     TrainingSession.everywhere.filter(pk__in=[walked["lost"].pk, walked["told"].pk]).update(**now)
     client = client_of(world)
     assert found(client, walked, weeks="4") == {"lost", "told"}
+    assert found(client, walked, weeks="") == found(client, walked, weeks="x") == set(walked)
     assert found(client, walked, weeks="12") == {"strong", "lost", "told"}
     assert found(client, walked, weeks="52") == set(walked)
 

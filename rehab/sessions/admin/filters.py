@@ -13,6 +13,7 @@ from django.utils import timezone
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.simulated import counted
 from rehab.sessions.reports.insight import PERIODS
 
 CHIPS = "admin/chips.html"
@@ -50,7 +51,7 @@ class PeriodFilter(SimpleListFilter):
     def queryset(self, request: HttpRequest, queryset: QuerySet[Any]) -> QuerySet[Any]:
         """Return the period's sessions."""
         weeks = self.value()
-        if weeks not in PERIODS:
+        if not weeks or weeks not in PERIODS:
             return queryset
         return queryset.filter(created_at__gte=timezone.now() - timedelta(weeks=int(weeks)))
 
@@ -74,4 +75,4 @@ class SimulatedFilter(SimpleListFilter):
 
     def queryset(self, request: HttpRequest, queryset: QuerySet[Any]) -> QuerySet[Any]:
         """Return the sessions."""
-        return queryset if self.value() == "simulated" else queryset.filter(simulated=False)
+        return queryset if self.value() == "simulated" else queryset.filter(counted())
