@@ -27,7 +27,6 @@ const SCALE_LEAST = 260; // of the thermometer
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const GAP = 24; // between total, badge and thermometer
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -38,6 +37,7 @@ export function chooseLevel(size, isMeasured, least) {
   const worth = (level) => (isMeasured ? ENOUGH : WORTH[level]);
   let level = least;
   while (level < LAST && size(level) < 1 && size(level) < worth(level) * size(LAST)) level++;
+  while (level > least && size(level - 1) === size(level)) level--; // what is in no word's way
   return level;
 }
 
@@ -48,11 +48,9 @@ export function createFitting(body, scene) {
   const landscape = matchMedia("(orientation: landscape)");
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
-  const numberRange = document.createRange();
   let [fitted, widest] = ["", ""];
 
   const unit = () => parseFloat(getComputedStyle(main).right) / EDGE; // walk.css
-  const badgeWidth = () => Number(getComputedStyle(body).getPropertyValue("--badge")); // walk.css
   const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
 
   // Return whether a message fits between header and buttons. By its parts' lines: letters reach beyond theirs.
@@ -76,34 +74,32 @@ export function createFitting(body, scene) {
     }
     const u = unit();
     const total = count.offsetHeight / u;
-    numberRange.selectNodeContents(key);
-    const wide = numberRange.getBoundingClientRect().width / u;
     words.replaceChildren(...[was[0]].filter(Boolean));
     key.textContent = was[1];
     if (was[2] !== undefined) key.dataset.lost = was[2];
     if (isTooLarge) return null;
 
     const { column } = body.dataset;
+    const isHalf = column === "right" || column === "left";
     const isWide = landscape.matches && !column;
-    const isRow = landscape.matches && (!column || column === "center"); // the badge is beside the total
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
-    const isBelow = width < NARROW || (column === "center" && !isRow); // the total
+    const isBelow = width < NARROW || (column === "center" && !landscape.matches); // the total
     const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isWide ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
+    const isHung = isHalf && landscape.matches; // the badge, in the sky
+    const hasBadge = level < BADGE && !isHung && body.dataset.theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const ground = goal + reach + AIR + (isRow ? Math.max(badge, total) : badge + (isBelow ? 0 : total));
+    const isStacked = isHalf || !landscape.matches; // the badge, over the total
+    const ground = goal + reach + AIR + (isStacked ? badge + (isBelow ? 0 : total) : Math.max(badge, total));
     if (zero - top < SCALE_LEAST || ground > stand) return null;
-    // In the middle stands the thermometer, together with a total that is beside it.
-    const beside = isBelow ? 0 : wide + (badge && GAP + badgeWidth()) + GAP;
-    const inset = column === "center" ? Math.max(0, (width - beside - SCENE) / 2 - EDGE) : 0;
-    const below = goal + reach + AIR - main.offsetTop / u;
-    return { width, height, isWide, inset, top, zero, goal, reach, below };
+    const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0; // the thermometer is in the middle
+    const [above, hung] = isHung ? [sky - AIR / 2, goal - sky] : [goal + reach + AIR];
+    return { width, height, isWide, inset, top, zero, goal, reach, above: above - main.offsetTop / u, hung };
   }
 
   function set(level, short) {
@@ -111,7 +107,6 @@ export function createFitting(body, scene) {
     if (short < 1) body.dataset.short = short.toFixed(4);
     else delete body.dataset.short;
     body.style.setProperty("--short", short);
-    body.style.setProperty("--inset", 0);
   }
 
   // Return the largest size of words, in shares of the promised one, at which a layout holds all.
@@ -152,16 +147,15 @@ export function createFitting(body, scene) {
     const frame = (level) => frameOf(level, samples, number);
     const sizes = [];
     const size = (level) => (sizes[level] ??= largest(level, frame));
-    // In the middle, or in a half, is no room for the chart; beside a thermometer in the middle none for the badge.
-    const least = !column ? 0 : column === "center" && !landscape.matches ? BADGE : CHART;
+    const least = column ? CHART : 0; // in the middle, or in a half, is no room for the chart
     const level = chooseLevel(size, Boolean(body.dataset.pxPerMm), least);
     set(level, size(level));
     const found = frame(level);
     if (!found) return; // a screen so small that nothing fits
     body.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
-    body.style.setProperty("--above", `${found.below * unit()}px`);
-    body.style.setProperty("--inset", found.inset);
+    body.style.setProperty("--above", `${found.above * unit()}px`);
+    body.style.setProperty("--hung", `${found.hung * unit()}px`);
     scene.layOut({ ...found, isFlipped: side === "left" });
   };
 }
