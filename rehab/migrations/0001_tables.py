@@ -643,7 +643,7 @@ class Migration(migrations.Migration):
                     "kind",
                     models.CharField(
                         choices=[
-                            ("source", "Source of steps"),
+                            ("source", "Sensor"),
                             ("tablet", "Tablet"),
                             ("robot", "Robot"),
                         ],

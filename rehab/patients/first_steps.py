@@ -54,14 +54,14 @@ def _look_for_tablet(user: User, now: datetime) -> Found:
 def _look_for_sensor(user: User, now: datetime) -> Found:
     sources = _devices(user, Device.Kind.SOURCE)
     if not sources:
-        return Found(False, _("No sensor has a token yet."))
+        return Found(False, _("No sensor yet."))
     running = runtime.peek()
     connected = running.devices.connected_ids() if running else set()
     here = [one.name for one in sources if one.pk in connected]
     if here:
         return Found(True, _("%(sensor)s is connected.") % {"sensor": ", ".join(here)})
-    words = _("Start the sensor’s program with its token. Not connected yet: %(sensors)s.")
-    return Found(False, words % {"sensors": _describe(sources, now)})
+    words = _("Not connected now: %(sensors)s. Start its program on its computer.")
+    return Found(False, words % {"sensors": ", ".join(one.name for one in sources)})
 
 
 def _look_for_patient(user: User, now: datetime) -> Found:

@@ -155,7 +155,11 @@ class ScreenForm(_SpokenForm):
         ]
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
         help_texts: ClassVar = {
-            "screen_side": _("In one half, words are largest on a tablet that lies on its side.")
+            "screen_side": _(
+                "Who misses the left side looks to the right: choose the right, or its half alone; "
+                "and the other way around. In one half, words are largest on a tablet that lies "
+                "on its side."
+            )
         }
 
 

@@ -76,7 +76,7 @@ class StationAdmin(ScopedAdmin):
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to pair a tablet, to check a recording and to add a device."""
         links = [
-            (reverse("pair"), _("Let a tablet in")),
+            (reverse("pair"), _("Pair a tablet")),
             (reverse("check-recording"), _("Check a recording")),
         ]
         if self.has_change_permission(request, row):

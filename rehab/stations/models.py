@@ -48,7 +48,7 @@ class Device(TokenModel):
     class Kind(models.TextChoices):
         """The kind of device."""
 
-        SOURCE = "source", _("Source of steps")
+        SOURCE = "source", _("Sensor")
         TABLET = "tablet", _("Tablet")
         ROBOT = "robot", _("Robot")
 

@@ -37,7 +37,7 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
     # The sensor gets a token.
     page.click("[data-step=sensor] a")
     page.fill("[name=name]", "Force plate")
-    page.click("text=Save")
+    page.click("details[open] .primary")
     token = page.locator("#token").inner_text().strip()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     # Its program's line is copied as it stands, and is seen to work on the same page.

@@ -70,7 +70,7 @@ def test_the_thermometer_stands_where_the_patient_looks(
         with page_of(browser, server, walk, size) as page, feet_of(server, walk) as feet:
             feet.walk(0.9, 1.1)
             until_step(page, 2)
-            parts = (".thermometer .wall", ".key", ".words", ".phrase", ".pennant text")
+            parts = (".thermometer .wall", ".key", ".words", ".phrase", ".pennant text", ".emblem")
             at[side] = {part: page.evaluate(MIDDLE, part) for part in parts}
             wide[side] = page.evaluate(
                 "() => document.querySelector('.thermometer').getBoundingClientRect().width"
@@ -81,12 +81,13 @@ def test_the_thermometer_stands_where_the_patient_looks(
     assert at["right"][".thermometer .wall"] > 0.7
     assert wide["left"] == pytest.approx(wide["right"], rel=0.01)
     assert at["center"][".phrase"] == pytest.approx(0.5, abs=0.02)  # on the midline
-    assert at["center"][".thermometer .wall"] == pytest.approx(0.5, abs=0.02)
-    total = at["center"][".key"]
-    if size == "tablet-portrait":  # below the thermometer
+    thermometer, total, badge = (at["center"][one] for one in (parts[0], ".key", ".emblem"))
+    if size == "tablet-portrait":  # the badge beside the thermometer, the total below both
+        assert (thermometer + badge) / 2 == pytest.approx(0.5, abs=0.03)
         assert total == pytest.approx(0.5, abs=0.02)
     else:
-        assert 0.2 < total < 0.5
+        assert thermometer == pytest.approx(0.5, abs=0.02)
+        assert 0.2 < total < 0.5 < badge < 0.8
 
 
 def test_on_a_calm_page_nothing_moves_and_nothing_bursts(browser: Browser, server: Server) -> None:

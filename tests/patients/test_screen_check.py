@@ -69,5 +69,5 @@ def test_nothing_is_set_before_the_therapist_saves(world):
 @pytest.mark.django_db
 def test_a_screen_that_was_not_measured_is_offered_to_be(world):
     page = client_of(world).get(f"/patients/{world.patient.pk}/screen/check/").content.decode()
-    assert "Wear your usual glasses." in page
-    assert re.search(r'<a class="btn" href="[^"]+">Measure this screen first</a>', page)
+    assert "the patient wears the usual glasses" in page
+    assert re.search(r'<a class="btn small" href="[^"]+">Measure this screen first</a>', page)

@@ -130,7 +130,7 @@ def test_a_choice_and_a_row_are_told_in_words(world):
     world.device.kind = "robot"
     world.device.save()
     url = reverse("admin:rehab_device_history", args=[world.device.pk])
-    assert "Source of steps → Robot" in world.lead.get(url).content.decode()
+    assert "Sensor → Robot" in world.lead.get(url).content.decode()
 
 
 def test_each_role_reads_the_changes_of_what_it_may_read_and_of_its_clinic(world):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from django.contrib import messages
 from django.db.models import Prefetch
 from django.http import HttpRequest, HttpResponse
@@ -45,9 +47,20 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     context = {
         "lately": now - JUST_NOW,
         "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
-        "stations": [(one, format_device_states(list(one.devices.all()), now)) for one in stations],
+        "stations": [
+            (one, format_device_states(list(one.devices.all()), now), _missing(one, now))
+            for one in stations
+        ],
     }
     return render(request, "stations/stations.html", context)
+
+
+def _missing(station: Station, now: datetime) -> list[str]:
+    """Return the kinds of device that a walk at a station would lack: connected at other times."""
+    used = [one for one in station.devices.all() if not one.is_revoked]
+    here = {one.kind for one in used if one.last_seen_at and now - one.last_seen_at < JUST_NOW}
+    away = {one.kind for one in used if not one.builtin} - here
+    return [str(kind.label).lower() for kind in Device.Kind if kind in away]
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -46,7 +46,6 @@ def pair(request: HttpRequest) -> HttpResponse:
         return redirect("start")
     context = {
         "stations": Station.objects.visible_to(user),
-        "back": reverse("start"),
         **asked,
         **tablet_address(request),
     }
@@ -78,7 +77,7 @@ def let_in(request: HttpRequest, kind: Device.Kind = Device.Kind.TABLET) -> dict
             }
         device = approve_pairing(pairing, station, user, here, now, kind)
     except (PairingRefused, NotTrusted) as refused:
-        return {"code": code, "problem": str(refused)}
+        return {"code": code, "problem": str(refused), "chosen": station}
     if kind == Device.Kind.TABLET:
         names = {"tablet": device.name, "station": station}
         messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)

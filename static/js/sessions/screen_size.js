@@ -5,6 +5,8 @@ import { pixelsOfDegree } from "garry/walk/fit_layout";
 
 const INCH_MM = 25.4;
 const USUAL = 4; // pixels a millimeter, to begin with
+const FINE = 0.005; // of the size, by a tap
+const DIAGONAL = Math.hypot(screen.width, screen.height); // pixels
 // Of a page of words and a number: letters of the longest phrase and word (rehab/training/phrases.py), their width, a
 // line's height and the number's with its label.
 const LETTERS = { phrase: 30, word: 12 };
@@ -19,6 +21,7 @@ const { px_per_mm: field, distance_m: distance } = form.elements;
 
 function show(pxPerMm) {
   width.value = pxPerMm;
+  if (document.activeElement !== diagonal) diagonal.value = (DIAGONAL / (pxPerMm * INCH_MM)).toFixed(1);
   form.querySelector(".bank-card").style.setProperty("--px-per-mm", pxPerMm);
   const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
   for (const row of form.querySelectorAll("[data-factor]")) {
@@ -26,7 +29,8 @@ function show(pxPerMm) {
     const inLine = Math.floor((USED.width * screen.width) / (word * LETTER_WIDTH));
     const lines = Math.ceil(LETTERS.phrase / inLine);
     const isHeld = inLine >= LETTERS.word && word * (lines * LINE + NUMBER) <= USED.height * screen.height;
-    row.firstElementChild.textContent = isHeld ? "✓" : "–";
+    const [fits, not] = row.querySelectorAll(".badge");
+    [fits.hidden, not.hidden] = [!isHeld, isHeld];
   }
 }
 
@@ -38,7 +42,9 @@ function take(pxPerMm) {
 width.addEventListener("input", () => take(Number(width.value)));
 diagonal.addEventListener("input", () => {
   const inches = Number(diagonal.value);
-  if (inches > 0) take(Math.hypot(screen.width, screen.height) / (inches * INCH_MM));
+  if (inches > 0) take(DIAGONAL / (inches * INCH_MM));
 });
+for (const button of form.querySelectorAll("[data-by]"))
+  button.addEventListener("click", () => take(Number(width.value) * (1 + FINE * Number(button.dataset.by))));
 distance.addEventListener("change", () => show(Number(field.value || USUAL)));
 show(Number(field.value || USUAL));

@@ -28,6 +28,7 @@ const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
 const SCENE = 188; // the thermometer's width
+const PAIR = 24; // between it and the badge, both in the middle
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -80,7 +81,6 @@ export function createFitting(body, scene) {
     if (isTooLarge) return null;
 
     const { column } = body.dataset;
-    const isHalf = column === "right" || column === "left";
     const isWide = landscape.matches && !column;
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
@@ -91,15 +91,16 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isWide ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const isHung = isHalf && landscape.matches; // the badge, in the sky
-    const hasBadge = level < BADGE && !isHung && body.dataset.theme !== "explicit"; // walk.css
+    const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const isStacked = isHalf || !landscape.matches; // the badge, over the total
-    const ground = goal + reach + AIR + (isStacked ? badge + (isBelow ? 0 : total) : Math.max(badge, total));
+    const isRow = landscape.matches || isBelow; // the badge is not over the total, beside the thermometer
+    const ground = goal + reach + AIR + (isRow ? Math.max(badge, isBelow ? 0 : total) : badge + total);
     if (zero - top < SCALE_LEAST || ground > stand) return null;
-    const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0; // the thermometer is in the middle
-    const [above, hung] = isHung ? [sky - AIR / 2, goal - sky] : [goal + reach + AIR];
-    return { width, height, isWide, inset, top, zero, goal, reach, above: above - main.offsetTop / u, hung };
+    // In the middle is the thermometer, or where the total is below it, it and the badge.
+    const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
+    const inset = column === "center" ? (width - SCENE + pair) / 2 - EDGE : 0;
+    const above = goal + reach + AIR - main.offsetTop / u;
+    return { width, height, isWide, inset, top, zero, goal, reach, above, high };
   }
 
   function set(level, short) {
@@ -107,6 +108,7 @@ export function createFitting(body, scene) {
     if (short < 1) body.dataset.short = short.toFixed(4);
     else delete body.dataset.short;
     body.style.setProperty("--short", short);
+    body.style.removeProperty("--measure");
   }
 
   // Return the largest size of words, in shares of the promised one, at which a layout holds all.
@@ -121,6 +123,24 @@ export function createFitting(body, scene) {
       else not = short;
     }
     return fits;
+  }
+
+  // Make the words' place as narrow as it can be without more lines: so they stand near the thermometer.
+  function narrow(samples, high) {
+    const said = words.firstChild;
+    let [fits, not] = [phrase.parentElement.clientWidth, 0];
+    for (let i = 0; i < HALVINGS; i++) {
+      const width = (fits + not) / 2;
+      body.style.setProperty("--measure", `${width}px`);
+      const isHeld = samples.every((sample) => {
+        words.textContent = sample;
+        return words.offsetHeight <= high && !isTooWide(words);
+      });
+      if (isHeld) fits = width;
+      else not = width;
+    }
+    words.replaceChildren(...[said].filter(Boolean));
+    body.style.setProperty("--measure", `${Math.ceil(fits) + 1}px`);
   }
 
   // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
@@ -147,7 +167,8 @@ export function createFitting(body, scene) {
     const frame = (level) => frameOf(level, samples, number);
     const sizes = [];
     const size = (level) => (sizes[level] ??= largest(level, frame));
-    const least = column ? CHART : 0; // in the middle, or in a half, is no room for the chart
+    // In the middle, or in a half, is no room for the chart; who needs the largest words does not see it.
+    const least = column || text === "largest" ? CHART : 0;
     const level = chooseLevel(size, Boolean(body.dataset.pxPerMm), least);
     set(level, size(level));
     const found = frame(level);
@@ -155,7 +176,7 @@ export function createFitting(body, scene) {
     body.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
     body.style.setProperty("--above", `${found.above * unit()}px`);
-    body.style.setProperty("--hung", `${found.hung * unit()}px`);
+    narrow(samples, found.high);
     scene.layOut({ ...found, isFlipped: side === "left" });
   };
 }

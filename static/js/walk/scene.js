@@ -8,7 +8,7 @@ const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 94;
 const EDGE = 24;
-const CLEAR = 26; // the least gap that is seen between a step and the goal line, at 2 m
+const CLEAR = 36; // the least gap between a step and the goal line: a tenth of a degree and more from 2 m
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: beside the thermometer where there is room, else on the horizon before it.
 const BESIDE = { sign: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0, turn: 1 };
@@ -65,11 +65,13 @@ export function createScene(svg) {
     for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   }
 
-  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit.
+  // Return how high a step stands: plainly below the goal line if it missed, above it if it hit. The scale goes on from
+  // there to the same ends, so that a better step is always higher.
   function levelOf({ performance, hit, close }) {
     const level = y(performance ?? 0);
     if (performance == null || close) return level;
-    return hit ? Math.min(level, layout.goal - CLEAR) : Math.max(level, layout.goal + CLEAR);
+    const [side, room] = hit ? [-1, layout.goal - layout.top] : [1, layout.zero - layout.goal];
+    return layout.goal + side * (CLEAR + (1 - CLEAR / room) * Math.max(side * (level - layout.goal), 0));
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
