@@ -80,7 +80,7 @@ NEAR = join(
 )
 
 REACHED = join(
-    gettext_noop("You reached the goal!"),
+    gettext_noop("You met the goal!"),
     gettext_noop("Goal!"),
     gettext_noop("At the goal!"),
     gettext_noop("You did it!"),

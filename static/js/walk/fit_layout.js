@@ -93,14 +93,15 @@ export function createFitting(body, scene) {
     const goal = zero - (2 / 3) * (zero - top);
     const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const isRow = landscape.matches || isBelow; // the badge is not over the total, beside the thermometer
-    const ground = goal + reach + AIR + (isRow ? Math.max(badge, isBelow ? 0 : total) : badge + total);
+    const isRow = landscape.matches && column !== "right" && column !== "left"; // the badge is beside the total
+    const beside = isBelow ? 0 : total;
+    const ground = goal + reach + AIR + (isRow ? Math.max(badge, beside) : badge + beside);
     if (zero - top < SCALE_LEAST || ground > stand) return null;
     // In the middle is the thermometer, or where the total is below it, it and the badge.
     const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
     const inset = column === "center" ? (width - SCENE + pair) / 2 - EDGE : 0;
     const above = goal + reach + AIR - main.offsetTop / u;
-    return { width, height, isWide, inset, top, zero, goal, reach, above, high };
+    return { width, height, isWide, isCenter: column === "center", inset, top, zero, goal, reach, above, high };
   }
 
   function set(level, short) {

@@ -8,11 +8,11 @@ const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 94;
 const EDGE = 24;
-const CLEAR = 36; // the least gap between a step and the goal line: a tenth of a degree and more from 2 m
+const CLEAR = 44; // the least gap between a step and the goal line: a tenth of a degree and more from 2 m
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: beside the thermometer where there is room, else on the horizon before it.
-const BESIDE = { sign: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0, turn: 1 };
-const BEFORE = { sign: "M0 40l20 -80h132v80z", room: BULB_RADIUS, rise: 43, turn: -1 };
+const BESIDE = { sign: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0 };
+const BEFORE = { sign: "M0 40l20 -80h132v80z", room: BULB_RADIUS, rise: 43 };
 
 export function createScene(svg) {
   const find = (selector) => svg.querySelector(selector);
@@ -27,8 +27,9 @@ export function createScene(svg) {
   // Place all: `top`, `zero` and `goal` are heights of the scale, `reach` that of the strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, top: top150, zero, goal, reach, isWide, isFlipped, inset } = frame;
-    const { sign, room, rise, turn } = isWide ? BESIDE : BEFORE;
+    const { width, height, top: top150, zero, goal, reach, isWide, isCenter, isFlipped, inset } = frame;
+    const { sign, room, rise } = isWide ? BESIDE : BEFORE;
+    const turn = isWide || isCenter ? 1 : -1; // the sign: behind the thermometer, over the badge; or before it
     const x = width - EDGE - room - inset;
     const [top, bottom, r] = [top150 - 36, zero + 78, TUBE_RADIUS];
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
@@ -43,7 +44,7 @@ export function createScene(svg) {
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", turn * (r + 10), goal - rise, {}, ` scale(${turn} 1)`);
     find(".pennant path").setAttribute("d", sign);
-    const isTurned = isFlipped === isWide; // by the sign or by the scene, not by both
+    const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
     find(".pennant text").setAttribute("transform", isTurned ? "translate(164 0) scale(-1 1)" : "");
     place(".sparkles", 0, top);
     for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);
