@@ -89,7 +89,6 @@ def test_the_list_glides_to_the_newest_score_which_then_stands_out(server, sessi
         row = board.locator(".you")
         expect(row).to_have_css("background-color", BLUE)
         expect(row).to_contain_text("You today")
-        expect(row.locator(".marker")).to_be_visible()
         expect(row.locator(".value")).to_have_text("13")
         expect(row).to_have_attribute("aria-current", "true")
         sizes = board.locator(".value").evaluate_all(
