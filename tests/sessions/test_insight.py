@@ -63,9 +63,9 @@ def test_several_patients_are_compared_by_their_means(world):
 @pytest.mark.parametrize(
     ("rates", "told"),
     [
-        (((0.8, 0.82, 0.81), (0.3, 0.31, 0.29)), "Their intervals do not overlap."),
-        (((0.8, 0.2, 0.81), (0.3, 0.31, 0.29)), "Their intervals overlap"),
-        (((0.8,), (0.3, 0.31, 0.29)), "Too few for intervals of both"),
+        (((0.8, 0.82, 0.81), (0.3, 0.31, 0.29)), "Their likely ranges do not overlap."),
+        (((0.8, 0.2, 0.81), (0.3, 0.31, 0.29)), "Their likely ranges overlap"),
+        (((0.8,), (0.3, 0.31, 0.29)), "One of them has too few to compare"),
         (((0.8,), (0.3, 0.3)), ""),  # too little data, which the page says
         (((0.8, 0.7),), ""),
     ],

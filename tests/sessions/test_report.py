@@ -67,7 +67,7 @@ def test_it_tells_how_the_session_before_went(world, patient):
 
 def test_strides_that_the_lab_sent_late_are_told_apart(world, patient):
     session = walk(patient, "positive", [HIT, None, "late", "late", "force_lost"])
-    assert "Strides, trained leg 5 2 do not count, of 2 the samples came late" in read(
+    assert "Strides, trained leg 5 2 do not count: not clearly measured, of 2 the samples came late" in read(
         world, session
     )
 

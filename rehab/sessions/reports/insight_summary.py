@@ -33,7 +33,7 @@ def summarize_groups(groups: Sequence[Group]) -> str:
 def _tell_apart(high: MeanInterval, low: MeanInterval) -> str:
     """Return whether the intervals of two groups overlap."""
     if high.low is None or low.high is None:
-        return gettext("Too few for intervals of both: this shows no difference.")
+        return gettext("One of them has too few to compare: this shows no difference.")
     if high.low > low.high:
-        return gettext("Their intervals do not overlap.")
-    return gettext("Their intervals overlap: this shows no difference.")
+        return gettext("Their likely ranges do not overlap.")
+    return gettext("Their likely ranges overlap: this shows no difference.")

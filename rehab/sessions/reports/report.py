@@ -33,6 +33,8 @@ from rehab.sessions.reports.summary import (
     format_mean,
     format_phases,
     format_summary,
+    load_point,
+    sum_up,
 )
 from rehab.sessions.reports.trend import load_trend
 from rehab.training.changes import ChangeKind
@@ -53,8 +55,10 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
     plan = session.to_plan()
     review = review_session(user, session)
     phases, remarks = format_phases(review), _summarize_remarks(review.rows, session)
+    point = load_point(user, session)
     return {
-        "figures": _list_figures(format_summary(plan, review), format_mean(user, session)),
+        "told": sum_up(session, review, point),
+        "figures": _list_figures(format_summary(plan, review), format_mean(session, point)),
         "incidents": format_incidents(review, session),
         "goals": _describe_goals(plan, review),
         "phases": phases[:MAX_PHASES],
