@@ -22,6 +22,9 @@ class ResearchExportForm(forms.Form):
     )
     shift_dates = forms.BooleanField(
         label=_("Shift dates by whole weeks, differently for each patient"),
+        help_text=_(
+            "Then days give less away of who it was; weekdays and the time between visits stay."
+        ),
         required=False,
         initial=True,
     )

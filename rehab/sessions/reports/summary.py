@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
@@ -17,13 +16,9 @@ from rehab.sessions.formatting import (
     format_change,
     format_duration,
     format_number,
-    format_quantity,
     format_rate,
 )
-from rehab.sessions.log import EVENTS
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.noted_conditions import RATED, format_noted, summarize_conditions
-from rehab.sessions.reports.better_or_worse import Change, judge
 from rehab.sessions.reports.review import SessionReview
 from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
@@ -93,43 +88,6 @@ def load_point(user: User, session: TrainingSession) -> TrendPoint | None:
     """Return a session's point of the trend; None of one without figures."""
     points = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
     return points[0] if points else None
-
-
-def sum_up(session: TrainingSession, review: SessionReview, point: TrendPoint | None) -> list[str]:
-    """Return what a session came to, in a few sentences; none before it has figures.
-
-    ``session``: with its measure; ``point``: its point of the trend.
-    """
-    if point is None or point.hit_rate is None:
-        return []
-    rates = {"rate": format_rate(point.hit_rate), "wanted": format_rate(point.target_hit_rate)}
-    told = [
-        _("%(rate)s of the steps reached the goal; %(wanted)s were wanted.") % rates
-        if point.target_hit_rate
-        else _("%(rate)s of the steps reached the goal.") % rates
-    ]
-    if point.with_feedback and point.baseline and point.baseline.mean > 0:
-        ratio = point.with_feedback.mean / point.baseline.mean - 1
-        sentences = {
-            Change.MORE: _("%(measure)s was %(change)s above the baseline."),
-            Change.SAME: _("%(measure)s was about as at the baseline."),
-            Change.LESS: _("%(measure)s was %(change)s below the baseline."),
-        }
-        words = {"measure": capfirst(_(session.measure.name)), "change": format_rate(abs(ratio))}
-        told.append(sentences[judge(ratio)] % words)
-    goals = [entry.event for entry in review.events if entry.event.kind == ChangeKind.GOAL]
-    if goals and goals[0].old is not None and goals[0].old != review.figures["goal"]:
-        unit = session.measure.unit
-        ends = {
-            "first": format_number(goals[0].old),
-            "last": format_quantity(review.figures["goal"], unit),
-        }
-        told.append(_("The goal went from %(first)s to %(last)s.") % ends)
-    rated = summarize_conditions(session, review.rows)
-    most = [f"{EVENTS[kind]} {format_noted(kind, rated[kind])}" for kind in RATED if kind in rated]
-    if most:
-        told.append(_("The patient’s highest ratings: %(noted)s.") % {"noted": ", ".join(most)})
-    return told
 
 
 def format_mean(session: TrainingSession, point: TrendPoint | None) -> Figure:
