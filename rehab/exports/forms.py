@@ -22,9 +22,7 @@ class ResearchExportForm(forms.Form):
     )
     shift_dates = forms.BooleanField(
         label=_("Shift dates by whole weeks, differently for each patient"),
-        help_text=_(
-            "Then days give less away of who it was; weekdays and the time between visits stay."
-        ),
+        help_text=_("Days then give less away; weekdays and intervals stay."),
         required=False,
         initial=True,
     )

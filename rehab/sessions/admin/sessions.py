@@ -220,7 +220,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         if session.metric_hit_rate is None:
             return None
         return format_html(
-            '<b>{}</b> <span class="on-phone">{}</span>',
+            "<b>{}</b> {}",
             format_rate(session.metric_hit_rate),
             gettext("hits"),
         )

@@ -137,12 +137,9 @@ def _describe_not_counted(count: int, late: int) -> list[str]:
     """Return how many strides do not count, and how many do not by the lab's delay."""
     notes = []
     if count:
-        about = ngettext(
-            "%(count)s does not count: not clearly measured",
-            "%(count)s do not count: not clearly measured",
-            count,
-        )
-        notes.append(about % {"count": format_number(count, 0)})
+        about = ngettext("%(count)s does not count", "%(count)s do not count", count)
+        told = about % {"count": format_number(count, 0)}
+        notes.append(f"{told}: {_('not clearly measured')}")
     if late:
         about = ngettext(
             "of %(count)s the samples came late", "of %(count)s the samples came late", late
