@@ -120,5 +120,5 @@ def test_sessions_are_compared_and_taken_along(visit: Visit, sessions: dict[str,
         expect(more).to_be_visible(visible=screen == "phone")
         if screen == "phone":
             expect(page.locator("tbody tr").first.locator("td:visible")).to_have_count(2)
-            assert all(row.bounding_box()["height"] < 110 for row in page.locator("tbody tr").all())
+            assert all(row.bounding_box()["height"] < 140 for row in page.locator("tbody tr").all())
         picture(page, f"insight-{screen}")

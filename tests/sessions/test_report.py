@@ -45,10 +45,10 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     words = read(world, session)
     assert "Rosa code B-1" in words
     assert f"{HERE:%A} {HERE.day} {HERE:%B %Y, %H:%M}" in words
-    assert "Session report: Rosa" in words
+    assert "Positive · left leg" in words
     assert (
         "75 % of the steps reached the goal; 60 % were wanted. Ankle push-off power A2 was 12 %"
-        " above the baseline. The goal went from 2.00 to 2.40 W/kg. Positive · left leg"
+        " above the baseline. The goal went from 2.00 to 2.40 W/kg."
     ) in words
     assert "Hit rate 75 % wanted 60 %" in words
     assert "Mean with feedback 2.25 W/kg, +12 % from baseline 2.00" in words

@@ -138,8 +138,8 @@ def _describe_not_counted(count: int, late: int) -> list[str]:
     notes = []
     if count:
         about = ngettext("%(count)s does not count", "%(count)s do not count", count)
-        told = about % {"count": format_number(count, 0)}
-        notes.append(f"{told}: {_('not clearly measured')}")
+        why = _("not clearly measured")
+        notes.append(f"{about % {'count': format_number(count, 0)}}: {why}")
     if late:
         about = ngettext(
             "of %(count)s the samples came late", "of %(count)s the samples came late", late
