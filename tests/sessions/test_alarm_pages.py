@@ -148,6 +148,16 @@ def test_what_is_counted_is_listed_with_what_was_done_then(world, session):
     assert "pain 0" not in listed
 
 
+def test_the_list_of_incidents_goes_back_as_far_as_it_is_asked(world, session):
+    SessionEvent.everywhere.create(
+        session=session, after_number=1, kind="near_fall", at=NOW - timedelta(weeks=8)
+    )
+    pt = client_of(world)
+    assert "Iris: near fall" not in seen(pt, "incidents", weeks="4")
+    for weeks in ("12", "52", "", "many"):
+        assert "Iris: near fall" in seen(pt, "incidents", weeks=weeks)
+
+
 def test_what_was_only_simulated_is_listed_and_not_counted(world, session):
     TrainingSession.everywhere.filter(pk=session.pk).update(simulated=True)
     note(session, "fall")
