@@ -22,6 +22,7 @@ class ResearchExportForm(forms.Form):
     )
     shift_dates = forms.BooleanField(
         label=_("Shift dates by whole weeks, differently for each patient"),
+        help_text=_("Days then give less away; weekdays and intervals stay."),
         required=False,
         initial=True,
     )

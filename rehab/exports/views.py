@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from django.conf import settings
+from django.db.models import Max, Min
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
 from django.utils import timezone
@@ -60,6 +61,7 @@ def show_export(request: HttpRequest) -> HttpResponse:
         "progress": package and package.progress,
         "sessions": sessions.count(),
         "patients": sessions.order_by().values("patient").distinct().count(),
+        **sessions.order_by().aggregate(first=Min("created_at"), last=Max("created_at")),
         "needs_consent": user.clinic and user.clinic.research_needs_consent,
     }
     return render(request, "exports/export.html", context)

@@ -235,6 +235,8 @@ def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
         expect(pt.locator(".figures")).to_contain_text("50")
         tab_to(pt, ".skip")
         pt.keyboard.press("Enter")
+        tab_to(pt, ".more summary")
+        pt.keyboard.press("Enter")
         tab_to(pt, f"a[href='{walk.path}report/']")
         pt.keyboard.press("Enter")
         pt.wait_for_url("**/report/")

@@ -37,15 +37,15 @@ def test_pages_allow_no_foreign_script(client):
 def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
     row = world.pt.get("/admin/rehab/trainingsession/").content.decode()
     found = re.findall(r'<td class="field-(\w+)[^"]*">(.*?)</td>', row)
-    cells = {name: strip_tags(cell.replace("<br>", " / ")) for name, cell in found}
+    cells = {name: strip_tags(re.sub(" ?<br>", " / ", cell)) for name, cell in found}
     patient = world.patient
     assert f'href="{reverse("session", args=[world.session.pk])}"' in dict(found)["who"]
     assert cells["who"] == f"{patient.nickname} / {patient.code}"
     assert cells["day"].startswith(f"{date_format(HERE, 'j M Y')} / {HERE:%H:%M}")
-    assert cells["duration"] == "0:10"
+    assert cells["duration"] == "10\N{NO-BREAK SPACE}s"
     assert cells["kind"] == "Positive / goal 1.00\N{NO-BREAK SPACE}m"
     assert cells["score"] == "6 points"
-    assert cells["hit_rate"] == "67\N{NO-BREAK SPACE}%"
+    assert cells["hit_rate"] == "67\N{NO-BREAK SPACE}% hits"
 
 
 def test_a_therapist_cannot_edit_the_log(world):

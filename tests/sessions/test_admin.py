@@ -59,7 +59,7 @@ def walked(world) -> dict[str, TrainingSession]:
 def found(client: Client, walked: dict[str, TrainingSession], **asked: Any) -> set[str]:
     page = client.get(SESSIONS, asked)
     assert page.status_code == 200, page.headers.get("Location")
-    keys = {int(key) for key in re.findall(rf"{SESSIONS}(\d+)/change/", page.content.decode())}
+    keys = {int(key) for key in re.findall(r"/sessions/(\d+)/details/", page.content.decode())}
     return {name for name, session in walked.items() if session.pk in keys}
 
 

@@ -40,6 +40,14 @@ def test_a_period_leaves_older_sessions_out_and_keeps_the_type(world, patient):
     assert "in this period" in words(world, patient, "?type=negative&weeks=4")
 
 
+def test_a_sentence_compares_the_last_sessions_that_compare(world, patient):
+    for days_ago in range(1, 7):
+        assert "last three sessions" not in words(world, patient)
+        walk(patient, "positive", strides(days_ago, 6 - days_ago), days_ago=days_ago)
+    told = "In the last three sessions fewer steps reached the goal than in those before."
+    assert told in words(world, patient)
+
+
 def test_sessions_stand_under_their_week(world, patient):
     for days_ago in (0, 0, 14):
         walk(patient, "positive", strides(3, 2), days_ago=days_ago)

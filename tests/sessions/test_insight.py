@@ -63,9 +63,9 @@ def test_several_patients_are_compared_by_their_means(world):
 @pytest.mark.parametrize(
     ("rates", "told"),
     [
-        (((0.8, 0.82, 0.81), (0.3, 0.31, 0.29)), "Their intervals do not overlap."),
-        (((0.8, 0.2, 0.81), (0.3, 0.31, 0.29)), "Their intervals overlap"),
-        (((0.8,), (0.3, 0.31, 0.29)), "Too few for intervals of both"),
+        (((0.8, 0.82, 0.81), (0.3, 0.31, 0.29)), "Their likely ranges do not overlap."),
+        (((0.8, 0.2, 0.81), (0.3, 0.31, 0.29)), "their likely ranges overlap"),
+        (((0.8,), (0.3, 0.31, 0.29)), "has too few to compare"),
         (((0.8,), (0.3, 0.3)), ""),  # too little data, which the page says
         (((0.8, 0.7),), ""),
     ],
@@ -79,7 +79,7 @@ def test_a_sentence_says_what_the_table_shows(world, rates, told):
     sentence = summarize_groups(compare(types, "type"))
     assert told in sentence.replace("\xa0", " ")
     assert bool(told) is bool(sentence)
-    if told:
+    if "do not" in told:
         assert sentence.startswith("Highest: Positive, ")
         assert "Lowest: Negative, 30 %" in sentence.replace("\xa0", " ")
 

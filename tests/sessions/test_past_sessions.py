@@ -84,9 +84,9 @@ def test_many_sessions_come_in_pages_at_the_same_cost(client, patient, django_as
         walk(patient, "positive", strides(3, 2), days_ago=index)
     url = reverse("history", kwargs={"patient_id": patient.pk})
     client.get(url)  # once a minute it is noted that somebody is there
-    with django_assert_num_queries(14):
+    with django_assert_num_queries(19):
         first = client.get(url).content.decode()
-    with django_assert_num_queries(14):
+    with django_assert_num_queries(19):
         second = client.get(f"{url}?page=2").content.decode()
     assert len(items(first)) == 20
     assert len(items(second)) == 3

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from datetime import timedelta
 from typing import Any
 
-from django.contrib.admin import ChoicesFieldListFilter, SimpleListFilter
+from django.contrib.admin import BooleanFieldListFilter, ChoicesFieldListFilter, SimpleListFilter
 from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.utils import timezone
@@ -29,6 +29,30 @@ class TypeFilter(ChoicesFieldListFilter):
         first, *others = super().choices(changelist)
         yield {**first, "display": _("All types")}
         yield from others
+
+
+class StateFilter(ChoicesFieldListFilter):
+    """Whether it is planned, runs, is paused or has ended."""
+
+    template = CHIPS
+
+    def choices(self, changelist: Any) -> Iterator[Any]:
+        """Return all states, then each."""
+        first, *others = super().choices(changelist)
+        yield {**first, "display": _("All states")}
+        yield from others
+
+
+class LeftOutFilter(BooleanFieldListFilter):
+    """Whether a correction took it out of figures."""
+
+    template = CHIPS
+
+    def choices(self, changelist: Any) -> Iterator[Any]:
+        """Return both, those left out, those that count."""
+        words = (_("Left out or not"), _("Left out"), _("Counted"))
+        for choice, display in zip(super().choices(changelist), words, strict=True):
+            yield {**choice, "display": display}
 
 
 class PeriodFilter(SimpleListFilter):

@@ -10,17 +10,23 @@ from django.http import HttpRequest
 from django.urls import reverse
 from django.utils.formats import date_format
 from django.utils.html import format_html, format_html_join
-from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.roles import may_see_names
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
-from rehab.sessions.admin.filters import PeriodFilter, SimulatedFilter, TypeFilter
+from rehab.sessions.admin.filters import (
+    LeftOutFilter,
+    PeriodFilter,
+    SimulatedFilter,
+    StateFilter,
+    TypeFilter,
+)
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
 from rehab.sessions.formatting import (
     clinic_time,
+    format_duration,
     format_number,
     format_quantity,
     format_rate,
@@ -43,20 +49,18 @@ class TrainingSessionAdmin(ScopedAdmin):
         "who",
         "day",
         "kind",
-        "duration",
         "hit_rate",
         "score",
-        "remarks",
-        "form_link",
+        "duration",
     )
     list_display_links = None
     list_filter = (
         ("valence", TypeFilter),
         PeriodFilter,
-        SessionSearchFilter,
-        "state",
-        "excluded",
+        ("state", StateFilter),
+        ("excluded", LeftOutFilter),
         SimulatedFilter,
+        SessionSearchFilter,
     )
     search_fields = ("patient__nickname", "patient__code", "source")
     list_select_related = ("patient", "measure", "station", "clinic")
@@ -142,12 +146,20 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     @admin.display(description=_("date"), ordering="created_at")
     def day(self, session: TrainingSession) -> str:
-        """The day, and below it the time and the place."""
+        """The day, below it the time and the place, and what is unusual about it."""
         below = (self.start_time(session), session.station.name if session.station else None)
+        unusual = (
+            format_state(session.state),
+            gettext("simulated") if session.simulated else "",
+            gettext("left out") if session.excluded else "",
+        )
         return format_html(
-            '{}<br><span class="muted s">{}</span>',
+            '{} <br><span class="muted s">{}</span>{}',
             date_format(self.date(session), "DATE_FORMAT"),
             " · ".join(filter(None, below)),
+            format_html_join(
+                "", ' <span class="badge warn">{}</span>', ((word,) for word in unusual if word)
+            ),
         )
 
     @admin.display(description=_("feedback type"), ordering="valence")
@@ -162,24 +174,6 @@ class TrainingSessionAdmin(ScopedAdmin):
             if session.goal is not None
             else "",
         )
-
-    @admin.display(description=_("state"), ordering="state", empty_value="")
-    def remarks(self, session: TrainingSession) -> str:
-        """What is unusual about it, as badges."""
-        words = [
-            format_state(session.state),
-            gettext("simulated") if session.simulated else "",
-            gettext("left out") if session.excluded else "",
-        ]
-        return format_html_join(
-            " ", '<span class="badge warn">{}</span>', ((word,) for word in words if word)
-        )
-
-    @admin.display(description=_("log"))
-    def form_link(self, session: TrainingSession) -> str:
-        """A link to the session's form, with its log."""
-        url = reverse("admin:rehab_trainingsession_change", args=[session.pk])
-        return format_html('<a href="{}">{}</a>', url, capfirst(_("log")))
 
     @admin.display(description=_("patient"), ordering="patient__pseudonym")
     def pseudonym(self, session: TrainingSession) -> str:
@@ -200,9 +194,8 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     @admin.display(description=_("duration"), ordering="active_s")
     def duration(self, session: TrainingSession) -> str:
-        """The walked time in minutes and seconds."""
-        minutes, seconds = divmod(round(session.active_s), 60)
-        return f"{minutes}:{seconds:02d}"
+        """The walked time."""
+        return format_duration(session.active_s)
 
     @admin.display(description=_("feedback type"), ordering="valence")
     def types(self, session: TrainingSession) -> str:
@@ -226,7 +219,11 @@ class TrainingSessionAdmin(ScopedAdmin):
         """The share of hits."""
         if session.metric_hit_rate is None:
             return None
-        return format_html("<b>{}</b>", format_rate(session.metric_hit_rate))
+        return format_html(
+            "<b>{}</b> {}",
+            format_rate(session.metric_hit_rate),
+            gettext("hits"),
+        )
 
     @admin.display(description=_("counts"), ordering="excluded", boolean=True)
     def counts(self, session: TrainingSession) -> bool:
@@ -270,7 +267,7 @@ class TrainingSessionAdmin(ScopedAdmin):
 
 def _link_to_page(session: TrainingSession, name: str, code: str = "") -> str:
     return format_html(
-        '<a href="{}"><span><b>{}</b><br><span class="muted s">{}</span></span></a>',
+        '<a href="{}"><span><b>{}</b> <br><span class="muted s">{}</span></span></a>',
         reverse("session", args=[session.pk]),
         name,
         code,

@@ -32,7 +32,11 @@ class CorrectionForm(forms.Form):
     """
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(
-        queryset=None, empty_label=None, label=_("Who walked"), show_hidden_initial=True
+        queryset=None,
+        empty_label=None,
+        label=_("Who walked"),
+        show_hidden_initial=True,
+        help_text=_("Only if it was somebody else: the whole session then moves to that patient."),
     )
     counts = forms.TypedChoiceField(
         label=_("This session"),
@@ -52,7 +56,7 @@ class CorrectionForm(forms.Form):
         help_text=_("What whoever reads this session should know."),
     )
     reason = forms.CharField(
-        label=_("Reason for the correction"),
+        label=_("Reason for the correction (required)"),
         max_length=500,
         widget=forms.Textarea(attrs={"rows": 2}),
         help_text=_("Stays with the session. Name nobody: researchers read it too."),
@@ -95,6 +99,13 @@ class CorrectionForm(forms.Form):
                 gettext("Nothing is altered. Change who walked, what counts or the note.")
             )
         return data
+
+    @property
+    def shown(self) -> list[forms.BoundField]:
+        """The fields as the page has them. They are cleaned with the patient first, whose name
+        the others refuse.
+        """
+        return [self[name] for name in ("counts", "note", "reason", "patient")]
 
     @property
     def counts_initial(self) -> str:

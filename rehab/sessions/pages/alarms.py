@@ -7,7 +7,6 @@ from datetime import datetime, timedelta
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
-from django.utils.translation import gettext
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
@@ -19,12 +18,13 @@ from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.pages.history import PERIODS
 from rehab.sessions.reports.incident_list import count_adverse, list_adverse
 from rehab.sessions.services import acknowledge
 from rehab.training.changes import OPEN_STATES, State
 
-LISTED = timedelta(days=365)
 MAX_INCIDENTS = 200
+LONGEST = "52"  # weeks
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -65,9 +65,14 @@ def acknowledge_alarms(request: HttpRequest, session_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def list_incidents(request: HttpRequest) -> HttpResponse:
-    """List what went wrong: what was done then, how it ended, and who saw it when."""
+    """List what went wrong: what was done then, how it ended, and who saw it when.
+
+    ``?weeks=`` is how far back, a year unless it is one of ``PERIODS``.
+    """
     user, now = user_of(request), timezone.now()
-    clinic, since = clinic_of(user), now - LISTED
+    weeks = request.GET.get("weeks", "")
+    weeks = weeks if weeks in PERIODS else LONGEST
+    clinic, since = clinic_of(user), now - timedelta(weeks=int(weeks))
     entries = list_adverse(user, since)
     walked = TrainingSession.objects.visible_to(user).filter(counted(), active_s__gt=0)
     sessions = walked.filter(created_at__gte=since).count()
@@ -76,6 +81,8 @@ def list_incidents(request: HttpRequest) -> HttpResponse:
         "now": clinic_time(now, clinic),
         "since": clinic_time(since, clinic),
         "sessions": sessions,
-        "figures": [(gettext("Sessions"), sessions), *count_adverse(entries)],
+        "weeks": weeks,
+        "periods": PERIODS,
+        "figures": count_adverse(entries),
     }
     return render(request, "sessions/incidents.html", context)

@@ -30,6 +30,7 @@ from rehab.sessions.formatting import (
     format_state,
 )
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.patient_summary import compare_last_sessions
 from rehab.sessions.reports.remarks import describe_noted
 from rehab.sessions.reports.trend import (
     load_trend,
@@ -106,6 +107,7 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
             for row in rows
         ],
         "simulated": simulated,
+        "sentence": compare_last_sessions(mine.filter(simulated=simulated)),
         "totals": summarize_trend(included, trend, simulated=simulated),
         "corrected": sum(group["pk__count"] for group in groups if group["excluded"]),
         "marked": marked,

@@ -50,5 +50,10 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     )
     now = clinic_time(timezone.now(), patient.clinic)
     summary = describe_take_home(sessions, now)
-    context = {"patient": patient, "summary": summary, "today": now.date()}
+    context = {
+        "patient": patient,
+        "summary": summary,
+        "today": now.date(),
+        "visit": patient.visits.filter(day__gt=now.date()).order_by("day").first(),
+    }
     return render(request, "sessions/takehome.html", context)

@@ -41,8 +41,9 @@ def show_replay(request: HttpRequest, session_id: int) -> HttpResponse:
         "played": play_back(user, session),
         "chart_marks": chart_marks(),
         "events": [
-            (max(0.0, (entry.event.at - began).total_seconds()), entry)
+            (at_s, f"{int(at_s) // 60}:{int(at_s) % 60:02d}", entry.text)
             for entry in review_session(user, session).events
+            for at_s in [max(0.0, (entry.event.at - began).total_seconds())]
         ],
     }
     return render(request, "sessions/replay.html", context)

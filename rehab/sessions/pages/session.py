@@ -27,6 +27,7 @@ from rehab.sessions.reports.summary import (
     format_mean,
     format_phases,
     format_summary,
+    load_point,
 )
 from rehab.sessions.reports.text_note import write_text_note
 from rehab.sessions.robot_incidents import RobotIncident
@@ -44,7 +45,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         pk=session_id,
     )
     review = review_session(user, session)
-    summary = format_summary(session.to_plan(), review)
+    summary, point = format_summary(session.to_plan(), review), load_point(user, session)
     corrections = describe_corrections(session, user)
     notes = (entry.new for entry in corrections if entry.row.field == CorrectedField.NOTE)
     note = next(notes, "")
@@ -65,14 +66,8 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "text": write_text_note(user, session, review, note) if by_name else "",
         "review": review,
         "incidents": _list_incidents(user, session) if by_name else [],
-        "figures": [
-            format_mean(user, session),
-            summary.hit_rate,
-            summary.goal,
-            summary.duration,
-            summary.strides,
-            summary.score,
-        ],
+        "figures": [summary.hit_rate, format_mean(session, point)],
+        "facts": summary,
         "alarms": format_incidents(review, session),
         "phases": format_phases(review),
         "asked": list_answers(user, session),

@@ -59,13 +59,11 @@ def list_adverse(user: User, since: datetime) -> list[Entry]:
 
 
 def count_adverse(entries: Iterable[Entry]) -> list[tuple[str, int]]:
-    """Return how often each thing went wrong in sessions that count."""
+    """Return how often each thing went wrong in sessions that count: falls, near falls, others."""
     found = Counter(one.kind for one in entries if one.is_counted)
-    return [
-        (gettext("Falls"), found[Alarm.FALL]),
-        (gettext("Robot stopped by itself"), found[Alarm.ROBOT_STOP]),
-        *((capfirst(str(EVENTS[kind])), found[kind]) for kind in ADVERSE if kind != Remark.FALL),
-    ]
+    noted = [(capfirst(str(EVENTS[kind])), found[kind]) for kind in ADVERSE if kind != Remark.FALL]
+    stops = gettext("Robot stopped by itself"), found[Alarm.ROBOT_STOP]
+    return [(gettext("Falls"), found[Alarm.FALL]), noted[0], stops, *noted[1:]]
 
 
 def _from_incident(user: User, incident: Incident) -> Entry:

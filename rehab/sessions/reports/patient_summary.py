@@ -175,11 +175,14 @@ def describe_for_family(patient: Patient, now: datetime) -> dict[str, Any]:
         )
         for session in sessions
     ]
-    compared: list[TrainingSession] = []
-    if sessions:
-        before = find_comparable(mine, sessions[0]).reverse()
-        compared = [sessions[0], *before[: 2 * FAMILY_COMPARED - 1]]
-    return {"walks": walks, "sentence": describe_weeks(load_results(*compared))}
+    return {"walks": walks, "sentence": compare_last_sessions(mine)}
+
+
+def compare_last_sessions(sessions: QuerySet[TrainingSession]) -> str:
+    """Return how a patient's last sessions compare with those before; empty for few."""
+    last = find_counted(sessions).last()
+    before = find_comparable(sessions, last).reverse()[: 2 * FAMILY_COMPARED - 1] if last else []
+    return describe_weeks(load_results(*([last] if last else []), *before))
 
 
 def describe_weeks(results: Sequence[Result]) -> str:
@@ -225,10 +228,8 @@ def describe_take_home(sessions: QuerySet[TrainingSession], now: datetime) -> di
     totals = counted.order_by().aggregate(Sum("active_s"), Count("pk"))
     keys = counted.order_by().values("pk")
     steps = Step.everywhere.filter(session__in=keys, valid=True, side=F("session__trained_side"))
-    best = SessionMetric.everywhere.filter(session__in=keys).aggregate(
-        streak=Max("value", filter=Q(slug="best_streak")),
-        rate=Max("value", filter=Q(slug="hit_rate")),
-    )
+    streaks = SessionMetric.everywhere.filter(session__in=keys, slug="best_streak")
+    streak = streaks.aggregate(most=Max("value"))["most"]
     bars, development = [], ""
     if last and len(results) == 2 and all(one.mean for one in results):
         names = (_("First session"), _("Last session"))
@@ -246,8 +247,7 @@ def describe_take_home(sessions: QuerySet[TrainingSession], now: datetime) -> di
         "bars": bars,
         "development": development,
         "last_hits": out_of_ten(results[-1].hit_rate) if results else None,
-        "best_hits": None if best["rate"] is None else out_of_ten(best["rate"]),
-        "streak": format_number(best["streak"], 0) if best["streak"] else "",
+        "streak": format_number(streak, 0) if streak else "",
         "measure": last.measure if last else None,
     }
 
@@ -262,18 +262,15 @@ def _describe_mean(before: Result, after: Result, session: TrainingSession) -> s
         "what": _("Your push-off")
         if is_push
         else _("Your %(measure)s") % {"measure": measure.name},
-        "before": format_number(before.mean),
-        "after": format_number(after.mean),
-        "unit": measure.unit,
         "change": format_rate(abs(change)),
     }
     match judge(change):
         case Change.SAME:
-            return _("%(what)s stayed the same: %(after)s %(unit)s.") % values
+            text = _("%(what)s is about as in your first session.")
         case Change.MORE:
-            text = _("%(what)s grew from %(before)s to %(after)s %(unit)s: %(change)s more.")
+            text = _("%(what)s was %(change)s more than in your first session.")
         case _:
-            text = _("%(what)s went from %(before)s to %(after)s %(unit)s: %(change)s less.")
+            text = _("%(what)s was %(change)s less than in your first session.")
     return text % values
 
 

@@ -21,8 +21,14 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import EVENTS, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.noted_conditions import CONDITIONS, format_noted
+from rehab.sessions.noted_conditions import (
+    CONDITIONS,
+    RATED,
+    format_noted,
+    summarize_conditions,
+)
 from rehab.sessions.reports.answers import list_answers
+from rehab.sessions.reports.better_or_worse import Change, judge
 from rehab.sessions.reports.remarks import read_noted
 from rehab.sessions.reports.report_chart import PAPER, PHONE, draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
@@ -33,8 +39,9 @@ from rehab.sessions.reports.summary import (
     format_mean,
     format_phases,
     format_summary,
+    load_point,
 )
-from rehab.sessions.reports.trend import load_trend
+from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import WORN
 from rehab.training.plans import SessionPlan
@@ -53,8 +60,10 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
     plan = session.to_plan()
     review = review_session(user, session)
     phases, remarks = format_phases(review), _summarize_remarks(review.rows, session)
+    point = load_point(user, session)
     return {
-        "figures": _list_figures(format_summary(plan, review), format_mean(user, session)),
+        "told": _sum_up(session, review, point),
+        "figures": _list_figures(format_summary(plan, review), format_mean(session, point)),
         "incidents": format_incidents(review, session),
         "goals": _describe_goals(plan, review),
         "phases": phases[:MAX_PHASES],
@@ -70,6 +79,43 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
         "has_close": bool(review.figures["close"]),
         "unit": plan.measure.unit,
     }
+
+
+def _sum_up(session: TrainingSession, review: SessionReview, point: TrendPoint | None) -> list[str]:
+    """Return what a session came to, in a few sentences; none before it has figures.
+
+    ``session``: with its measure; ``point``: its point of the trend.
+    """
+    if point is None or point.hit_rate is None:
+        return []
+    rates = {"rate": format_rate(point.hit_rate), "wanted": format_rate(point.target_hit_rate)}
+    told = [
+        _("%(rate)s of the steps reached the goal; %(wanted)s were wanted.") % rates
+        if point.target_hit_rate
+        else _("%(rate)s of the steps reached the goal.") % rates
+    ]
+    if point.with_feedback and point.baseline and point.baseline.mean > 0:
+        ratio = point.with_feedback.mean / point.baseline.mean - 1
+        sentences = {
+            Change.MORE: _("%(measure)s was %(change)s above the baseline."),
+            Change.SAME: _("%(measure)s was about as at the baseline."),
+            Change.LESS: _("%(measure)s was %(change)s below the baseline."),
+        }
+        words = {"measure": capfirst(_(session.measure.name)), "change": format_rate(abs(ratio))}
+        told.append(sentences[judge(ratio)] % words)
+    goals = [entry.event for entry in review.events if entry.event.kind == ChangeKind.GOAL]
+    if goals and goals[0].old is not None and goals[0].old != review.figures["goal"]:
+        unit = session.measure.unit
+        ends = {
+            "first": format_number(goals[0].old),
+            "last": format_quantity(review.figures["goal"], unit),
+        }
+        told.append(_("The goal went from %(first)s to %(last)s.") % ends)
+    rated = summarize_conditions(session, review.rows)
+    most = [f"{EVENTS[kind]} {format_noted(kind, rated[kind])}" for kind in RATED if kind in rated]
+    if most:
+        told.append(_("The patient’s highest ratings: %(noted)s.") % {"noted": ", ".join(most)})
+    return told
 
 
 def _list_figures(summary: SessionSummary, mean: Figure) -> list[Figure]:

@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import Any
 
 LETTER_WIDTH = 0.6  # of bold words on average, by their size
+FAR_FROM_ZERO = 0.3  # of the highest value; what lies beyond fills the drawing
 MAX_ROWS = 4  # of phases' names above each other
 
 
@@ -33,7 +34,7 @@ def draw_chart(chart: dict[str, Any], size: Format = PAPER) -> dict[str, Any]:
     """Return all strides of the trained leg against the goal, as paths that print in gray.
 
     At or above the goal is a disc, below a ring, without a goal a cross, close to it a dash; an
-    invalid stride is a mark below the axis. The goal is a line, phases without feedback are shaded.
+    invalid stride is a mark on the axis. The goal is a line, phases without feedback are shaded.
     ``chart`` is the result of ``review.stride_chart``. Returns {} without strides.
     """
     strides = chart["strides"]
@@ -44,7 +45,9 @@ def draw_chart(chart: dict[str, Any], size: Format = PAPER) -> dict[str, Any]:
     known = [value for value in (*values, *goals) if value is not None]
     highest: float = max(known, default=1.0)
     top = 1.08 * highest if highest > 0 else 1.0
-    levels = [value for value in round_steps(0, top, most=7) if 0 < value < top]
+    lowest: float = min(known, default=0.0)
+    bottom = lowest - 0.15 * (top - lowest) if lowest > FAR_FROM_ZERO * top else 0.0
+    levels = [value for value in round_steps(bottom, top, most=7) if bottom < value < top]
     first: int = numbers[0]
     span: int = max(1, numbers[-1] - first)
 
@@ -52,14 +55,14 @@ def draw_chart(chart: dict[str, Any], size: Format = PAPER) -> dict[str, Any]:
         return size.margin + (width - 2 * size.margin) * (number - first) / span
 
     def y(value: float) -> float:
-        return height - height * max(value, 0.0) / top
+        return height - height * max(value - bottom, 0.0) / (top - bottom)
 
     paths: defaultdict[str, list[str]] = defaultdict(list)
     verdicts = zip(numbers, values, strides["hit"], strides["close"], strict=True)
     for number, value, hit, close in verdicts:
         at = x(number)
         if value is None:
-            paths["lost"].append(f"M{at:.1f} {height:.0f}v6")
+            paths["lost"].append(f"M{at:.1f} {height - 6:.0f}v6")
         elif hit is None:
             paths["free"].append(f"M{at - 2.4:.1f} {y(value):.1f}h4.8m-2.4 -2.4v4.8")
         elif close:

@@ -20,7 +20,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import SessionReview
-from rehab.sessions.reports.trend import load_trend
+from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
@@ -84,10 +84,14 @@ def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
     )
 
 
-def format_mean(user: User, session: TrainingSession) -> Figure:
+def load_point(user: User, session: TrainingSession) -> TrendPoint | None:
+    """Return a session's point of the trend; None of one without figures."""
+    points = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
+    return points[0] if points else None
+
+
+def format_mean(session: TrainingSession, point: TrendPoint | None) -> Figure:
     """Return the mean of the phases with feedback, beside its baseline."""
-    ended = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
-    point = ended[0] if ended else None
     if point is None or point.with_feedback is None:
         return Figure(_("Mean with feedback"), MISSING, "")
     change = _("no baseline")
@@ -134,7 +138,8 @@ def _describe_not_counted(count: int, late: int) -> list[str]:
     notes = []
     if count:
         about = ngettext("%(count)s does not count", "%(count)s do not count", count)
-        notes.append(about % {"count": format_number(count, 0)})
+        why = _("not clearly measured")
+        notes.append(f"{about % {'count': format_number(count, 0)}}: {why}")
     if late:
         about = ngettext(
             "of %(count)s the samples came late", "of %(count)s the samples came late", late

@@ -51,11 +51,11 @@ function drawPhases(marks) {
     if (right <= left) continue;
     ctx.fillStyle = color(phase.feedback ? "card" : "well");
     ctx.fillRect(left, box.top, right - left, box.height);
-    marks.line(left, box.top - 60 * marks.unit, left, box.top + box.height, color("border"), 1);
+    marks.line(left, box.top - 64 * marks.unit, left, box.top + box.height, color("border"), 1);
     if (marks.widthOf(phase.name) < right - left - 12 * marks.unit) {
       const fill = color("text");
       const from = { align: "left", weight: 700, fill };
-      marks.text(phase.name, left + 7 * marks.unit, box.top - 46 * marks.unit, from);
+      marks.text(phase.name, left + 7 * marks.unit, box.top - 50 * marks.unit, from);
     }
   }
 }
@@ -64,8 +64,9 @@ function drawPhases(marks) {
 function groupChanges() {
   const groups = new Map();
   for (const { after, kind, words } of changes) {
-    const group = groups.get(after) ?? { after, isGoal: false, words: [] };
+    const group = groups.get(after) ?? { after, isGoal: false, isPain: false, words: [] };
     group.isGoal ||= kind === "goal";
+    group.isPain ||= kind === "pain";
     group.words.push(words);
     groups.set(after, group);
   }
@@ -75,19 +76,25 @@ function groupChanges() {
 function drawChanges(marks) {
   const { box, unit: pixel } = marks;
   const free = [box.left, box.left]; // labels never run into each other: two rows of them
-  for (const change of groupChanges()) {
-    const x = marks.x(change.after + 0.5);
+  const labels = [];
+  for (const { after, isGoal, isPain, words } of groupChanges()) {
+    const x = marks.x(after + 0.5);
     if (x < box.left || x > box.left + box.width) continue;
-    const { isGoal } = change;
-    const paint = color(isGoal ? "c-goal" : "c-third");
-    const wide = marks.widthOf(change.words, 13);
+    const fill = color(isGoal ? "c-goal" : isPain ? "error" : "c-third");
+    const wide = marks.widthOf(words, 13);
     const start = Math.min(x + 5 * pixel, box.left + box.width - wide);
     const row = free.findIndex((end) => start >= end);
-    const foot = box.top - (row === 1 ? 26 : 8) * pixel;
-    marks.line(x, foot, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
+    const foot = box.top - (row === 1 ? 28 : 8) * pixel;
+    marks.line(x, foot, x, box.top + box.height, fill, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
     if (row < 0) continue;
-    marks.text(change.words, start, foot - 3 * pixel, { size: 13, weight: 700, align: "left", fill: paint });
+    labels.push({ words, start, wide, foot, fill });
     free[row] = start + wide + 10 * pixel;
+  }
+  // Over the lines of the row above.
+  for (const { words, start, wide, foot, fill } of labels) {
+    marks.ctx.fillStyle = color("card");
+    marks.ctx.fillRect(start - 2 * pixel, foot - 15 * pixel, wide + 4 * pixel, 16 * pixel);
+    marks.text(words, start, foot - 3 * pixel, { size: 13, weight: 700, align: "left", fill });
   }
 }
 
@@ -126,7 +133,7 @@ function drawStrides(element) {
       { stroke: () => color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
     scales: { x: { time: false }, y: { range: () => [bottom, most + air] } },
-    padding: [72, 26, 0, 0],
+    padding: [76, 26, 0, 0],
     cursor: { y: false, points: { show: false }, drag: { x: true, y: false } },
     under: drawPhases,
     paint: (marks) => {

@@ -87,7 +87,8 @@ function drawValues(element) {
         if (values.goal[index] !== null) marks.dash(index, values.goal[index], color("c-goal"), count);
         if (values.mean[index] !== null) drawType(marks, index, values.mean[index], values.types[index]);
         if (values.baseline[index] !== null) {
-          marks.square(index, values.baseline[index], 6, color("c-third"), count > LABELED ? 0 : -20);
+          const aside = Math.min(20, (0.35 * marks.box.width) / marks.unit / count); // clear of its neighbor
+          marks.square(index, values.baseline[index], 6, color("c-third"), count > LABELED ? 0 : -aside);
         }
       });
     },

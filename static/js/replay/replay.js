@@ -26,6 +26,7 @@ function show(slotName, text) {
 const player = new Player(log, () => (frame ||= requestAnimationFrame(draw)));
 window.replayPlayer = player; // for the patient's page in its frame
 const page = { state, show };
+document.querySelector("section.robot").hidden = !log.snapshots.monitor.presence.robot;
 const robot = createReplayedRobot(page, log.robot, player);
 const drawPhases = createPhaseBar(document.querySelector(".phases"));
 const parts = [createLastStride(page), createStrideCharts(page), robot];
@@ -63,6 +64,7 @@ function drawTransport() {
   }
   const last = entries.findLast(({ dataset }) => Number(dataset.at) <= at_s);
   for (const entry of entries) {
+    entry.classList.toggle("later", Number(entry.dataset.at) > at_s);
     if (entry === last) entry.setAttribute("aria-current", "step");
     else entry.removeAttribute("aria-current");
   }

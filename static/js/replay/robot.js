@@ -43,7 +43,7 @@ export function createReplayedRobot({ show }, pieces, player) {
     draw() {
       const piece = find(player.at_s);
       if (piece) drawMoment(scene, piece, player.at_s - piece.at_s);
-      else scene.draw({ poses: pieces.length ? [{ x_m: 0, y_m: 0, heading_rad: 0 }] : [] });
+      else scene.draw({ poses: [{ x_m: 0, y_m: 0, heading_rad: 0 }] });
       const gesture = piece && !piece.recorded ? `${describeGesture(piece.name)}…` : "";
       show("robot-state", isStopped ? _("stopped") : gesture);
       show("robot-last", describeDecision(decision, breakReason));
