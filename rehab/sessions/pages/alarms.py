@@ -34,23 +34,23 @@ MAX_INCIDENTS = 200
 def show_alarms(request: HttpRequest) -> HttpResponse:
     """Return what is open in the clinic, or at one station, as a part of a page.
 
-    ``but``: of which session the page itself tells: there, what ended sessions left is folded up.
+    ``but``: of which sessions the page itself tells: there, what ended sessions left is folded up.
     """
     station = request.GET.get("station", "")
     user, now = user_of(request), timezone.now()
     found = open_alarms(user, now, int(station) if station.isdecimal() else None)
-    but = request.GET.get("but")
+    but = request.GET.getlist("but")
     context: dict[str, list[tuple[SessionEvent, datetime]]] = {"alarms": [], "ended": []}
     for one in found:
-        if str(one.session_id) != but:
-            has_ended = but is not None and State(one.session.state) not in OPEN_STATES
+        if str(one.session_id) not in but:
+            has_ended = bool(but) and State(one.session.state) not in OPEN_STATES
             row = (one, clinic_time(one.at, one.session.clinic))
             context["ended" if has_ended else "alarms"].append(row)
     stopped: list[int] = []
     if found:
         robots = Device.objects.visible_to(user).filter(kind=Device.Kind.ROBOT)
         stopped = list(robots.filter(station__robot_stopped=True).values_list("station", flat=True))
-    seen = falls_just_seen(user, now) if but is None else []
+    seen = falls_just_seen(user, now) if not but else []
     told = [(one, clinic_time(one.at, one.session.clinic)) for one in seen]
     return render(request, "sessions/alarms.html", context | {"seen": told, "stopped": stopped})
 

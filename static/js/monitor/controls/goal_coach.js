@@ -38,8 +38,8 @@ export function createGoalCoach({ show, onPress, change }) {
     if (goal === null || now === null || goal === now) return "";
     const text =
       goal < now
-        ? _("Lower the goal from %(now)s to %(goal)s %(unit)s? By the last 20 steps, about %(hits)s then reach it.")
-        : _("Raise the goal from %(now)s to %(goal)s %(unit)s? By the last 20 steps, about %(hits)s then reach it.");
+        ? _("Lower the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.")
+        : _("Raise the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.");
     return fill(text, { now: number(now, 2), goal: number(goal, 2), unit, hits: percent(wanted) });
   }
 
