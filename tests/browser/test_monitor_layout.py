@@ -128,7 +128,9 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     monitor.locator("[data-alarm=fall] button").click()  # tapped to ask its question
     monitor.locator("[data-alarm=robot] button").click()
     monitor.evaluate("document.querySelector('.said').textContent = ''")
-    expect(monitor.locator("[data-alarm]:not([data-alarm=why], [data-alarm=seen])")).to_have_count(0)
+    expect(monitor.locator("[data-alarm]:not([data-alarm=why], [data-alarm=seen])")).to_have_count(
+        0
+    )
 
 
 @pytest.mark.parametrize("screen", CORNERS)

@@ -45,7 +45,7 @@ export function createAlarms(page) {
     if (!action) return button?.remove();
     if (!button) {
       button = banner.appendChild(document.createElement("button"));
-      button.className = banner.classList.contains("red") ? "btn seen" : "btn small";
+      button.className = banner.classList.contains("red") ? "btn big seen" : "btn small";
     }
     const [label, act] = action;
     if (button.textContent !== label) button.textContent = label;

@@ -129,4 +129,3 @@ function draw() {
 
 setInterval(() => state.session && connections.draw(state.session), 1_000); // silence sends no event
 addEventListener("resize", draw);
-new ResizeObserver(draw).observe(document.getElementById("strip")); // banners take of its height

@@ -60,7 +60,7 @@ export function createStrideCharts({ state, show }) {
     );
   }
 
-  return {
+  const charts = {
     draw(session) {
       show("strip", describeStrip(session));
       drawStrip(strip, state.strides, state.annotations, session);
@@ -72,4 +72,6 @@ export function createStrideCharts({ state, show }) {
       describeRate(session);
     },
   };
+  new ResizeObserver(() => state.session && charts.draw(state.session)).observe(strip); // banners take of its height
+  return charts;
 }
