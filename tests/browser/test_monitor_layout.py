@@ -179,3 +179,20 @@ def test_axe_finds_nothing_light_and_dark(monitor: Page, screen: str) -> None:
     check(monitor)
     go_dark(monitor)
     check(monitor)
+
+
+def test_of_two_on_a_phone_each_keeps_its_safety_bar_after_a_fall(
+    server: Server, browser: Browser
+) -> None:
+    walks = make_walks(server, {"name": "Iris"}, {"name": "Tom"})
+    with signed_in(browser, server, walks[0], "phone", reduced_motion="reduce") as context:
+        page = context.new_page()
+        page.goto(f"/sessions/two/?of={walks[0].session}&of={walks[1].session}")
+        frame = page.frame_locator("iframe").first
+        frame.locator("[data-fall]").click()
+        expect(frame.locator("[data-alarm=fall]")).to_be_visible()
+        page.keyboard.press("Escape")
+        for number in range(2):
+            button = page.frame_locator("iframe").nth(number).locator("[data-fall]")
+            expect(button).to_be_in_viewport(ratio=1)
+        expect(page.locator(".elsewhere")).to_be_empty()  # its own page tells it
