@@ -19,6 +19,7 @@ from rehab.sessions.state_messages import Message
 from rehab.training.changes import NotAllowed
 
 SHOWN_FOR = timedelta(days=30)  # on pages of the clinic; the list of incidents has all
+TOLD_FOR = timedelta(minutes=2)  # who took care of a fall
 BY_PERSON = frozenset({"button"})  # reasons of a robot's stop that are a person's
 
 
@@ -62,6 +63,7 @@ class OpenAlarms:
     def __init__(self, events: Iterable[SessionEvent] = ()) -> None:
         self._raised: defaultdict[Alarm, list[SessionEvent]] = defaultdict(list)
         self.stop_reason = ""  # of the robot's latest stop, where it stopped by itself
+        self._fall_seen: SessionEvent | None = None  # the latest acknowledgment of a fall
         for event in events:
             self.apply(event)
 
@@ -77,6 +79,8 @@ class OpenAlarms:
             return [falls.pop()] if falls else None
         if event.kind not in ENDED_BY:
             return None
+        if event.kind == Remark.FALL_ACKNOWLEDGED:
+            self._fall_seen = event
         return self._raised.pop(ENDED_BY[event.kind], None)
 
     @property
@@ -105,7 +109,11 @@ class OpenAlarms:
             }
             for event in self.events
         ]
-        return {"alarms": alarms, "stop_reason": self.stop_reason}
+        seen = self._fall_seen and {
+            "by": str(self._fall_seen.by or "–"),
+            "at": self._fall_seen.at.isoformat(),
+        }
+        return {"alarms": alarms, "stop_reason": self.stop_reason, "fall_seen": seen}
 
 
 @dataclass(slots=True, eq=False)
@@ -166,3 +174,11 @@ def open_alarms(user: User, now: datetime, station: int | None = None) -> list[S
     """
     found = [one.raised for one in find_incidents(user, now - SHOWN_FOR) if one.ended is None]
     return [one for one in found if station in (None, one.session.station_id)]
+
+
+def falls_just_seen(user: User, now: datetime) -> list[SessionEvent]:
+    """Return the latest acknowledgments of falls that a user may see: who does what is left."""
+    rows = SessionEvent.objects.visible_to(user).filter(
+        kind=Remark.FALL_ACKNOWLEDGED.value, at__gte=now - TOLD_FOR
+    )
+    return list(rows.select_related("by", "session__patient__clinic").order_by("-pk"))

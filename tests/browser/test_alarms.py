@@ -241,7 +241,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             expect(page.locator("[data-alarm]")).to_have_count(1)
             expect(red).to_contain_text("Robot stopped")  # there is one
             expect(page.locator(".said")).to_be_empty()  # the banner says it
-        told = start.locator(".elsewhere .red", has_text="Iris fell.")
+        told = start.locator(".elsewhere .red", has_text="Iris fell, ")
         expect(told).to_be_visible()
         expect(start.locator(".today li").first).to_contain_text("fell")
         expect(start.locator(".chosen-one > .fell", has_text="Iris")).to_be_visible()
@@ -252,8 +252,11 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
         picture(patient, "fall-on-the-patients-page")
         told.get_by_role("button", name="I’ll take care of it").click()
         expect(told).to_have_count(0)
+        care = re.compile(r"walker\d+ takes care of Iris’s fall, \d\d:\d\d\.")
+        expect(start.locator(".elsewhere")).to_have_text(care)
         for page in (monitor, second):
             expect(page.locator(".red[data-alarm]")).to_have_count(0)
+            expect(page.locator("[data-alarm=seen]")).to_contain_text(care)
         expect(patient.locator(".words")).to_have_text("Pause.")
     assert [kind for kind, _ in noted(server, walk)][-1] == "fall_acknowledged"
     start.goto("/incidents/")

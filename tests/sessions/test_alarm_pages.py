@@ -45,7 +45,7 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     note(session, "fall")
     pt = client_of(world)
     told = seen(pt)
-    assert "Iris fell." in told
+    assert f"Iris fell, {NOW:%H:%M}." in told
     assert "Finished" in told
     assert "I’ll take care of it" in told
     assert "Iris" not in seen(pt, but=session.pk)
@@ -54,7 +54,9 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert "fell" in seen(pt, "start")
     answer = pt.post(reverse("acknowledge-alarms", args=[session.pk]))
     assert (answer.status_code, answer.content) == (204, b"")
-    assert "Iris" not in seen(pt)
+    assert "fell" not in (told := seen(pt))
+    assert f"{world.people[Role.PT]} takes care of Iris’s fall, {NOW:%H:%M}." in told
+    assert "Iris" not in seen(pt, but=0)  # no room beside another walk
     assert "fell" not in seen(pt, "start")
     row = SessionEvent.everywhere.get(session=session, kind="fall_acknowledged")
     assert row.by == world.people[Role.PT]
@@ -65,7 +67,7 @@ def test_what_an_ended_session_left_is_folded_up_on_the_page_of_another(world, s
     pt = client_of(world)
     for query, is_folded in (({"but": 0}, True), ({}, False)):
         told = pt.get(reverse("alarms"), query).content.decode()
-        assert "Iris fell." in told
+        assert "Iris fell, " in told
         assert ("1 alarm of an ended session" in told) is is_folded
 
 
@@ -74,7 +76,7 @@ def test_a_fall_stands_first_on_the_start_page_and_in_the_admins_day(world, sess
     TrainingSession.everywhere.filter(pk=session.pk).update(active_s=60)
     walk(make_patient(world.clinic, "Tom", code="K-2"), "positive", [HIT])
     pt = client_of(world)
-    assert f"noted by {world.people[Role.PT]}" in seen(pt)
+    assert f"Noted by {world.people[Role.PT]}" in seen(pt)
     listed = seen(pt, "start")
     assert listed.index("Iris") < listed.index("Tom")
     page = pt.get(reverse("admin:index"))
@@ -102,7 +104,7 @@ def test_another_clinic_acknowledges_nothing(world, session):
     stranger = client_of(build_world("oak"))
     answer = stranger.post(reverse("acknowledge-alarms", args=[session.pk]))
     assert answer.status_code == 404
-    assert "Iris fell." in seen(client_of(world))
+    assert "Iris fell, " in seen(client_of(world))
 
 
 def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):

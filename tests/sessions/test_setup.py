@@ -251,6 +251,8 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
         "live",  # one trial with a simulator makes nobody a simulated patient
     )
     assert "Like last time" in page.content.decode()
+    offered = plain(pt.get(f"/patients/{patient.pk}/new/").content.decode())
+    assert "Last time ended at 4.20 W/kg." in offered
     chosen = {field.name: field.value() for field in page.context["form"]}
     hidden = {name: "" if value is None else value for name, value in chosen.items()}
     pt.post(f"/patients/{patient.pk}/new/", hidden)

@@ -161,7 +161,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     made = []
     for index, wish in enumerate(wanted):
         name = f"{count}-{index}"
-        station = Station(clinic=clinic, name=name)
+        station = Station(clinic=clinic, name=f"Treadmill {name}")
         set_pin(station, wish.get("pin", ""))
         station.save()
         patient = Patient.everywhere.create(

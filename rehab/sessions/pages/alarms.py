@@ -13,7 +13,7 @@ from django.views.decorators.http import require_POST, require_safe
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.roles import Role
 from rehab.people.simulated import counted
-from rehab.sessions.alarms import open_alarms
+from rehab.sessions.alarms import falls_just_seen, open_alarms
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.log import SessionEvent
@@ -21,6 +21,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.history import PERIODS
 from rehab.sessions.reports.incident_list import count_adverse, list_adverse
 from rehab.sessions.services import acknowledge
+from rehab.stations.models import Device
 from rehab.training.changes import OPEN_STATES, State
 
 MAX_INCIDENTS = 200
@@ -33,20 +34,25 @@ LONGEST = "52"  # weeks
 def show_alarms(request: HttpRequest) -> HttpResponse:
     """Return what is open in the clinic, or at one station, as a part of a page.
 
-    ``but``: of which session the page itself tells: there, what ended sessions left is folded up.
+    ``but``: of which sessions the page itself tells: there, what ended sessions left is folded up.
     """
     station = request.GET.get("station", "")
-    found = open_alarms(
-        user_of(request), timezone.now(), int(station) if station.isdecimal() else None
-    )
-    but = request.GET.get("but")
+    user, now = user_of(request), timezone.now()
+    found = open_alarms(user, now, int(station) if station.isdecimal() else None)
+    but = request.GET.getlist("but")
     context: dict[str, list[tuple[SessionEvent, datetime]]] = {"alarms": [], "ended": []}
     for one in found:
-        if str(one.session_id) != but:
-            has_ended = but is not None and State(one.session.state) not in OPEN_STATES
+        if str(one.session_id) not in but:
+            has_ended = bool(but) and State(one.session.state) not in OPEN_STATES
             row = (one, clinic_time(one.at, one.session.clinic))
             context["ended" if has_ended else "alarms"].append(row)
-    return render(request, "sessions/alarms.html", context)
+    stopped: list[int] = []
+    if found:
+        robots = Device.objects.visible_to(user).filter(kind=Device.Kind.ROBOT)
+        stopped = list(robots.filter(station__robot_stopped=True).values_list("station", flat=True))
+    seen = falls_just_seen(user, now) if not but else []
+    told = [(one, clinic_time(one.at, one.session.clinic)) for one in seen]
+    return render(request, "sessions/alarms.html", context | {"seen": told, "stopped": stopped})
 
 
 @for_roles(Role.LEAD, Role.PT)

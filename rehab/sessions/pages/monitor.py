@@ -116,4 +116,6 @@ def show_side_by_side(request: HttpRequest) -> HttpResponse:
     for session in rows:
         shown.setdefault(session.station_id, session)
     two = sorted(list(shown.values())[:2], key=lambda session: str(session.station))
-    return render(request, "sessions/side_by_side.html", {"sessions": two})
+    shown_here = "?" + "&".join(f"but={session.pk}" for session in two)
+    context = {"sessions": two, "alarms_elsewhere": shown_here if two else ""}
+    return render(request, "sessions/side_by_side.html", context)

@@ -41,21 +41,30 @@ function describeServer({ number }, { socket }) {
 }
 
 // Whether somebody fell, and nobody has said yet that they saw it: until then nothing goes on.
-export const hasFallen = (session) => Boolean(session && alarmOf(session, "fall"));
+export const hasFallen = (session) => Boolean(session?.alarms && alarmOf(session, "fall"));
 
 function describeFall(session, { robot }) {
   const alarm = alarmOf(session, "fall");
   if (!alarm) return "";
   const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
-  const { station } = document.getElementById("monitor").dataset;
+  const { station: place } = document.getElementById("monitor").dataset;
+  const where = place && fill(_("Where: %(place)s"), { place });
   const cure = `${_("If the belt still runs, stop it by hand.")} ${_("Stay with the patient and call for help.")}`;
+  const noted = fill(_("Noted by %(who)s"), { who: alarm.by || "–" });
   const facts = [
-    alarm.by && fill(_("Noted by %(who)s at %(time)s"), { who: alarm.by, time: timeOf(alarm) }),
-    minutesAgo(alarm.at),
-    session.state === "paused" && _("Paused"),
+    `${noted}, ${minutesAgo(alarm.at)}`,
+    session.state === "paused" && _("Session paused"),
     robot.isHere && robot.isStopped && _("Robot stopped"),
+    _("Belt: not known to GARRY"),
   ];
-  return [fell, station, cure, facts.filter(Boolean).join(" · ")].join("\n");
+  return [fell, where, cure, ...facts.filter(Boolean)].join("\n");
+}
+
+// Who takes care of it, in the pause.
+function describeSeen({ fall_seen: seen, state, about }) {
+  if (!seen || state !== "paused") return "";
+  const values = { who: seen.by, name: about.nickname, time: timeOf(seen) };
+  return fill(_("%(who)s takes care of %(name)s’s fall, %(time)s."), values);
 }
 
 function describeOwnStop(session, { robot }) {
@@ -134,12 +143,13 @@ export const CAUSES = [
   },
   {
     cause: "fall",
-    hides: ["robot_stop", "restart", "ended", "source", "signals", "strides", "tablet", "robot", "why"],
+    hides: ["seen", "robot_stop", "restart", "ended", "source", "signals", "strides", "tablet", "robot", "why"],
     isRed: true,
     describe: describeFall,
     isOwn: ({ state }) => state.fellHere,
     action: () => [_("I’ll take care of it"), ({ remark }) => remark("fall_acknowledged")],
   },
+  { cause: "seen", hides: [], describe: describeSeen, isCalm: true },
   {
     cause: "robot_stop",
     hides: ["robot"],

@@ -4,9 +4,9 @@
 
 import { soundAlarm } from "garry/monitor/alarm_tone";
 import { findCauses } from "garry/monitor/alarm_causes";
+import { update } from "garry/monitor/state";
 
 const REFRESH_MS = 250; // silence sends no event
-const LINES = ["b", "b", "span", "small"]; // of a fall, as in sessions/alarm.html
 
 export function createAlarms(page) {
   const { state } = page;
@@ -24,17 +24,20 @@ export function createAlarms(page) {
     return banner;
   }
 
+  // One sentence; or of a fall who, where, what to do, and what is so, as in sessions/alarm.html.
+  function drawLines([who, where, cure, ...facts]) {
+    const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: `${text} ` });
+    if (cure === undefined) return [make("span", who)];
+    const told = make("small", "");
+    told.className = "row wrap";
+    told.append(...facts.map((fact) => Object.assign(make("span", fact), { className: "badge" })));
+    return [make("b", who), where && make("b", where), make("span", cure), told].filter(Boolean);
+  }
+
   function drawWords(banner, sentence) {
     if (banner.dataset.of === sentence) return;
     banner.dataset.of = sentence;
-    const lines = sentence.split("\n");
-    const tags = lines.length > 1 ? LINES : ["span"];
-    const drawn = lines.map((line, index) => {
-      const part = document.createElement(tags[index]);
-      part.textContent = `${line} `;
-      return line ? part : "";
-    });
-    banner.firstChild.replaceChildren(...drawn);
+    banner.firstChild.replaceChildren(...drawLines(sentence.split("\n")));
   }
 
   function drawButton(banner, action) {
@@ -42,7 +45,7 @@ export function createAlarms(page) {
     if (!action) return button?.remove();
     if (!button) {
       button = banner.appendChild(document.createElement("button"));
-      button.className = banner.classList.contains("red") ? "btn seen" : "btn small";
+      button.className = banner.classList.contains("red") ? "btn big seen" : "btn small";
     }
     const [label, act] = action;
     if (button.textContent !== label) button.textContent = label;
@@ -71,9 +74,11 @@ export function createAlarms(page) {
   return {
     draw,
     events: {
+      state(session) {
+        if (session.state === "running") session.fall_seen = null;
+      },
       alarms(session, event) {
-        session.alarms = event.alarms;
-        session.stop_reason = event.stop_reason;
+        update(session, event, ["alarms", "stop_reason", "fall_seen"]);
       },
     },
   };

@@ -2,6 +2,7 @@
 
 import { _, fill, n_ } from "garry/shared/language";
 import { percent } from "garry/shared/format";
+import { hasFallen } from "garry/monitor/alarm_causes";
 import { legendOf } from "garry/monitor/annotations";
 import { drawHitRing } from "garry/monitor/hit_ring";
 import { drawLastStrides } from "garry/monitor/last_strides";
@@ -27,6 +28,11 @@ export function createStrideCharts({ state, show }) {
   }
 
   const isBeforeGoal = ({ goal }) => goal === null && state.strides.every(({ performance }) => performance == null);
+
+  function describeStrip(session) {
+    if (hasFallen(session)) return _("Strides before the fall");
+    return isBeforeGoal(session) ? fill(_("Strides in %(unit)s, mean ± SD"), session) : _("Strides against the goal");
+  }
 
   function describeLast() {
     const judged = state.strides.filter(({ performance }) => performance !== null).slice(-LAST);
@@ -54,18 +60,18 @@ export function createStrideCharts({ state, show }) {
     );
   }
 
-  return {
+  const charts = {
     draw(session) {
-      show(
-        "strip",
-        isBeforeGoal(session) ? fill(_("Strides in %(unit)s, mean ± SD"), session) : _("Strides against the goal"),
-      );
+      show("strip", describeStrip(session));
       drawStrip(strip, state.strides, state.annotations, session);
       drawLegend();
       show("of-twenty", describeLast());
-      drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session), session.span);
+      if (twenty)
+        drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session), session.span);
       drawHitRing(ring, session.hit_rate, session.target.hit_rate);
       describeRate(session);
     },
   };
+  new ResizeObserver(() => state.session && charts.draw(state.session)).observe(strip); // banners take of its height
+  return charts;
 }

@@ -15,6 +15,17 @@ for (const step of document.querySelectorAll(".step")) {
   });
 }
 
+// What so many percent of the baseline were last time.
+const percent = document.querySelector("input[name=goal_percent]");
+const last = document.querySelector("[data-last]");
+function showLast() {
+  const about = last?.querySelector("output");
+  const { places } = document.querySelector(".step[data-for=value]").dataset;
+  if (about) about.textContent = ((last.dataset.last * Number(percent.value)) / 100).toFixed(places);
+}
+for (const kind of ["click", "input"]) percent.closest(".step").addEventListener(kind, showLast);
+showLast();
+
 const choices = document.querySelectorAll("input[name=goal_by]");
 function showGoal() {
   const by = document.querySelector("input[name=goal_by]:checked")?.value ?? "value";
@@ -32,6 +43,7 @@ document.querySelector("select[name=measure]")?.addEventListener("change", ({ ta
   buttons.querySelector("input").value = goal;
   document.querySelector("[data-unit]").textContent = unit;
   document.querySelector("[data-better]").textContent = better;
+  last?.remove();
 });
 
 // Only the numbers that the chosen rule asks for.

@@ -24,7 +24,7 @@ async function look() {
       if (answer.ok && now !== before) place.innerHTML = shown = found;
       if (answer.ok && isListOld()) return location.reload();
       for (const since of place.querySelectorAll("[data-since]")) {
-        const text = `(${minutesAgo(since.dataset.since)})`;
+        const text = minutesAgo(since.dataset.since);
         if (since.textContent !== text) since.textContent = text;
       }
     } catch {

@@ -2,6 +2,7 @@
 // Whoever tapped by mistake withdraws the note alone: going on, and letting the robot move, are taps of their own.
 
 import { _, fill } from "garry/shared/language";
+import { hasFallen } from "garry/monitor/alarm_causes";
 import { openDialog } from "garry/monitor/controls/open_dialog";
 
 const WITHDRAWN_WITHIN_MS = 10_000;
@@ -53,6 +54,9 @@ export function createFall({ state: told, show, announce, onPress, change, note,
   });
 
   return {
-    draw: ({ state }) => (button.disabled = !["ready", "running", "paused"].includes(state)),
+    draw(session) {
+      button.disabled = !["ready", "running", "paused"].includes(session.state);
+      show("fall-again", hasFallen(session) ? _("Another fall") : _("Fall"));
+    },
   };
 }

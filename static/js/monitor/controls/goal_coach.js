@@ -36,8 +36,11 @@ export function createGoalCoach({ show, onPress, change }) {
   }) {
     if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
     if (goal === null || now === null || goal === now) return "";
-    const text = _("By the last 20 strides, a goal of %(goal)s %(unit)s gives %(hits)s hits.");
-    return fill(text, { goal: number(goal, 2), unit, hits: percent(wanted) });
+    const text =
+      goal < now
+        ? _("Lower the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.")
+        : _("Raise the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.");
+    return fill(text, { now: number(now, 2), goal: number(goal, 2), unit, hits: percent(wanted) });
   }
 
   return {

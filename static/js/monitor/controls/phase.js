@@ -19,9 +19,8 @@ export function createPhase({ show, onPress, change }) {
       again.disabled = !["running", "paused"].includes(session.state);
       drawBar(session);
       const next = session.phases[session.phase.index + 1];
-      show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("Last phase"));
-      button.disabled = !next;
-      button.classList.toggle("none", !next);
+      show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : "");
+      button.disabled = button.hidden = !next;
     },
   };
 }

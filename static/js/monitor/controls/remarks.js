@@ -21,7 +21,7 @@ export function createRemarks({ announce, onPress, remark }) {
   return {
     events: {
       remark(_session, event) {
-        if (event.what === "fall") return; // its banner says so
+        if (["fall", "fall_acknowledged"].includes(event.what)) return; // a banner says so
         announce(fill(_("Noted: %(what)s"), { what: describe(annotationOf(event)) }));
       },
     },
