@@ -75,7 +75,7 @@ def test_who_was_here_today_is_next_expected_another_day(world, pt):
     assert "here today" in after
     assert after.index("Train again today") < after.index("Next visit")
     assert after.index("Next visit") < after.index("Last session: today")
-    planning = 'id="next-visit" open'
+    planning = 'class="visits card" open'
     assert planning not in after
     later.delete()
     assert planning in " ".join(pt.get(page).content.decode().split())
