@@ -39,7 +39,7 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
     given, answered = active_consents(patient), answered_purposes(patient)
     context = {
         "patient": patient,
-        "consents": [str(each) for each in given.values()],
+        "consents": [each.label for each in Purpose if each in given],
         "refused": [each.label for each in Purpose if each in answered - given.keys()],
         "unasked": []
         if patient.erased_at

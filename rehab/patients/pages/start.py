@@ -174,7 +174,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 @never_cache
 @require_safe
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show a patient: a session like last time, other set-ups, past sessions, planned visits."""
+    """Show a patient: a session like last time, planned visits (``?plan``: open), progress."""
     user = user_of(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     lists = start_context(user)
@@ -192,7 +192,9 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         "open_here": open_sessions(user).filter(patient=patient),
         "visits": visits,
         "was_here": was_here,
-        "must_plan": (was_here and not visits) or (row is not None and row.is_missed),
+        "must_plan": "plan" in request.GET
+        or (was_here and not visits)
+        or (row is not None and row.is_missed),
         "soon": [
             (days, today + timedelta(days=days), planned.get(today + timedelta(days=days)))
             for days in QUICK_VISIT_DAYS
