@@ -104,6 +104,7 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
         {
             "purpose": row.purpose,
             "level": row.level or None,
+            "answer": "no" if row.is_refusal else "yes",
             "given_at": row.given_at,
             "withdrawn_at": row.withdrawn_at,
             "version": row.text and row.text.version,

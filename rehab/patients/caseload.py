@@ -9,12 +9,13 @@ from datetime import date, datetime, time, timedelta
 from enum import StrEnum
 
 from django.utils.functional import Promise
+from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.patients.visits import Visit, is_late
+from rehab.patients.visits import MISSED_AFTER, Visit, is_late
 from rehab.people.models import Patient, User
 from rehab.people.simulated import counted
-from rehab.sessions.formatting import clinic_time, format_number
+from rehab.sessions.formatting import clinic_time, format_day, format_number
 from rehab.sessions.models import TrainingSession
 
 LOOKED_BACK = timedelta(weeks=26)
@@ -44,8 +45,11 @@ FLAGS: dict[str, str | Promise] = {
     Flag.NEW: _("new"),
 }
 
-
-SIGNS = {Flag.IMPROVING: "▲", Flag.DECLINING: "▼"}
+REASONS: dict[str, str | Promise] = {
+    Flag.DECLINING: _("easier goal than 3 sessions ago"),
+    Flag.STUCK: _("no harder goal in 3 sessions"),
+    Flag.IMPROVING: _("harder goal than 3 sessions ago"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +68,8 @@ class Case:
     """A patient of the list.
 
     ``walks``: the newest sessions, the newest first; ``recent``: how many of the last four weeks;
-    ``missed``: the last planned day whose visit is past, if the patient has not walked since.
+    ``missed``: the last planned day whose visit is past, if the patient has not walked since;
+    ``may_come``: it is today, and the patient only late.
     """
 
     patient: Patient
@@ -73,6 +78,7 @@ class Case:
     next_visit: Visit | None
     missed: date | None
     flags: tuple[Flag, ...]
+    may_come: bool = False
 
     @property
     def goals(self) -> str:
@@ -81,10 +87,18 @@ class Case:
         kept = [goal for place, goal in enumerate(shown) if not place or shown[place - 1] != goal]
         return f"{' → '.join(kept)} {self.walks[0].unit}" if kept else ""
 
-    @property
-    def way(self) -> str:
-        """The sign of the flag that tells how the goal went: up is better."""
-        return next((SIGNS[flag] for flag in self.flags if flag in SIGNS), "")
+    def tell(self, today: date) -> list[tuple[Flag, str, str]]:
+        """Return each flag with its label and, where that is not plain, its reason in words."""
+        return [(flag, str(FLAGS[flag]), self._reason(flag, today)) for flag in self.flags]
+
+    def _reason(self, flag: Flag, today: date) -> str:
+        if flag is not Flag.DUE:
+            return str(REASONS.get(flag, ""))
+        if self.missed is None:
+            return gettext("no visit planned")
+        if self.missed < today:
+            return gettext("did not come on %(day)s") % {"day": format_day(self.missed, today)}
+        return gettext("late today") if self.may_come else gettext("did not come today")
 
     @property
     def _compared(self) -> list[float]:
@@ -180,7 +194,8 @@ def _to_case(
 ) -> Case:
     today = now.date()
     last = walks[0].day if walks else date.min
-    coming = next((v for v in visits if v.day >= today and v.day > last), None)
+    gone = [v for v in visits if v.day == today and is_late(v.at, now, by=MISSED_AFTER)]
+    coming = next((v for v in visits if v.day >= today and v.day > last and v not in gone), None)
     past = [v.day for v in visits if v.day < today or (v.day == today and is_late(v.at, now))]
     missed = next((day for day in reversed(past) if day > last), None)
     return Case(
@@ -190,4 +205,5 @@ def _to_case(
         coming,
         missed,
         judge(walks, coming.day if coming else None, missed, today),
+        not gone,
     )

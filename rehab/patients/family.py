@@ -79,6 +79,9 @@ class FamilyLink(ClinicModel):
         return self.ended_at is not None or self.expires_at <= now
 
 
+NOT_AGREED = _("The patient has not agreed to family view. Ask, and note the answer.")
+
+
 def refusal_reason(patient: Patient) -> str:
     """Return why a patient's family sees nothing now; empty where it may."""
     if patient.erased_at is not None or patient.ended_at is not None:
@@ -88,7 +91,7 @@ def refusal_reason(patient: Patient) -> str:
             _("In a blinded study there is no family view: points and hits would tell too much.")
         )
     if Purpose.FAMILY not in active_consents(patient):
-        return str(_("The patient has not agreed to family view. Ask, and note the answer."))
+        return str(NOT_AGREED)
     return ""
 
 

@@ -73,10 +73,13 @@ class _SpokenForm(_PatientFieldsForm):
             self.instance.language = self.initial["language"] = self.instance.clinic.language
 
 
+FIRST = ("nickname", "code", "paretic_side", "body_mass_kg")  # the others can wait
+
+
 class PatientForm(_SpokenForm):
     """A patient of the PT's clinic, new or to be edited."""
 
-    field_order = ("nickname", "code", "paretic_side")  # then as in the model
+    field_order = FIRST  # then as in the model
 
     class Meta:
         model = Patient
@@ -103,6 +106,16 @@ class PatientForm(_SpokenForm):
                     "time."
                 ),
             )
+
+    @property
+    def first(self) -> list[forms.BoundField]:
+        """The fields that are always shown."""
+        return [self[name] for name in FIRST]
+
+    @property
+    def more(self) -> list[forms.BoundField]:
+        """The fields that can wait."""
+        return [field for field in self if field.name not in {*FIRST, "agrees"}]
 
     def clean(self) -> dict[str, Any]:
         """Return the cleaned data. Refuses a birth or a stroke that is still to come."""

@@ -63,7 +63,7 @@ class Visit(ClinicModel):
 
 
 class Progress(StrEnum):
-    """A patient's progress today: who is open comes first in the list, in this order."""
+    """A patient's progress today."""
 
     WALKING = "walking"
     PAUSED = "paused"
@@ -156,7 +156,7 @@ def suggested_time(user: User, patient: Patient, now: datetime) -> time | None:
 
 
 def patients_today(user: User, now: datetime) -> list[PatientToday]:
-    """Return who is expected at somebody's clinic today or was here: open ones first, then by time.
+    """Return who is expected at somebody's clinic today or was here, by time.
 
     ``now`` is in the clinic's time zone. Ended sessions count if a person walked in them.
     """
@@ -173,13 +173,7 @@ def patients_today(user: User, now: datetime) -> list[PatientToday]:
         _to_row(patient, expected.get(patient.pk), by_patient.get(patient.pk, []), now)
         for patient in patients.filter(pk__in={*expected, *by_patient})
     ]
-    order = list(PROGRESS_OF_OPEN.values())
-
-    def place(row: PatientToday) -> tuple[int, time, str]:
-        first = order.index(row.progress) if row.progress in order else len(order)
-        return first, row.at or time.max, row.patient.nickname
-
-    return sorted(rows, key=place)
+    return sorted(rows, key=lambda row: (row.at or time.max, row.patient.nickname))
 
 
 def _to_row(

@@ -118,6 +118,21 @@ WALK_SPEED = (
     gettext_noop("Stop it when the first foot crosses the last mark."),
     gettext_noop("Walking aid and orthosis as usual; walk slightly behind, never ahead."),
 )
+STOP_AT_ONCE = gettext_noop(  # ATS 2002
+    "Stop at once for chest pain, severe breathlessness, leg cramps, dizziness or "
+    "staggering, heavy sweating, or a pale face."
+)
+# What a standard test is about, and about how many minutes it takes, for who plans a visit.
+PURPOSES = {
+    "10mwt": (gettext_noop("Comfortable walking speed"), 5),
+    "10mwt_fast": (gettext_noop("How fast the patient can walk"), 5),
+    "6mwt": (gettext_noop("Endurance: how far in six minutes"), 10),
+    "tug": (gettext_noop("Stand up, walk, turn, sit: risk of falls"), 3),
+    "5sts": (gettext_noop("Leg strength"), 3),
+    "fac": (gettext_noop("How much help walking takes"), 5),
+    "fma_le": (gettext_noop("Movement and reflexes of the leg"), 15),
+    "berg": (gettext_noop("Balance, sitting and standing"), 20),
+}
 # Each number's source is beside it; in full in docs/reference/questionnaires.md#walking-tests.
 CLINICAL_TESTS: dict[str, ClinicalTest] = {
     test.slug: test
@@ -173,10 +188,7 @@ CLINICAL_TESTS: dict[str, ClinicalTest] = {
                 ),
                 gettext_noop("Tap “Lap” at each turn. Every minute, say how much time is left."),
                 gettext_noop("At six minutes, measure the meters since the last turn."),
-                gettext_noop(  # ATS 2002
-                    "Stop at once for chest pain, severe breathlessness, leg cramps, dizziness or "
-                    "staggering, heavy sweating, or a pale face."
-                ),
+                STOP_AT_ONCE,
             ),
             norms=((60, 538, 572), (70, 471, 527), (80, 392, 417)),  # means: Steffen 2002
             least_change=34.4,  # Tang 2012

@@ -18,7 +18,7 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.field_policy import erased, personal_fields, retained
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicModel
-from rehab.questionnaires.standard_tests import CLINICAL_TESTS, ClinicalTest
+from rehab.questionnaires.standard_tests import CLINICAL_TESTS, PURPOSES, ClinicalTest
 from rehab.sessions.available_tests import find_test, own_tests
 from rehab.sessions.formatting import MISSING, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
@@ -88,6 +88,14 @@ class Course:
     test: ClinicalTest
     results: Sequence[Assessment]
     norm: tuple[float, float] | None
+
+    @property
+    def purpose(self) -> str:
+        """What the test measures, and how long it takes; empty for a clinic's own."""
+        if self.test.slug not in PURPOSES:
+            return ""
+        what, minutes = PURPOSES[self.test.slug]
+        return gettext("%(what)s; about %(count)s min") % {"what": gettext(what), "count": minutes}
 
     @property
     def last(self) -> Assessment | None:

@@ -8,9 +8,15 @@ SIZE = (120, 32)  # of the drawing, in its own units
 EDGE = 4  # room for the dots at its ends
 
 
-def draw_spark(values: Sequence[float], *, higher_is_better: bool) -> list[str]:
-    """Return the points of a line in a drawing of the size `SIZE`, better values higher."""
-    low, high = min(values, default=0.0), max(values, default=0.0)
+def draw_spark(
+    values: Sequence[float], *, higher_is_better: bool, beside: Sequence[float] = ()
+) -> list[str]:
+    """Return the points of a line in a drawing of the size `SIZE`, better values higher.
+
+    ``beside``: the values of another line on the same scale.
+    """
+    scale = [*values, *beside]
+    low, high = min(scale, default=0.0), max(scale, default=0.0)
     span = (high - low) or 1.0
     width, height = SIZE
     points = []

@@ -43,13 +43,13 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     walk(emil, "positive", [HIT], simulated=True)  # nobody was here
     listed = patients_today(world.people[Role.PT], HERE)
     assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
-        ("Dora", HERE.time().replace(second=0), Progress.WALKING),
         ("Cleo", time(9, 0), Progress.DONE),
         ("Ana", time(9, 30), Progress.EXPECTED),
+        ("Dora", HERE.time().replace(second=0), Progress.WALKING),
         ("Bo", None, Progress.EXPECTED),
     ]
-    assert [row.is_late for row in listed] == [False, False, True, False]
-    assert listed[1].walked_s == pytest.approx(130, abs=3)
+    assert [row.is_late for row in listed] == [False, True, False, False]
+    assert listed[0].walked_s == pytest.approx(130, abs=3)
 
 
 def test_who_is_late_for_hours_did_not_come(world):
@@ -73,8 +73,13 @@ def test_who_was_here_today_is_next_expected_another_day(world, pt):
     assert after.count("Remove the visit of") == 1
     assert after.count('aria-pressed="true" disabled') == 1  # the day that is planned is no choice
     assert "here today" in after
-    assert after.index("Last session: today") < after.index("Next visit")
-    assert after.index("Next visit") < after.index("Train again today")
+    assert after.index("Train again today") < after.index("Next visit")
+    assert after.index("Next visit") < after.index("Last session: today")
+    planning = 'class="visits card" open'
+    assert planning not in after
+    later.delete()
+    assert planning in " ".join(pt.get(page).content.decode().split())
+    later.save()
     (case,) = [one for one in load_caseload(world.people[Role.PT], HERE) if one.patient == cleo]
     assert case.next_visit == later
 

@@ -98,6 +98,32 @@ def test_a_tap_notes_consent_and_another_withdraws_it_with_who_and_when(world, p
     assert "care" not in active_consents(world.patient)
 
 
+def test_who_was_not_asked_has_no_answer_and_a_no_is_noted_once(world, pt):
+    rosa = world.add_patient()
+    publish_text(world.clinic, "Hello.\n\nCare: your therapists use it.\n\nBye.", None, NOW)
+    url = reverse("consent", kwargs={"patient_id": rosa.pk})
+    page = pt.get(url).content.decode()
+    assert 'aria-pressed="true"' not in page
+    assert page.count("not asked yet") == len(offered_purposes(world.clinic))
+    assert (
+        page.index("Hello.")
+        < page.index("Your therapists use it.")
+        < page.index('value="yes"')
+        < page.index("Bye.")
+    )
+    for _ in range(2):
+        tap(pt, rosa, "care", "no")
+        tap(pt, rosa, "boards", "own")
+    page = pt.get(url).content.decode()
+    assert page.count('aria-pressed="true"') == 2
+    assert active_consents(rosa) == {}
+    rows = list(Consent.everywhere.filter(patient=rosa))
+    assert sorted(row.purpose for row in rows if row.is_refusal) == ["boards", "care"]
+    assert "until" not in page  # nothing was given that could end
+    tap(pt, rosa, "care", "yes")
+    assert not active_consents(rosa)["care"].is_refusal
+
+
 @pytest.mark.parametrize(
     ("purpose", "answer"), [("care", "maybe"), ("fame", "yes"), ("boards", "x")]
 )
@@ -215,7 +241,7 @@ def test_a_clinic_may_need_consent_to_care_before_a_session(world, pt):
     world.begin_session()
     page = pt.post(consent, {"purpose": "care", "answer": "no"}, follow=True).content.decode()
     assert "This clinic sets up no session without it." in page
-    assert f'href="{reverse("records", args=[world.patient.pk])}">End the program' in page
+    assert f'href="{reverse("records", args=[world.patient.pk])}">End the training program' in page
     with pytest.raises(InvalidSetting):
         world.begin_session()
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)

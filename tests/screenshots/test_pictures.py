@@ -187,7 +187,7 @@ plan_visit(rosa, today + timedelta(7), time(9, 30))
 for name, code, side, at in (
     ("Joon", "K7-211", "right", time(10, 15)),
     ("Amara", "K7-230", "left", time(11, 0)),
-    ("Walter", "K7-118", "right", time(13, 30)),
+    ("Walter", "K7-118", "right", min(time(23, 59), (timezone.now() + timedelta(hours=1)).time())),
 ):
     who = Patient.everywhere.create(
         clinic=first_clinic(), code=code, nickname=name, paretic_side=side

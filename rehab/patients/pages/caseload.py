@@ -25,15 +25,13 @@ def show_caseload(request: HttpRequest) -> HttpResponse:
     context = {
         "today": now.date(),
         "cases": [
-            (case, [(flag, FLAGS[flag]) for flag in case.flags])
-            for case in cases
-            if not only or only in case.flags
+            (case, case.tell(now.date())) for case in cases if not only or only in case.flags
         ],
         "only": only,
-        "has_arrows": any(case.way for case in cases),
         "chips": [
-            (flag, label, sum(not flag or flag in case.flags for case in cases))
+            (flag, label, count)
             for flag, label in {"": "", **FLAGS}.items()
+            if (count := sum(not flag or flag in case.flags for case in cases)) or flag == only
         ],
     }
     return render(request, "patients/caseload.html", context)

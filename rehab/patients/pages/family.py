@@ -15,6 +15,7 @@ from django.views.decorators.csrf import csrf_exempt
 from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.patients.family import (
+    NOT_AGREED,
     WEEKS,
     FamilyLink,
     FamilyLinkRefused,
@@ -106,10 +107,12 @@ def show_links(request: HttpRequest, patient_id: int) -> HttpResponse:
 def _render_links(request: HttpRequest, patient: Patient, **given: str) -> HttpResponse:
     now = timezone.now()
     rows = FamilyLink.objects.visible_to(user_of(request)).filter(patient=patient)
+    reason = refusal_reason(patient)
     context = {
         "patient": patient,
         "links": [(link, link.is_over(now)) for link in rows.select_related("created_by")[:20]],
-        "refusal_reason": refusal_reason(patient),
+        "refusal_reason": reason,
+        "may_ask": reason == str(NOT_AGREED),
         "weeks": WEEKS,
         **given,
     }

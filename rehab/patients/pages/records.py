@@ -13,9 +13,11 @@ from django.views.decorators.http import require_POST, require_safe
 
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase
+from rehab.patients.family import open_links, refusal_reason
 from rehab.patients.forms import EndProgramForm, ErasureForm
 from rehab.people.access import for_roles, get_patient, user_of
-from rehab.people.consent.services import active_consents
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import active_consents, answered_purposes, offered_purposes
 from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
@@ -34,9 +36,16 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
     """Return the page, with the forms as they were sent."""
     user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
+    given, answered = active_consents(patient), answered_purposes(patient)
     context = {
         "patient": patient,
-        "consents": list(active_consents(patient).values()),
+        "consents": [each.label for each in Purpose if each in given],
+        "refused": [each.label for each in Purpose if each in answered - given.keys()],
+        "unasked": []
+        if patient.erased_at
+        else [each.label for each in offered_purposes(patient.clinic) if each not in answered],
+        "family_refusal": refusal_reason(patient),
+        "family_links": open_links(patient, timezone.now()).count(),
         "count": sessions.count(),
         "may_erase": user.role == Role.LEAD,
         "ending": EndProgramForm(),

@@ -37,6 +37,7 @@ from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
 from rehab.sessions.reports.day.today import IS_OPEN
+from rehab.sessions.reports.remarks import load_noted
 from rehab.sessions.reports.trend import load_trend, summarize_trend, with_metrics
 from rehab.sessions.spark import draw_spark
 from rehab.stations.builtin import first_station
@@ -91,11 +92,12 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
 def begin_context(user: User, patient: Patient) -> dict[str, Any]:
     """Return the context of the button that starts a session as it is proposed for a patient."""
     first_station(patient.clinic)
-    initial = initial_choices(patient, user)
+    initial, last = initial_choices(patient, user), last_session(patient, user)
     return {
         "form": SessionForm(initial=initial, patient=patient, by=user),
         "last": initial,
-        "is_repeated": last_session(patient, user) is not None,
+        "is_repeated": last is not None,
+        "last_goal": format_quantity(last.goal, last.measure.unit) if last and last.goal else "",
         "has_tablet": has_tablet(initial["station"], timezone.now()),
     }
 
@@ -109,22 +111,27 @@ def load_progress(user: User, patient: Patient, now: datetime) -> dict[str, Any]
     if not trend:
         return None
     last = trend[-1].session
-    means = [
-        point.with_feedback.mean
-        for point in trend
-        if point.with_feedback and point.session.measure == last.measure
-    ]
-    higher_is_better = last.measure.higher_is_better
-    is_course = len(means) > 1
-    return {
+    unit, higher_is_better = last.measure.unit, last.measure.higher_is_better
+    same = [p for p in trend if p.with_feedback and p.session.measure == last.measure]
+    means = [point.with_feedback.mean for point in same if point.with_feedback]
+    goals = [point.session.goal for point in same if point.session.goal]
+    goals = goals if len(goals) == len(means) else []
+    noted = load_noted(user, [last.pk]).get(last.pk, [])
+    progress = {
         "session": last,
         "day": format_day(clinic_time(last.began_at, patient.clinic).date(), now.date()),
         "totals": summarize_trend([], trend, simulated=patient.simulated),
-        "points": draw_spark(means, higher_is_better=higher_is_better) if is_course else [],
-        "ends": f"{format_number(means[0])} → {format_quantity(means[-1], last.measure.unit)}"
-        if is_course
-        else "",
+        "noted": dict.fromkeys(one.words for one in noted if one.is_adverse),
     }
+    if len(means) > 1:
+        ends = sorted([*means, *goals], reverse=higher_is_better)
+        progress |= {
+            "points": draw_spark(means, higher_is_better=higher_is_better, beside=goals),
+            "goals": draw_spark(goals, higher_is_better=higher_is_better, beside=means),
+            "scale": [format_number(ends[0]), format_number(ends[-1])],
+            "ends": f"{format_number(means[0])} → {format_quantity(means[-1], unit)}",
+        }
+    return progress
 
 
 def load_last_walked(user: User, now: datetime) -> list[tuple[TrainingSession, str, str]]:
@@ -156,6 +163,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     }
     context["lately"] = load_last_walked(user, context["now"])
     coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
+    context["is_over"] = context["today"] and all(row.is_missed for row in coming)
     following = next((row for row in coming if not row.is_late), None)
     if following is not None:  # who is late may not come: one tap in the list, when they do
         context |= {"next": following} | begin_context(user, following.patient)
@@ -166,15 +174,14 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 @never_cache
 @require_safe
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show a patient: a session like last time, other set-ups, past sessions, planned visits."""
+    """Show a patient: a session like last time, planned visits (``?plan``: open), progress."""
     user = user_of(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     lists = start_context(user)
     today = lists["now"].date()
     visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
-    was_here = any(
-        row.patient == patient and row.progress is Progress.DONE for row in lists["today"]
-    )
+    row = next((row for row in lists["today"] if row.patient == patient), None)
+    was_here = row is not None and row.progress is Progress.DONE
     if was_here:
         visits = visits.exclude(day=today)
     planned = {visit.day: visit for visit in visits}
@@ -185,10 +192,13 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         "open_here": open_sessions(user).filter(patient=patient),
         "visits": visits,
         "was_here": was_here,
+        "must_plan": "plan" in request.GET
+        or (was_here and not visits)
+        or (row is not None and row.is_missed),
         "soon": [
             (days, today + timedelta(days=days), planned.get(today + timedelta(days=days)))
             for days in QUICK_VISIT_DAYS
-            if days or all(row.patient != patient for row in lists["today"])
+            if days or row is None
         ],
         "at": suggested_time(user, patient, lists["now"]),
     }

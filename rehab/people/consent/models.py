@@ -57,7 +57,7 @@ class ConsentText(AppendOnlyModel):
 
 
 class Consent(ScopedModel):
-    """A patient's consent to one purpose, until it is withdrawn."""
+    """A patient's consent to one purpose, until it is withdrawn; at once: the patient said no."""
 
     scope = Scope(clinic="patient__clinic")
 
@@ -101,6 +101,11 @@ class Consent(ScopedModel):
 
     def __str__(self) -> str:
         return str(self.get_purpose_display())
+
+    @property
+    def is_refusal(self) -> bool:
+        """Whether the patient was asked and said no; such a row never allows anything."""
+        return self.given_at == self.withdrawn_at
 
 
 def has_consented(purpose: Purpose, patient: str = "pk") -> Exists:

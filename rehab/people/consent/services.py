@@ -81,6 +81,11 @@ def active_consents(patient: Patient) -> dict[str, Consent]:
     return {row.purpose: row for row in rows}
 
 
+def answered_purposes(patient: Patient) -> set[str]:
+    """Return what a patient has said yes or no to; what nobody asked counts as no."""
+    return set(Consent.everywhere.filter(patient=patient).values_list("purpose", flat=True))
+
+
 def offered_purposes(clinic: Clinic) -> list[Purpose]:
     """Return what a clinic asks for: remote view only where it has named its own networks."""
     return [purpose for purpose in Purpose if clinic.networks or purpose is not Purpose.REMOTE]
@@ -145,12 +150,28 @@ def withdraw_consent(patient: Patient, purpose: Purpose, by: User | None, now: d
         consent_withdrawn.send(Consent, patient=patient, purpose=purpose, by=by, now=now)
 
 
+def record_refusal(patient: Patient, purpose: Purpose, by: User | None, now: datetime) -> None:
+    """Record that a patient says no: a consent ends; who never answered is noted as asked."""
+    with transaction.atomic():
+        withdraw_consent(patient, purpose, by, now)
+        if patient.erased_at is None and purpose not in answered_purposes(patient):
+            Consent.everywhere.create(
+                patient=patient,
+                purpose=purpose,
+                text=current_text(patient.clinic),
+                given_at=now,
+                recorded_by=by,
+                withdrawn_at=now,
+                withdrawn_by=by,
+            )
+
+
 def record_boards_consent(
     patient: Patient, boards: BoardsConsent, by: User | None, now: datetime
 ) -> None:
-    """Record on which boards a patient consents to stand; OWN withdraws the consent."""
+    """Record on which boards a patient consents to stand; OWN is a refusal."""
     if boards == BoardsConsent.OWN:
-        withdraw_consent(patient, Purpose.BOARDS, by, now)
+        record_refusal(patient, Purpose.BOARDS, by, now)
         return
     with transaction.atomic():
         record_consent(patient, Purpose.BOARDS, by, now, boards.value)

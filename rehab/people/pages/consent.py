@@ -9,7 +9,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
+from django.utils.translation import gettext_lazy, override
 from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import clinic_of, for_roles, get_patient, user_of
@@ -17,13 +17,14 @@ from rehab.people.consent.forms import ConsentTextForm
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (
     active_consents,
+    answered_purposes,
     current_text,
     is_care_allowed,
     offered_purposes,
     publish_text,
     record_boards_consent,
     record_consent,
-    withdraw_consent,
+    record_refusal,
 )
 from rehab.people.models import BoardsConsent, Patient
 from rehab.people.roles import Role
@@ -31,17 +32,17 @@ from rehab.people.roles import Role
 MEANINGS = {
     Purpose.CARE: gettext_lazy("Sessions are kept, and therapists plan the training with them."),
     Purpose.RESEARCH: gettext_lazy(
-        "Researchers of the clinic see the sessions under a false name."
+        "Researchers of the clinic see the sessions under a made-up name."
     ),
     Purpose.BOARDS: gettext_lazy("Results stand beside those of others, under an animal's name."),
     Purpose.REMOTE: gettext_lazy("A therapist may watch a session from another place."),
     Purpose.FAMILY: gettext_lazy("People whom the patient chooses see how the training is going."),
 }
 LEVELS = {
+    BoardsConsent.CLINIC: gettext_lazy("Yes, in this clinic"),
+    BoardsConsent.ACROSS: gettext_lazy("Yes, in all clinics"),
+    BoardsConsent.TOTAL: gettext_lazy("Yes, in totals only"),
     BoardsConsent.OWN: gettext_lazy("No"),
-    BoardsConsent.TOTAL: gettext_lazy("Totals only"),
-    BoardsConsent.CLINIC: gettext_lazy("This clinic"),
-    BoardsConsent.ACROSS: gettext_lazy("All clinics"),
 }
 
 
@@ -56,42 +57,71 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
         if purpose == Purpose.BOARDS and answer in BoardsConsent.values:
             record_boards_consent(patient, BoardsConsent(answer), user, timezone.now())
         elif answer in ("yes", "no") and purpose in _listed_purposes(patient):
-            change = record_consent if answer == "yes" else withdraw_consent
+            change = record_consent if answer == "yes" else record_refusal
             change(patient, Purpose(purpose), user, timezone.now())
         else:
             messages.error(request, _("That cannot be chosen. Tap one of the answers."))
         return redirect("consent", patient_id=patient.pk)
     rows = Consent.objects.visible_to(user).filter(patient=patient)
+    text = current_text(patient.clinic)
+    before, words, after = split_words(text.text, patient)
     context = {
         "patient": patient,
-        "text": current_text(patient.clinic),
-        "choices": list_choices(patient),
+        "text": text,
+        "before": before,
+        "choices": [one | {"words": words.get(one["purpose"])} for one in list_choices(patient)],
+        "after": after,
         "history": rows.select_related("text", "recorded_by", "withdrawn_by"),
     }
     return render(request, "people/consent.html", context)
 
 
+def split_words(text: str, patient: Patient) -> tuple[str, dict[Purpose, str], str]:
+    """Return a text's words before those of the first purpose, of each purpose, and the others.
+
+    A purpose's own paragraph begins with its name in the clinic's language and a colon.
+    """
+    with override(patient.clinic.language):
+        names = {str(purpose.label): purpose for purpose in _listed_purposes(patient)}
+    before: list[str] = []
+    after: list[str] = []
+    words: dict[Purpose, str] = {}
+    for paragraph in text.split("\n\n"):
+        name, _colon, said = paragraph.partition(":")
+        if purpose := names.pop(name.strip(), None):
+            words[purpose] = said.strip()
+        else:
+            (after if words else before).append(paragraph)
+    return "\n\n".join(before), words, "\n\n".join(after)
+
+
 def list_choices(patient: Patient) -> list[dict[str, Any]]:
     """Return the purposes that are offered, or consented to, each with its options.
 
-    An option is a value, its label, and whether it is chosen now.
+    An option is a value, its label, and whether it was answered: none, where nobody asked.
     """
     active, text = active_consents(patient), current_text(patient.clinic)
+    answered = answered_purposes(patient)
     choices = []
     for purpose in _listed_purposes(patient):
         consent = active.get(purpose)
+        is_refused = consent is None and purpose in answered
         if purpose == Purpose.BOARDS:
             now = patient.boards if consent else BoardsConsent.OWN
             across = patient.clinic.boards_across or now == BoardsConsent.ACROSS
-            levels = [level for level in BoardsConsent if across or level != BoardsConsent.ACROSS]
-            options = [(level.value, str(LEVELS[level]), level == now) for level in levels]
+            options = [
+                (level.value, str(label), level == now and (consent is not None or is_refused))
+                for level, label in LEVELS.items()
+                if across or level != BoardsConsent.ACROSS
+            ]
         else:
-            options = [("yes", _("Yes"), consent is not None), ("no", _("No"), consent is None)]
+            options = [("yes", _("Yes"), consent is not None), ("no", _("No"), is_refused)]
         choices.append(
             {
                 "purpose": purpose,
                 "meaning": MEANINGS[purpose],
                 "consent": consent,
+                "is_answered": purpose in answered,
                 "is_outdated": consent is not None and consent.text_id != text.pk,
                 "options": options,
                 # Without it no session can be set up.

@@ -21,7 +21,13 @@ from rehab.people.roles import Role
 from rehab.people.row_values import read_key
 from rehab.people.web.refusals import format_refusal
 from rehab.questionnaires.form_items import MAX_LETTERS, FormItem, total
-from rehab.questionnaires.standard_tests import LAP_TEST_S, ClinicalTest, Way, to_speed
+from rehab.questionnaires.standard_tests import (
+    LAP_TEST_S,
+    STOP_AT_ONCE,
+    ClinicalTest,
+    Way,
+    to_speed,
+)
 from rehab.sessions.assessment_results import Assessment, format_result, load_courses
 from rehab.sessions.available_tests import fix_tests
 from rehab.sessions.formatting import format_number
@@ -29,6 +35,7 @@ from rehab.sessions.setup.walking_conditions import MAX_DEVICE_LETTERS
 from rehab.training.measures import InvalidSetting
 
 USUAL_METERS = 10.0
+SCORED = (Way.SCORE, Way.FORM)
 STORED = ("value", "answers", "remarks", "device")  # of a form, in the row
 
 
@@ -132,7 +139,7 @@ def list_assessments(request: HttpRequest, patient_id: int) -> HttpResponse:
     user = user_of(request)
     patient = get_patient(user, patient_id)
     courses = load_courses(user, patient)
-    context = {"patient": patient, "courses": courses, "none": not any(c.results for c in courses)}
+    context = {"patient": patient, "courses": courses, "scored": SCORED}
     return render(request, "sessions/assessments.html", context)
 
 
@@ -175,7 +182,9 @@ def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
         "test": test,
         "course": course,
         "form": form,
-        "has_timer": test.way not in {Way.SCORE, Way.FORM},
+        "warning": STOP_AT_ONCE if STOP_AT_ONCE in test.steps else "",
+        "steps": [step for step in test.steps if step != STOP_AT_ONCE],
+        "has_timer": test.way not in SCORED,
         "lap_test_s": LAP_TEST_S if test.way is Way.LAPS else 0,
     }
     return render(request, "sessions/assess.html", context)
