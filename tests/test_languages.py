@@ -38,10 +38,11 @@ ALIKE_IN = {
     "es": "factor robot sensor extra normal plan total",
     "de": "arm code codes design feedback hand hedges index minus monitor name normal passkey "
     "patient pause person phase plan plus sensor start tablet tablets training",
-    "fr": "cadence code correction corrections date description distance effort formats incident incidents "
-    "menu migrations minutes moment normal options pages participant participants patient patients "
-    "pause performance phase phases phrases plan plus point points position questionnaire "
-    "questionnaires questions robot signature source test total type variation version",
+    "fr": "cadence code correction corrections date description distance effort formats incident "
+    "incidents menu migrations minutes moment normal options pages participant participants "
+    "patient patients pause performance phase phases phrases plan plus point points position "
+    "questionnaire questionnaires questions robot signature source test total type variation "
+    "version",
 }
 
 
