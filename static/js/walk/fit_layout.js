@@ -24,9 +24,11 @@ const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const NARROW = 600; // the total has no room beside the thermometer: it is below it
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 260; // of the thermometer
+const BESIDE_WORDS = 420; // the same, where words are beside it and so may be smaller for its sake
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
+const SIGN_HIGH = 96; // of the goal, where it is below its line
 const SCENE = 188; // the thermometer's width
 const PAIR = 24; // between it and the badge, both in the middle
 
@@ -81,7 +83,9 @@ export function createFitting(body, scene) {
     if (isTooLarge) return null;
 
     const { column } = body.dataset;
-    const isWide = landscape.matches && !column;
+    const isHalf = column === "right" || column === "left";
+    const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
+    const sign = isBeside ? (isHalf ? "below" : "behind") : column === "center" ? "over" : "before"; // scene.js
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
     const isBelow = width < NARROW || (column === "center" && !landscape.matches); // the total
@@ -89,19 +93,20 @@ export function createFitting(body, scene) {
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
-    const top = Math.max(isWide ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
+    const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
     const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const isRow = landscape.matches && column !== "right" && column !== "left"; // the badge is beside the total
+    const isRow = landscape.matches && !isHalf; // the badge is beside the total
+    const under = reach + (sign === "below" ? SIGN_HIGH : AIR);
     const beside = isBelow ? 0 : total;
-    const ground = goal + reach + AIR + (isRow ? Math.max(badge, beside) : badge + beside);
-    if (zero - top < SCALE_LEAST || ground > stand) return null;
+    const ground = goal + under + (isRow ? Math.max(badge, beside) : badge + beside);
+    if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle is the thermometer, or where the total is below it, it and the badge.
     const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
     const inset = column === "center" ? (width - SCENE + pair) / 2 - EDGE : 0;
-    const above = goal + reach + AIR - main.offsetTop / u;
-    return { width, height, isWide, isCenter: column === "center", inset, top, zero, goal, reach, above, high };
+    const above = goal + under - main.offsetTop / u;
+    return { width, height, sign, inset, top, zero, goal, reach, above, high };
   }
 
   function set(level, short) {

@@ -10,9 +10,14 @@ const BULB_RADIUS = 94;
 const EDGE = 24;
 const CLEAR = 44; // the least gap between a step and the goal line: a tenth of a degree and more from 2 m
 const TICKS = [0.25, 0.5, 0.75, 1.25];
-// The goal's sign: beside the thermometer where there is room, else on the horizon before it.
-const BESIDE = { sign: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0 };
-const BEFORE = { sign: "M0 40l20 -80h132v80z", room: BULB_RADIUS, rise: 43 };
+// The goal's sign: behind the thermometer where there is room, else on the horizon before or behind it, or below that.
+const ON_LINE = "M0 40l20 -80h132v80z";
+const SIGNS = {
+  behind: { path: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0, turn: 1 },
+  over: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: 1 },
+  before: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: -1 },
+  below: { path: "M0 -40l20 80h132v-80z", room: BULB_RADIUS, rise: -43, turn: -1 },
+};
 
 export function createScene(svg) {
   const find = (selector) => svg.querySelector(selector);
@@ -27,9 +32,8 @@ export function createScene(svg) {
   // Place all: `top`, `zero` and `goal` are heights of the scale, `reach` that of the strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, top: top150, zero, goal, reach, isWide, isCenter, isFlipped, inset } = frame;
-    const { sign, room, rise } = isWide ? BESIDE : BEFORE;
-    const turn = isWide || isCenter ? 1 : -1; // the sign: behind the thermometer, over the badge; or before it
+    const { width, height, top: top150, zero, goal, reach, sign, isFlipped, inset } = frame;
+    const { path, room, rise, turn } = SIGNS[sign];
     const x = width - EDGE - room - inset;
     const [top, bottom, r] = [top150 - 36, zero + 78, TUBE_RADIUS];
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
@@ -43,13 +47,13 @@ export function createScene(svg) {
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", turn * (r + 10), goal - rise, {}, ` scale(${turn} 1)`);
-    find(".pennant path").setAttribute("d", sign);
+    find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
     find(".pennant text").setAttribute("transform", isTurned ? "translate(164 0) scale(-1 1)" : "");
     place(".sparkles", 0, top);
     for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);
     ticks.forEach((tick, i) => tick.setAttribute("d", `M${r - 3} ${y(TICKS[i])}h${TICKS[i] === 0.5 ? -32 : -20}`));
-    const end = x - r - 50 - (isWide ? 0 : room + 90);
+    const end = x - r - 50 - (turn > 0 ? 0 : room + 90);
     const swing = reach - 30; // of the middle of a dot
     dots.layOut({
       left: 60,
