@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any
 
+from django.db.models import F
 from django.utils.translation import gettext
 
 from rehab.people.consent.models import Consent, Purpose
@@ -95,7 +96,8 @@ def agreement_rows(study: Study) -> Iterator[dict[str, Any]]:
     withdrawn = {e.enrollment_id: clinic_time(e.at, study.clinic).date() for e in events}
     for one in enrollments:
         consents = Consent.everywhere.filter(patient=one.patient, purpose=Purpose.RESEARCH)
-        given = consents.filter(given_at__lte=one.enrolled_at).select_related("text")
+        agreed = consents.exclude(withdrawn_at=F("given_at"))  # that is a refusal
+        given = agreed.filter(given_at__lte=one.enrolled_at).select_related("text")
         consent = given.order_by("-given_at").first()
         walked = one.visits.filter(version__isnull=False).order_by("number", "attempt")
         yield {
