@@ -97,10 +97,9 @@ export function createFitting(body, scene) {
     const goal = zero - (2 / 3) * (zero - top);
     const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const isRow = landscape.matches && !isHalf; // the badge is beside the total
     const under = reach + (sign === "below" ? SIGN_HIGH : AIR);
     const beside = isBelow ? 0 : total;
-    const ground = goal + under + (isRow ? Math.max(badge, beside) : badge + beside);
+    const ground = goal + under + (landscape.matches ? Math.max(badge, beside) : badge + beside);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle is the thermometer, or where the total is below it, it and the badge.
     const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
