@@ -8,7 +8,8 @@ const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 94;
 const EDGE = 24;
-const CLEAR = 44; // the least gap between a step and the goal line: a tenth of a degree and more from 2 m
+// The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
+const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: behind the thermometer where there is room, else on the horizon before or behind it, or below that.
 const ON_LINE = "M0 40l20 -80h132v80z";
@@ -58,7 +59,7 @@ export function createScene(svg) {
     dots.layOut({
       left: 60,
       right: end,
-      y: (stride) => Math.min(Math.max(levelOf(stride), goal - swing), goal + swing),
+      y: (stride) => Math.min(Math.max(levelOf(stride, CLEAR_IN_CHART), goal - swing), goal + swing),
       beyond: (performance) => Math.sign(Math.trunc((y(performance) - goal) / (swing + 1))),
     });
     if (shown) show(shown);
@@ -72,11 +73,11 @@ export function createScene(svg) {
 
   // Return how high a step stands: plainly below the goal line if it missed, above it if it hit. The scale goes on from
   // there to the same ends, so that a better step is always higher.
-  function levelOf({ performance, hit, close }) {
+  function levelOf({ performance, hit, close }, clear) {
     const level = y(performance ?? 0);
     if (performance == null || close) return level;
     const [side, room] = hit ? [-1, layout.goal - layout.top] : [1, layout.zero - layout.goal];
-    return layout.goal + side * (CLEAR + (1 - CLEAR / room) * Math.max(side * (level - layout.goal), 0));
+    return layout.goal + side * (clear + (1 - clear / room) * Math.max(side * (level - layout.goal), 0));
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
@@ -86,7 +87,7 @@ export function createScene(svg) {
     const { performance, hit, close, strides: entries, isCut } = step;
     if (!layout) return; // no room for it
     thermometer.toggleAttribute("data-cut", isCut);
-    const level = levelOf(shown);
+    const level = levelOf(shown, CLEAR);
     const height = performance === null ? layout.zero + 60 : level;
     liquid.style.transform = `translateY(${height}px)`;
     ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));
