@@ -44,7 +44,7 @@ def _look_for_station(user: User, now: datetime) -> Found:
 
 
 def _look_for_tablet(user: User, now: datetime) -> Found:
-    tablets = _devices(user, Device.Kind.TABLET)
+    tablets = list_devices(user, Device.Kind.TABLET)
     if not tablets:
         return Found(False, _("No tablet is paired yet."))
     is_here = any(one.last_seen_at and now - one.last_seen_at < JUST_NOW for one in tablets)
@@ -52,7 +52,7 @@ def _look_for_tablet(user: User, now: datetime) -> Found:
 
 
 def _look_for_sensor(user: User, now: datetime) -> Found:
-    sources = _devices(user, Device.Kind.SOURCE)
+    sources = list_devices(user, Device.Kind.SOURCE)
     if not sources:
         return Found(False, _("No sensor yet."))
     running = runtime.peek()
@@ -109,7 +109,8 @@ def is_new(user: User) -> bool:
     return not walked.exists()
 
 
-def _devices(user: User, kind: Device.Kind) -> list[Device]:
+def list_devices(user: User, kind: Device.Kind) -> list[Device]:
+    """Return a clinic's devices of a kind that may connect, but the server's own."""
     devices = Device.objects.visible_to(user).filter(kind=kind, builtin=False, revoked_at=None)
     return list(devices.order_by("name"))
 

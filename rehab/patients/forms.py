@@ -97,13 +97,12 @@ class PatientForm(_SpokenForm):
         self.fields["nickname"].widget.attrs["autofocus"] = True
         if self.instance.is_new:
             self.fields["agrees"] = forms.MultipleChoiceField(
-                label=_("What the patient agrees to"),
+                label=_("Consent"),
                 choices=[(p.value, p.label) for p in offered_purposes(self.instance.clinic)],
                 required=False,
                 widget=forms.CheckboxSelectMultiple,
                 help_text=_(
-                    "Read the clinic's words to the patient first. The answer can change at any "
-                    "time."
+                    "Ask now, or later on the patient’s page. Nothing ticked means: not asked yet."
                 ),
             )
 
@@ -169,9 +168,9 @@ class ScreenForm(_SpokenForm):
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
         help_texts: ClassVar = {
             "screen_side": _(
-                "Who misses the left side looks to the right: choose the right, or its half alone; "
-                "and the other way around. In one half, words are largest on a tablet that lies "
-                "on its side."
+                "If the left side is missed, choose the right; if the right side is missed, "
+                "choose the left. In one half alone, words are largest on a tablet that lies on "
+                "its side."
             )
         }
 

@@ -36,6 +36,7 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
 
     # The sensor gets a token.
     page.click("[data-step=sensor] a")
+    page.click("text=Force plates, a motion laboratory")
     page.fill("[name=name]", "Force plate")
     page.click("details[open] .primary")
     token = page.locator("#token").inner_text().strip()
@@ -53,13 +54,20 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
         finally:
             running.terminate()
 
+    # Once its program has ended, the page tells so and leads to its line, not to another sensor.
+    expect(page.locator("[data-live=sensor]")).to_contain_text("Not connected", timeout=30_000)
+    expect(page.get_by_text("Show the line that starts it")).to_be_visible()
+    expect(page.get_by_text("A phone on the shin")).to_be_hidden()
+
     # What was skipped stays open; the last step leads to a patient.
     page.click("text=Skip this step")
     expect(page.locator("[data-step=sensor]")).to_contain_text("skipped")
     page.click("main >> text=New patient")
     page.wait_for_url("**/patients/new/")
 
-    # Stations and devices have a page of their own: the token ends with one tap.
+    # Stations and devices have a page of their own: the token ends with two taps.
     page.goto("/stations/")
-    page.locator(".entry", has_text="Force plate").locator("[name=revoke]").click()
+    device = page.locator(".entry", has_text="Force plate")
+    device.get_by_text("More").click()
+    device.locator("[name=revoke]").click()
     expect(page.locator(".entry", has_text="Force plate")).to_contain_text("revoked")

@@ -64,7 +64,7 @@ def rows(page: Page) -> dict[str, list[str]]:
 
 def test_sessions_are_compared_and_taken_along(visit: Visit, sessions: dict[str, int]) -> None:
     page = visit("/start/", size="laptop")
-    page.click("text=Insight")
+    page.click("text=Hit rates compared")
 
     # Weeks first, the newest on top; each of one or two patients, whose means have the interval.
     weeks = rows(page)

@@ -68,6 +68,12 @@ def test_nothing_is_set_before_the_therapist_saves(world):
 
 @pytest.mark.django_db
 def test_a_screen_that_was_not_measured_is_offered_to_be(world):
-    page = client_of(world).get(f"/patients/{world.patient.pk}/screen/check/").content.decode()
+    client = client_of(world)
+    page = client.get(f"/patients/{world.patient.pk}/screen/check/").content.decode()
     assert "the patient wears the usual glasses" in page
-    assert re.search(r'<a class="btn small" href="[^"]+">Measure this screen first</a>', page)
+    [address] = re.findall(r'big wide" href="([^"]+)">\s*Measure this screen first</a>', page)
+    assert "Begin without measuring" in page
+    measured = client.post(address, {"px_per_mm": "5.884", "distance_m": "2.0"})
+    page = client.get(measured.headers["Location"]).content.decode()
+    assert "Measure this screen first" not in page
+    assert "data-begin>Begin<" in page

@@ -11,7 +11,7 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.patients.first_steps import STEPS, FirstStep, Found, is_new, look_at_all
+from rehab.patients.first_steps import STEPS, FirstStep, Found, is_new, list_devices, look_at_all
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.sign_in import step_up
@@ -65,6 +65,8 @@ def first_steps(request: HttpRequest) -> HttpResponse:
     }
     if slug == "tablet":
         context |= tablet_address(request) | {"stations": Station.objects.visible_to(user)}
+    if slug == "sensor":
+        context["sensors"] = list_devices(user, Device.Kind.SOURCE)
     acted = _act(request, slug, context)
     return acted or render(request, "patients/first_steps.html", context)
 

@@ -30,7 +30,7 @@ PAGES = {
     "progress": "history take-home family-links",
     "standard-tests": "assessments assess rehab_clinictest",
     "caseload": "caseload",
-    "insight": "insight",
+    "hit-rates-compared": "insight",
     "pair-the-tablet": "pair",
     "first-steps": "first-steps",
     "stations-and-devices": "stations new-station rehab_station rehab_device",

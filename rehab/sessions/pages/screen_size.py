@@ -18,6 +18,7 @@ from django.views.decorators.http import require_http_methods
 from rehab.people.access import for_roles, tablet_of
 from rehab.people.models import ScreenText
 from rehab.people.roles import Role
+from rehab.people.row_values import read_key
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device
 
@@ -60,7 +61,11 @@ def set_screen_size(request: HttpRequest) -> HttpResponse:
     form = ScreenSizeForm(request.POST or None, initial=known._asdict() if known else None)
     if request.method == "POST" and form.is_valid():
         screen = Screen(**form.cleaned_data)
-        response = redirect("tablet" if tablet is not None else "start")
+        patient = read_key(request.GET.get("for", ""))  # whose letter test waits for it
+        if tablet is not None:
+            response = redirect("tablet")
+        else:
+            response = redirect("check-screen", patient) if patient else redirect("start")
         if tablet is None:
             written = f"{screen.px_per_mm:.3f},{screen.distance_m:g}"
             response.set_cookie(COOKIE, written, max_age=COOKIE_AGE_S, samesite="Lax")

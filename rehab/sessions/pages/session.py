@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Any
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
@@ -16,7 +17,7 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
 from rehab.sessions.corrections import CorrectedField, can_correct, describe_corrections
-from rehab.sessions.formatting import clinic_time, format_day, format_state
+from rehab.sessions.formatting import clinic_time, format_day, format_rate, format_state
 from rehab.sessions.forms.correction import CorrectionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
@@ -30,6 +31,7 @@ from rehab.sessions.reports.summary import (
     load_point,
 )
 from rehab.sessions.reports.text_note import write_text_note
+from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.robot_incidents import RobotIncident
 from rehab.training.changes import OPEN_STATES, State
 from robot.wire.incident import MOTION
@@ -88,9 +90,8 @@ def _list_incidents(user: User, session: TrainingSession) -> list[tuple[RobotInc
 def correct(request: HttpRequest, session_id: int) -> HttpResponse:
     """Correct an ended session: who walked, whether it counts, a note. The log stays as it is."""
     user = user_of(request)
-    session = get_object_or_404(
-        TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
-    )
+    rows = with_metrics(user, TrainingSession.objects.visible_to(user))
+    session: Any = get_object_or_404(rows.select_related("patient", "clinic"), pk=session_id)
     if not can_correct(session):
         messages.error(
             request, gettext("This session is still running. End it before you correct it.")
@@ -100,4 +101,5 @@ def correct(request: HttpRequest, session_id: int) -> HttpResponse:
     if request.method == "POST" and form.create(timezone.now()):
         messages.success(request, gettext("Corrected. Figures, boards and trends follow it."))
         return redirect("session", session_id=session.pk)
-    return render(request, "sessions/correct.html", {"session": session, "form": form})
+    context = {"session": session, "form": form, "rate": format_rate(session.metric_hit_rate)}
+    return render(request, "sessions/correct.html", context)

@@ -25,11 +25,10 @@ function draw(slug, isDone, words) {
   if (isDone && !live.classList.contains("done")) root.querySelector("details")?.removeAttribute("open");
   live.classList.toggle("done", isDone);
   if (live.textContent !== words) live.textContent = words;
+  for (const part of root.querySelectorAll("[data-when]")) part.hidden = (part.dataset.when === "done") !== isDone;
   const next = root.querySelector("[name=skip]");
-  if (!next) return;
-  next.classList.toggle("primary", isDone);
-  next.classList.toggle("quiet", !isDone);
-  for (const label of next.children) label.hidden = (label.dataset.when === "done") !== isDone;
+  next?.classList.toggle("primary", isDone);
+  next?.classList.toggle("quiet", !isDone);
 }
 
 setTimeout(look, EVERY_MS);
