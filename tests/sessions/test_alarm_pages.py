@@ -111,6 +111,9 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     by = world.people[Role.PT]
     note(session, "fall")
     note(session, "fall_severity", value=1)
+    assert "Iris fell. Slightly hurt Nobody takes care of it yet" in words(
+        seen(client_of(world), "incidents")
+    )
     note(session, "robot_stop", data={"reason": "bump"})
     note(session, "fall_acknowledged", by=by)
     pt = client_of(world)

@@ -128,8 +128,8 @@ function describeRobot(session, { state, robot }) {
   return robot.alarm;
 }
 
-function describePause({ state, pause_reason: reason, rest_s: rest }) {
-  if (state !== "paused") return "";
+function describePause({ state, pause_reason: reason, rest_s: rest, fall_seen: seen }) {
+  if (state !== "paused" || (seen && reason === "therapist")) return ""; // who takes care of the fall is told
   const why = fill(PAUSES[reason] ?? _("Paused."), { time: clock(rest ?? 0) });
   return reason === "therapist" ? why : `${why} ${_("Resume when ready.")}`;
 }
