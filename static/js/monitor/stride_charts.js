@@ -47,11 +47,12 @@ export function createStrideCharts({ state, show }) {
     return close ? `${words}, ${n_("%(count)s close", "%(count)s close", close)}` : words;
   }
 
-  function describeRate({ hits, judged, close = 0, target }) {
+  // Of all strides with feedback: a few of the last may have had none.
+  function describeRate({ hits, judged, close = 0, target }, last) {
     show("wanted", target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(target.hit_rate) }) : _("No rate set"));
     show(
       "judged",
-      judged === undefined
+      judged === undefined || judged < last.judged
         ? ""
         : withClose(fill(_("%(hits)s of %(count)s in all"), { hits, count: judged - close }), close),
     );
@@ -69,7 +70,7 @@ export function createStrideCharts({ state, show }) {
       // Where the last are a drawing of their own, the ring is of all.
       const rate = twenty ? session.hit_rate : last.count ? last.hits / last.count : null;
       drawHitRing(ring, rate, session.target.hit_rate);
-      describeRate(session);
+      describeRate(session, last);
     },
   };
   new ResizeObserver(() => state.session && charts.draw(state.session)).observe(strip); // banners take of its height
