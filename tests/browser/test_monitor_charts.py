@@ -92,6 +92,11 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     expect(strip.locator(".remark-words")).to_have_count(3)
     assert page.evaluate(OVERLAP, "#strip text:not(.part)") is False
 
+    feet.walk(*[1.1] * 5, *[0.5] * 15)
+    at_stride(page, 85)
+    expect(page.locator("[data-show=of-twenty]")).to_have_text("5 of 20 hit")
+    expect(page.locator("#ring .rate")).to_have_text("25\u00a0%")  # of the same
+
 
 def test_a_phase_is_as_wide_as_it_is_long_and_filled_as_far_as_it_is_walked(
     walking: tuple[Page, Feet],

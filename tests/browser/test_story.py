@@ -103,7 +103,7 @@ def numbers_agree(story: Story, server: Server) -> None:
     judged = [row for row in rows if row["hit"] is not None]
     hits = sum(row["hit"] for row in judged)
     expect(story.monitor.locator("[data-show=judged]")).to_have_text(
-        f"{hits} of {len(judged)} strides"
+        f"{hits} of {len(judged)} in all"
     )
     assert {row["goal"] for row in rows} == {3.9, 4.0}
     points = [row["points"] for row in rows]

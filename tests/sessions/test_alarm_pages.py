@@ -111,16 +111,19 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     by = world.people[Role.PT]
     note(session, "fall")
     note(session, "fall_severity", value=1)
+    assert "Iris fell. Slightly hurt Nobody takes care of it yet" in words(
+        seen(client_of(world), "incidents")
+    )
     note(session, "robot_stop", data={"reason": "bump"})
     note(session, "fall_acknowledged", by=by)
     pt = client_of(world)
     listed = seen(pt, "incidents")
     assert "Iris fell." in listed
-    assert "slightly hurt" in listed
+    assert "Slightly hurt" in listed
     assert f"by {by}" in listed
     assert "The robot of Iris stopped by itself." in listed
-    assert "not seen yet" in listed
-    assert "Falls 1 Near fall 0 Robot stopped by itself 1" in words(listed)
+    assert "Not seen yet" in listed
+    assert "Falls 1 Near falls 0 Robot stopped 1" in words(listed)
     assert "! incident" in plain(
         pt.get(reverse("history", args=[session.patient_id])).content.decode()
     )
@@ -135,16 +138,16 @@ def test_what_is_counted_is_listed_with_what_was_done_then(world, session):
     by = world.people[Role.PT]
     note(session, "pain", value=0)  # none
     note(session, "near_fall", by=by)
-    assert f"noted by {by} · walked on" in seen(client_of(world), "incidents")
+    assert f"Noted by {by} · walked on" in seen(client_of(world), "incidents")
     note(session, "pain", value=6)
     note(session, "pause")
     note(session, "dizziness")
     listed = words(seen(client_of(world), "incidents"))
-    assert "Falls 0 Near fall 1 Robot stopped by itself 0 · Pain 1 · Dizziness 1" in listed
+    assert "Falls 0 Near falls 1 Robot stopped 0 Pain 1 Dizziness 1" in listed
     for line in (
-        f"Iris: near fall noted by {by} · pause {NOW:%H:%M}",
-        f"Iris: pain 6 of 10 pause {NOW:%H:%M}",
-        "Iris: dizziness during a pause",
+        f"Iris: near fall Noted by {by} · pause {NOW:%H:%M}",
+        f"Iris: pain 6 of 10 Pause {NOW:%H:%M}",
+        "Iris: dizziness During a pause",
     ):
         assert re.search(rf"\d\d:\d\d {re.escape(line)}", listed), line
     assert "pain 0" not in listed

@@ -30,13 +30,17 @@ RESUMES = {ChangeKind.START.value, ChangeKind.RESUME.value}
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One of them, as text; ``at`` by the clinic's clock. ``is_one``: nobody took it back."""
+    """One of them, as text; ``at`` by the clinic's clock.
+
+    ``hurt``: how badly, by a fall. ``is_one``: nobody took it back.
+    """
 
     kind: str
     session: TrainingSession
     at: datetime
     what: str
     done: str
+    hurt: str = ""
     is_open: bool = False
     is_one: bool = True
 
@@ -61,9 +65,13 @@ def list_adverse(user: User, since: datetime) -> list[Entry]:
 def count_adverse(entries: Iterable[Entry]) -> list[tuple[str, int]]:
     """Return how often each thing went wrong in sessions that count: falls, near falls, others."""
     found = Counter(one.kind for one in entries if one.is_counted)
-    noted = [(capfirst(str(EVENTS[kind])), found[kind]) for kind in ADVERSE if kind != Remark.FALL]
-    stops = gettext("Robot stopped by itself"), found[Alarm.ROBOT_STOP]
-    return [(gettext("Falls"), found[Alarm.FALL]), noted[0], stops, *noted[1:]]
+    named = {
+        Alarm.FALL.value: gettext("Falls"),
+        Remark.NEAR_FALL.value: gettext("Near falls"),
+        Alarm.ROBOT_STOP.value: gettext("Robot stopped"),
+    }
+    named |= {kind: capfirst(str(EVENTS[kind])) for kind in ADVERSE if kind not in named}
+    return [(name, found[kind]) for kind, name in named.items()]
 
 
 def _from_incident(user: User, incident: Incident) -> Entry:
@@ -75,20 +83,19 @@ def _from_incident(user: User, incident: Incident) -> Entry:
         if is_fall
         else gettext("The robot of %(name)s stopped by itself.")
     )
-    done = gettext("not seen yet")
+    done = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
     if not incident.was_one:
         done = gettext("it was not a fall")
     elif ended is not None:
         seen = {"time": f"{clinic_time(ended.at, clinic):%H:%M}", "who": ended.by or "–"}
         done = gettext("seen %(time)s by %(who)s") % seen
-    if incident.severity is not None:
-        done = f"{incident.severity.label} · {done}"
     return Entry(
         kind=raised.kind,
         session=raised.session,
         at=clinic_time(raised.at, clinic),
         what=what % {"name": raised.session.patient.nickname},
         done=done,
+        hurt="" if incident.severity is None else str(incident.severity.label),
         is_open=ended is None,
         is_one=incident.was_one,
     )

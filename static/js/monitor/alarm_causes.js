@@ -1,7 +1,7 @@
 // What a therapist has to look at: a table of causes, the one behind the others first. Each has the consequences that
 // it hides, a sentence with the cure, and what its button does.
 //
-//   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what to do, what is so
+//   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
 //   action                    [label, what is done]; or a function of the session that returns it
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
@@ -49,7 +49,6 @@ function describeFall(session, { robot }) {
   const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
   const { station: place } = document.getElementById("monitor").dataset;
   const where = place && fill(_("Where: %(place)s"), { place });
-  const cure = `${_("If the belt still runs, stop it by hand.")} ${_("Stay with the patient and call for help.")}`;
   const noted = fill(_("Noted by %(who)s"), { who: alarm.by || "–" });
   const facts = [
     `${noted}, ${minutesAgo(alarm.at)}`,
@@ -57,7 +56,7 @@ function describeFall(session, { robot }) {
     robot.isHere && robot.isStopped && _("Robot stopped"),
     _("Belt: not known to GARRY"),
   ];
-  return [fell, where, cure, ...facts.filter(Boolean)].join("\n");
+  return [fell, where, ...facts.filter(Boolean)].join("\n");
 }
 
 // Who takes care of it, in the pause.
@@ -129,8 +128,8 @@ function describeRobot(session, { state, robot }) {
   return robot.alarm;
 }
 
-function describePause({ state, pause_reason: reason, rest_s: rest }) {
-  if (state !== "paused") return "";
+function describePause({ state, pause_reason: reason, rest_s: rest, fall_seen: seen }) {
+  if (state !== "paused" || (seen && reason === "therapist")) return ""; // who takes care of the fall is told
   const why = fill(PAUSES[reason] ?? _("Paused."), { time: clock(rest ?? 0) });
   return reason === "therapist" ? why : `${why} ${_("Resume when ready.")}`;
 }

@@ -8,36 +8,36 @@ import { update } from "garry/monitor/state";
 
 const REFRESH_MS = 250; // silence sends no event
 
+const element = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
+
 export function createAlarms(page) {
   const { state } = page;
   const place = document.querySelector(".alarms");
+  const steps = document.getElementById("fall-steps");
   const shown = new Map(); // the banner of each cause
 
   function make({ cause, isRed, isCalm, isOwn }) {
-    const banner = document.createElement("p");
+    const banner = document.createElement("div");
     banner.className = "notice alarm row wrap";
     banner.classList.toggle("red", Boolean(isRed));
     banner.dataset.alarm = cause;
-    banner.append(document.createElement("span"));
-    banner.firstChild.className = "grow";
+    banner.append(Object.assign(element("div"), { className: "grow" }));
     if (!isCalm && !isOwn?.(page)) soundAlarm();
     return banner;
   }
 
   // One sentence; or of a fall who, where, what to do, and what is so, as in sessions/alarm.html.
-  function drawLines([who, where, cure, ...facts]) {
-    const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: `${text} ` });
-    if (cure === undefined) return [make("span", who)];
-    const told = make("small", "");
-    told.className = "row wrap";
-    told.append(...facts.map((fact) => Object.assign(make("span", fact), { className: "badge" })));
-    return [make("b", who), where && make("b", where), make("span", cure), told].filter(Boolean);
-  }
-
   function drawWords(banner, sentence) {
     if (banner.dataset.of === sentence) return;
     banner.dataset.of = sentence;
-    banner.firstChild.replaceChildren(...drawLines(sentence.split("\n")));
+    const [who, where, ...facts] = sentence.split("\n");
+    if (where === undefined) return banner.firstChild.replaceChildren(who);
+    const heading = [`${who} `, where].filter(Boolean).map((text) => element("b", text));
+    banner.firstChild.replaceChildren(...heading, steps.content.cloneNode(true));
+    const told = Object.assign(element("small"), { className: "row wrap" });
+    told.append(...facts.map((fact) => Object.assign(element("span", `${fact} `), { className: "badge" })));
+    banner.querySelector("small")?.remove();
+    banner.append(told);
   }
 
   function drawButton(banner, action) {

@@ -3,6 +3,7 @@
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
 import { phaseName } from "garry/shared/labels";
+import { hasFallen } from "garry/monitor/alarm_causes";
 
 const STRIDE_S = 1.1; // of phases that end by strides, and only for their width
 const OPEN_S = 60; // the least width of a phase that a therapist ends
@@ -46,7 +47,8 @@ export function createPhaseBar(list) {
     [...list.children].forEach((item, index) => {
       const isNow = index === phase.index;
       const text = isNow && left ? fill(_("%(phase)s · %(left)s left"), { phase: phaseName(phase.name), left }) : "";
-      const label = text || phaseName(phases[index].name);
+      const isHeld = isNow && session.state === "paused" && hasFallen(session);
+      const label = isHeld ? _("Paused") : text || phaseName(phases[index].name);
       if (item.textContent !== label) item.textContent = label;
       item.style.setProperty("--share", long[index]);
       item.style.setProperty("--done", isNow ? Math.min(1, done) : index < phase.index ? 1 : 0);

@@ -2,7 +2,6 @@
 
 import { _, fill, n_ } from "garry/shared/language";
 import { percent } from "garry/shared/format";
-import { hasFallen } from "garry/monitor/alarm_causes";
 import { legendOf } from "garry/monitor/annotations";
 import { drawHitRing } from "garry/monitor/hit_ring";
 import { drawLastStrides } from "garry/monitor/last_strides";
@@ -30,19 +29,17 @@ export function createStrideCharts({ state, show }) {
   const isBeforeGoal = ({ goal }) => goal === null && state.strides.every(({ performance }) => performance == null);
 
   function describeStrip(session) {
-    if (hasFallen(session)) return _("Strides before the fall");
     return isBeforeGoal(session) ? fill(_("Strides in %(unit)s, mean ± SD"), session) : _("Strides against the goal");
   }
 
-  function describeLast() {
+  function countLast() {
     const judged = state.strides.filter(({ performance }) => performance !== null).slice(-LAST);
     const decided = judged.filter(({ close }) => !close);
-    const hits = decided.filter(({ hit }) => hit).length;
-    if (!judged.length) return "";
-    return withClose(
-      fill(_("%(hits)s of %(count)s hit"), { hits, count: decided.length }),
-      judged.length - decided.length,
-    );
+    return { judged: judged.length, count: decided.length, hits: decided.filter(({ hit }) => hit).length };
+  }
+
+  function describeLast({ judged, count, hits }) {
+    return judged ? withClose(fill(_("%(hits)s of %(count)s hit"), { hits, count }), judged - count) : "";
   }
 
   // Steps that were close are counted apart.
@@ -50,13 +47,14 @@ export function createStrideCharts({ state, show }) {
     return close ? `${words}, ${n_("%(count)s close", "%(count)s close", close)}` : words;
   }
 
-  function describeRate({ hits, judged, close = 0, target }) {
+  // Of all strides with feedback: a few of the last may have had none.
+  function describeRate({ hits, judged, close = 0, target }, last) {
     show("wanted", target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(target.hit_rate) }) : _("No rate set"));
     show(
       "judged",
-      judged === undefined
+      judged === undefined || judged < last.judged
         ? ""
-        : withClose(fill(_("%(hits)s of %(count)s strides"), { hits, count: judged - close }), close),
+        : withClose(fill(_("%(hits)s of %(count)s in all"), { hits, count: judged - close }), close),
     );
   }
 
@@ -65,11 +63,14 @@ export function createStrideCharts({ state, show }) {
       show("strip", describeStrip(session));
       drawStrip(strip, state.strides, state.annotations, session);
       drawLegend();
-      show("of-twenty", describeLast());
+      const last = countLast();
+      show("of-twenty", describeLast(last));
       if (twenty)
         drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session), session.span);
-      drawHitRing(ring, session.hit_rate, session.target.hit_rate);
-      describeRate(session);
+      // Where the last are a drawing of their own, the ring is of all.
+      const rate = twenty ? session.hit_rate : last.count ? last.hits / last.count : null;
+      drawHitRing(ring, rate, session.target.hit_rate);
+      describeRate(session, last);
     },
   };
   new ResizeObserver(() => state.session && charts.draw(state.session)).observe(strip); // banners take of its height

@@ -37,7 +37,7 @@ export function createFall({ state: told, show, announce, onPress, change, note,
     show("fall", _("The robot is told to stop, and the session to pause."));
     try {
       await note("fall");
-      show("fall", _("Noted. The robot is stopped; the session is paused."));
+      show("fall", _("Noted. First take care of the patient: this question can wait."));
     } catch (problem) {
       dialog.close("");
       announce(fill(_("The fall is not noted: %(problem)s"), { problem: problem.message }));
