@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, FilePayload, Page, expect
 from rehab.stations.https.certificate import network_address
 from tests.support.browsers import PATIENCE_MS, SIZES, Visit, picture, sign_in
 from tests.support.data import signals
+from tests.support.layout import set_screen
 from tests.support.servers import Server, free_port, serve
 from tests.support.walk_seed import make_walks
 from tests.support.worn_phone import read_steps
@@ -120,6 +121,7 @@ class FirstDay:
         expect(body).to_have_attribute("data-look", "feedback", timeout=PATIENCE_MS)
         # A share of stance varies by a hundredth: its scale begins above 0, and says so.
         expect(tablet.locator(".cut")).to_be_visible()
+        set_screen(tablet, "tablet-portrait")  # where there is room for the chart
         heights = tablet.eval_on_selector_all(
             ".dots circle:not(.gap)", "all => all.map((one) => Number(one.getAttribute('cy')))"
         )
