@@ -16,7 +16,7 @@ from operator import attrgetter
 from rehab.people.models import User
 from rehab.sessions.log import ALARM_KINDS, FallSeverity, Remark, RobotEntry, SessionEvent
 from rehab.sessions.state_messages import Message
-from rehab.training.changes import NotAllowed
+from rehab.training.changes import ChangeKind, NotAllowed
 
 SHOWN_FOR = timedelta(days=30)  # on pages of the clinic; the list of incidents has all
 TOLD_FOR = timedelta(minutes=2)  # who took care of a fall
@@ -42,6 +42,9 @@ ENDED_BY = {
 }
 
 
+# What a session's alarms, and who takes care of them, follow from.
+FOLDED_KINDS = (*ALARM_KINDS, ChangeKind.RESUME.value)
+
 # Holds the reason of a stop where the session has its robot off: no alarm, no harm.
 UNASKED = "unasked"
 
@@ -63,7 +66,7 @@ class OpenAlarms:
     def __init__(self, events: Iterable[SessionEvent] = ()) -> None:
         self._raised: defaultdict[Alarm, list[SessionEvent]] = defaultdict(list)
         self.stop_reason = ""  # of the robot's latest stop, where it stopped by itself
-        self._fall_seen: SessionEvent | None = None  # the latest acknowledgment of a fall
+        self._fall_seen: SessionEvent | None = None  # a fall's acknowledgment, until all goes on
         for event in events:
             self.apply(event)
 
@@ -77,6 +80,8 @@ class OpenAlarms:
         if event.kind == Remark.FALL_WITHDRAWN:
             falls = self._raised[Alarm.FALL]
             return [falls.pop()] if falls else None
+        if event.kind == ChangeKind.RESUME:
+            self._fall_seen = None
         if event.kind not in ENDED_BY:
             return None
         if event.kind == Remark.FALL_ACKNOWLEDGED:
@@ -135,7 +140,9 @@ def find_incidents(user: User, since: datetime) -> list[Incident]:
     rows = SessionEvent.objects.visible_to(user).filter(
         kind__in=[*ALARM_KINDS, Remark.FALL_SEVERITY.value], at__gte=since
     )
-    chosen = rows.select_related("by", "session__patient__clinic", "session__station")
+    chosen = rows.select_related(
+        "by", "session__clinic", "session__patient__clinic", "session__station"
+    )
     found: list[Incident] = []
     for _, some in groupby(chosen.order_by("session_id", "pk"), attrgetter("session_id")):
         found += fold_incidents(some)
@@ -181,4 +188,5 @@ def falls_just_seen(user: User, now: datetime) -> list[SessionEvent]:
     rows = SessionEvent.objects.visible_to(user).filter(
         kind=Remark.FALL_ACKNOWLEDGED.value, at__gte=now - TOLD_FOR
     )
-    return list(rows.select_related("by", "session__patient__clinic").order_by("-pk"))
+    chosen = rows.select_related("by", "session__clinic", "session__patient__clinic")
+    return list(chosen.order_by("-pk"))

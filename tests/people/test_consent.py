@@ -19,6 +19,7 @@ from rehab.people.consent.services import (
     withdraw_consent,
 )
 from rehab.people.models import BoardsConsent, Clinic, Patient
+from rehab.people.pages.consent import split_words
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -96,6 +97,13 @@ def test_a_tap_notes_consent_and_another_withdraws_it_with_who_and_when(world, p
     assert row.withdrawn_by == world.people[Role.PT]
     assert row.withdrawn_at >= row.given_at
     assert "care" not in active_consents(world.patient)
+
+
+def test_what_follows_a_purposes_words_belongs_to_them(world):
+    text = "First.\n\nCare: a\n\nmore\n\nResearch: b\n\nLast."
+    before, own, after = split_words(text, world.patient)
+    assert (before, after) == ("First.", "Last.")
+    assert own == {Purpose.CARE: "a\n\nmore", Purpose.RESEARCH: "b"}
 
 
 def test_who_was_not_asked_has_no_answer_and_a_no_is_noted_once(world, pt):

@@ -16,6 +16,7 @@ from django.utils import timezone
 
 from rehab.patients import urls
 from rehab.people.roles import Role
+from rehab.sessions.alarms import OpenAlarms
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from tests.support.page_text import plain, words
@@ -48,7 +49,10 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert f"Iris fell, {NOW:%H:%M}." in told
     assert "Finished" in told
     assert "I’ll take care of it" in told
+    assert "Iris fell" in seen(pt, but=session.pk)  # its page tells no more: it has ended
+    TrainingSession.everywhere.filter(pk=session.pk).update(state="paused")
     assert "Iris" not in seen(pt, but=session.pk)
+    TrainingSession.everywhere.filter(pk=session.pk).update(state="finished")
     assert "Iris" not in seen(pt, station=world.session.station_id or 0)  # it was at none
     assert "Iris" not in seen(client_of(build_world("oak")))
     assert "fell" in seen(pt, "start")
@@ -60,6 +64,13 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert "fell" not in seen(pt, "start")
     row = SessionEvent.everywhere.get(session=session, kind="fall_acknowledged")
     assert row.by == world.people[Role.PT]
+
+
+def test_who_takes_care_of_a_fall_is_told_until_the_session_goes_on(session):
+    alarms = OpenAlarms([note(session, "fall"), note(session, "fall_acknowledged")])
+    assert alarms.describe()["fall_seen"]
+    alarms.apply(note(session, "resume"))
+    assert alarms.describe()["fall_seen"] is None
 
 
 def test_what_an_ended_session_left_is_folded_up_on_the_page_of_another(world, session):

@@ -8,9 +8,11 @@ from django.urls import reverse
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
-from rehab.stations.models import Station
+from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Device, Station
 from tests.support.page_text import plain, words
-from tests.support.world import build_world, client_of
+from tests.support.tablets import approved
+from tests.support.world import NOW, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -33,6 +35,25 @@ def test_a_station_says_who_walks_there_and_its_robot_is_stopped(transactional_d
     stop = SessionEvent.everywhere.get(session=session, kind="robot_stop")
     assert stop.by == world.people[Role.PT]
     assert AuditEntry.everywhere.filter(act="robot_stop", by_id=stop.by_id).exists()
+
+
+def test_a_station_is_ready_where_what_measures_and_the_tablet_are_connected(world):
+    station = world.rows[Station]
+    Device.everywhere.filter(station=station).delete()
+
+    def told():
+        page = words(plain(client_of(world).get(reverse("stations")).content.decode()))
+        return "ready" in page, "not connected: " in page
+
+    TrainingSession.everywhere.update(state="finished")
+    assert told() == (False, False)  # no device
+    approved(station, "Plates", kind="source")
+    tablet, _ = approved(station, "Tablet", kind="tablet")
+    assert told() == (False, True)  # never seen
+    Device.everywhere.update(last_seen_at=NOW)
+    assert told() == (True, False)
+    Device.everywhere.filter(pk=tablet.pk).update(revoked_at=NOW)
+    assert told() == (False, True)
 
 
 def test_the_robot_of_a_session_that_has_ended_is_not_stopped(world):

@@ -79,7 +79,8 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
 def split_words(text: str, patient: Patient) -> tuple[str, dict[Purpose, str], str]:
     """Return a text's words before those of the first purpose, of each purpose, and the others.
 
-    A purpose's own paragraph begins with its name in the clinic's language and a colon.
+    A purpose's own paragraph begins with its name in the clinic's language and a colon; what
+    follows it up to the next purpose's belongs to it.
     """
     with override(patient.clinic.language):
         names = {str(purpose.label): purpose for purpose in _listed_purposes(patient)}
@@ -89,6 +90,9 @@ def split_words(text: str, patient: Patient) -> tuple[str, dict[Purpose, str], s
     for paragraph in text.split("\n\n"):
         name, _colon, said = paragraph.partition(":")
         if purpose := names.pop(name.strip(), None):
+            if after:  # the purpose before goes on in these
+                words[next(reversed(words))] += "\n\n" + "\n\n".join(after)
+                after = []
             words[purpose] = said.strip()
         else:
             (after if words else before).append(paragraph)

@@ -34,7 +34,8 @@ LONGEST = "52"  # weeks
 def show_alarms(request: HttpRequest) -> HttpResponse:
     """Return what is open in the clinic, or at one station, as a part of a page.
 
-    ``but``: of which sessions the page itself tells: there, what ended sessions left is folded up.
+    ``but``: of which open sessions the page itself tells: there, what others that ended left is
+    folded up.
     """
     station = request.GET.get("station", "")
     user, now = user_of(request), timezone.now()
@@ -42,10 +43,11 @@ def show_alarms(request: HttpRequest) -> HttpResponse:
     but = request.GET.getlist("but")
     context: dict[str, list[tuple[SessionEvent, datetime]]] = {"alarms": [], "ended": []}
     for one in found:
-        if str(one.session_id) not in but:
-            has_ended = bool(but) and State(one.session.state) not in OPEN_STATES
+        is_own, is_open = str(one.session_id) in but, State(one.session.state) in OPEN_STATES
+        if not (is_own and is_open):
+            is_folded = bool(but) and not is_own and not is_open
             row = (one, clinic_time(one.at, one.session.clinic))
-            context["ended" if has_ended else "alarms"].append(row)
+            context["ended" if is_folded else "alarms"].append(row)
     stopped: list[int] = []
     if found:
         robots = Device.objects.visible_to(user).filter(kind=Device.Kind.ROBOT)

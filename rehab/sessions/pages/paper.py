@@ -50,10 +50,14 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     )
     now = clinic_time(timezone.now(), patient.clinic)
     summary = describe_take_home(sessions, now)
+    if patient.blinded:  # points, hits and how they went tell the arm
+        summary |= {"bars": [], "development": "", "last_hits": None, "streak": ""}
     context = {
         "patient": patient,
         "summary": summary,
         "today": now.date(),
-        "visit": patient.visits.filter(day__gt=now.date()).order_by("day").first(),
+        "visit": None
+        if patient.ended_at
+        else patient.visits.filter(day__gt=now.date()).order_by("day").first(),
     }
     return render(request, "sessions/takehome.html", context)

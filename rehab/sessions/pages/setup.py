@@ -85,8 +85,8 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     sources, tried = _part_sources(form)
     last = last_session(patient, user)
     last_goal, last_baseline = _read_last_goal(user, last) if last else (None, None)
-    if last and last.measure_id != getattr(form.initial.get("measure"), "pk", last.measure_id):
-        last_goal = None  # of another measure
+    if last and last.measure.slug != measure.slug:
+        last_goal = last_baseline = None  # of another measure
     context = {
         "patient": patient,
         "last": initial_choices(patient, user),

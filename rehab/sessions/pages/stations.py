@@ -55,12 +55,18 @@ def list_stations(request: HttpRequest) -> HttpResponse:
     return render(request, "stations/stations.html", context)
 
 
-def _missing(station: Station, now: datetime) -> list[str]:
-    """Return the kinds of device that a walk at a station would lack: connected at other times."""
+def _missing(station: Station, now: datetime) -> list[str] | None:
+    """Return the kinds of device that a walk at a station would lack; None where it has no device.
+
+    A walk needs a sensor and a tablet, and the robot where the station has one.
+    """
     used = [one for one in station.devices.all() if not one.is_revoked]
+    if not used:
+        return None
     here = {one.kind for one in used if one.last_seen_at and now - one.last_seen_at < JUST_NOW}
-    away = {one.kind for one in used if not one.builtin} - here
-    return [str(kind.label).lower() for kind in Device.Kind if kind in away]
+    own = {one.kind for one in used if not one.builtin}
+    lacks = (own | {Device.Kind.SOURCE, Device.Kind.TABLET}) - here
+    return [str(kind.label).lower() for kind in Device.Kind if kind in lacks]
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -56,7 +56,7 @@ function describeFall(session, { robot }) {
     robot.isHere && robot.isStopped && _("Robot stopped"),
     _("Belt: not known to GARRY"),
   ];
-  return [fell, where, ...facts.filter(Boolean)].join("\n");
+  return [fell, where || "", ...facts.filter(Boolean)].join("\n");
 }
 
 // Who takes care of it, in the pause.

@@ -37,7 +37,7 @@ export function createAlarms(page) {
     const told = Object.assign(element("small"), { className: "row wrap" });
     told.append(...facts.map((fact) => Object.assign(element("span", `${fact} `), { className: "badge" })));
     banner.querySelector("small")?.remove();
-    banner.append(told);
+    banner.firstChild.after(told); // the button stays where it is
   }
 
   function drawButton(banner, action) {

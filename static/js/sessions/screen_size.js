@@ -21,7 +21,6 @@ const { px_per_mm: field, distance_m: distance } = form.elements;
 
 function show(pxPerMm) {
   width.value = pxPerMm;
-  if (document.activeElement !== diagonal) diagonal.value = (DIAGONAL / (pxPerMm * INCH_MM)).toFixed(1);
   form.querySelector(".bank-card").style.setProperty("--px-per-mm", pxPerMm);
   const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
   for (const row of form.querySelectorAll("[data-factor]")) {
@@ -34,8 +33,13 @@ function show(pxPerMm) {
   }
 }
 
+function tellDiagonal(pxPerMm) {
+  if (document.activeElement !== diagonal) diagonal.value = (DIAGONAL / (pxPerMm * INCH_MM)).toFixed(1);
+}
+
 function take(pxPerMm) {
   field.value = pxPerMm.toFixed(3);
+  tellDiagonal(pxPerMm);
   show(pxPerMm);
 }
 
@@ -47,4 +51,5 @@ diagonal.addEventListener("input", () => {
 for (const button of form.querySelectorAll("[data-by]"))
   button.addEventListener("click", () => take(Number(width.value) * (1 + FINE * Number(button.dataset.by))));
 distance.addEventListener("change", () => show(Number(field.value || USUAL)));
+if (field.value) tellDiagonal(Number(field.value));
 show(Number(field.value || USUAL));

@@ -21,7 +21,7 @@ const last = document.querySelector("[data-last]");
 function showLast() {
   const about = last?.querySelector("output");
   const { places } = document.querySelector(".step[data-for=value]").dataset;
-  if (about) about.textContent = ((last.dataset.last * Number(percent.value)) / 100).toFixed(places);
+  if (about) about.textContent = ((last.dataset.last * Number(percent.value.replace(",", "."))) / 100).toFixed(places);
 }
 for (const kind of ["click", "input"]) percent.closest(".step").addEventListener(kind, showLast);
 showLast();

@@ -9,9 +9,8 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from rehab.people.models import User
-from rehab.sessions.alarms import OpenAlarms
+from rehab.sessions.alarms import FOLDED_KINDS, OpenAlarms
 from rehab.sessions.log import (
-    ALARM_KINDS,
     PartEntry,
     Remark,
     RobotEntry,
@@ -77,7 +76,7 @@ class SessionAggregate:
         aggregate.fold = fold_log(aggregate.fold, session)
         marked = SessionEvent.everywhere.filter(session=session, kind__in=kinds_with_marks())
         aggregate.add_marks(reversed(marked.order_by("-pk")[:MARKS]))
-        alarms = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS)
+        alarms = SessionEvent.everywhere.filter(session=session, kind__in=FOLDED_KINDS)
         aggregate.alarms = OpenAlarms(alarms.select_related("by").order_by("pk"))
         noted = SessionEvent.everywhere.filter(session=session, kind__in=CONDITIONS)
         for kind, value in noted.order_by("pk").values_list("kind", "value"):
@@ -147,6 +146,7 @@ class SessionAggregate:
             **_to_columns(old, change.value),
         )
         self._add_mark(event)
+        self.alarms.apply(event)
         rows: list[Row] = [event]
         if change.kind == ChangeKind.START:
             self.session.started_at = at
