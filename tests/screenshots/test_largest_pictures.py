@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.test_word_sizes import NEVER_STILL, SIDES, look
 from tests.support.browsers import signed_in
 from tests.support.layout import SCREENS, set_screen
 from tests.support.servers import ROOT, Server, serve
 from tests.support.walk_seed import Walk, feet_of, make_walks, robot_of
+from tests.support.word_sizes import NEVER_STILL, SIDES, look
 
 pytestmark = pytest.mark.browser
 
