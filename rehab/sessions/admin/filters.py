@@ -10,6 +10,7 @@ from django.contrib.admin import BooleanFieldListFilter, ChoicesFieldListFilter,
 from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.utils import timezone
+from django.utils.functional import Promise
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
@@ -19,28 +20,29 @@ from rehab.sessions.reports.insight import PERIODS
 CHIPS = "admin/chips.html"
 
 
-class TypeFilter(ChoicesFieldListFilter):
-    """The feedback types beside each other."""
+class _ChoiceChips(ChoicesFieldListFilter):
+    """A field's choices beside each other, after ``everything``."""
 
     template = CHIPS
+    everything: str | Promise
 
     def choices(self, changelist: Any) -> Iterator[Any]:
-        """Return all types, then each."""
+        """Return all, then each."""
         first, *others = super().choices(changelist)
-        yield {**first, "display": _("All types")}
+        yield {**first, "display": self.everything}
         yield from others
 
 
-class StateFilter(ChoicesFieldListFilter):
+class TypeFilter(_ChoiceChips):
+    """The feedback types."""
+
+    everything = _("All types")
+
+
+class StateFilter(_ChoiceChips):
     """Whether it is planned, runs, is paused or has ended."""
 
-    template = CHIPS
-
-    def choices(self, changelist: Any) -> Iterator[Any]:
-        """Return all states, then each."""
-        first, *others = super().choices(changelist)
-        yield {**first, "display": _("All states")}
-        yield from others
+    everything = _("All states")
 
 
 class LeftOutFilter(BooleanFieldListFilter):
