@@ -15,13 +15,12 @@ from django.views.decorators.http import require_http_methods
 
 from rehab.feedback.clinic_valences import valences_of
 from rehab.people.access import for_roles, user_of
-from rehab.people.models import Patient, User
+from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.setup import SessionForm
-from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.trend import load_trend
+from rehab.sessions.reports.summary import load_point
 from rehab.sessions.setup.option import Group
 from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.presets import Preset
@@ -84,16 +83,15 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     outlines = {row.pk: outline_protocol(row) for row in protocols}
     sources, tried = _part_sources(form)
     last = last_session(patient, user)
-    last_goal, last_baseline = _read_last_goal(user, last) if last else (None, None)
-    if last and last.measure.slug != measure.slug:
-        last_goal = last_baseline = None  # of another measure
+    same = last if last and last.measure.slug == measure.slug else None  # by the same measure
+    point = load_point(user, same) if same else None
     context = {
         "patient": patient,
         "last": initial_choices(patient, user),
         "has_tablet": has_tablet(form.chosen_station, timezone.now()),
         "is_repeated": last is not None,
-        "last_goal": last_goal,
-        "last_baseline": last_baseline,
+        "last_goal": same and same.goal,
+        "last_baseline": point and point.baseline and point.baseline.mean,
         "protocols": [
             (choice, outlines[choice.data["value"].value]) for choice in form["protocol"]
         ],
@@ -128,13 +126,6 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         "preset_name": name,
     }
     return render(request, "sessions/setup.html", context)
-
-
-def _read_last_goal(user: User, last: TrainingSession) -> tuple[float | None, float | None]:
-    """Return the goal that a session ended with, and the mean of its baseline if it had one."""
-    found = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=last.pk))
-    baseline = found[0].baseline if found else None
-    return last.goal, baseline.mean if baseline else None
 
 
 def _part_sources(form: SessionForm) -> tuple[list[BoundWidget], list[BoundWidget]]:
