@@ -14,7 +14,7 @@ from robot.marking import gettext_noop
 
 # By language: the longest phrase, and the longest word in it, that the largest words have room for
 # on a tablet (tests/browser/test_word_sizes.py). Of a language that is not here: the last of them.
-LENGTHS = {"en": (24, 9), "de": (30, 9), "es": (30, 9), "fr": (30, 9)}
+LENGTHS = {"en": (19, 8), "de": (30, 9), "es": (30, 9), "fr": (30, 9)}
 APART = 6  # phrases that come before one may come again, where a pool has at least twice as many
 
 
@@ -50,41 +50,41 @@ def join(*phrases: str) -> str:
 
 
 ONWARD = join(
-    gettext_noop("On to the next step."),
-    gettext_noop("And the next step."),
-    gettext_noop("Keep walking."),
+    gettext_noop("On to the next."),
+    gettext_noop("And the next."),
+    gettext_noop("Keep going."),
     gettext_noop("Step by step."),
     gettext_noop("On we go."),
-    gettext_noop("One more step."),
+    gettext_noop("A step more."),
     gettext_noop("Walk on."),
     gettext_noop("The next one."),
-    gettext_noop("Go on walking."),
+    gettext_noop("Just walk on."),
     gettext_noop("On you go."),
-    gettext_noop("Another step."),
-    gettext_noop("Further on."),
+    gettext_noop("A new step."),
+    gettext_noop("Carry on."),
 )
 
 NEAR = join(
     gettext_noop("Nearly there."),
     gettext_noop("Close to the goal."),
-    gettext_noop("Almost at the goal."),
+    gettext_noop("Nearly at the goal."),
     gettext_noop("Very near."),
     gettext_noop("A little more."),
     gettext_noop("The goal is near."),
     gettext_noop("Not far now."),
     gettext_noop("Near the goal."),
-    gettext_noop("Almost."),
+    gettext_noop("So close."),
     gettext_noop("Only a bit more."),
-    gettext_noop("Only a little short."),
-    gettext_noop("Just a touch more."),
+    gettext_noop("A bit short."),
+    gettext_noop("A touch more."),
 )
 
 REACHED = join(
-    gettext_noop("You met the goal!"),
+    gettext_noop("Goal met!"),
     gettext_noop("Goal!"),
     gettext_noop("At the goal!"),
     gettext_noop("You did it!"),
-    gettext_noop("Goal reached!"),
+    gettext_noop("You got there!"),
     gettext_noop("That is the goal!"),
     gettext_noop("Well done!"),
     gettext_noop("Nicely done!"),
@@ -99,7 +99,7 @@ STRONG = join(
     gettext_noop("What a step!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
-    gettext_noop("More than the goal!"),
+    gettext_noop("Past the goal!"),
     gettext_noop("Nice going!"),
     gettext_noop("A strong one!"),
     gettext_noop("Great going!"),
@@ -112,59 +112,59 @@ STRONG = join(
 STRONGEST = join(
     gettext_noop("Top step!"),
     gettext_noop("Bravo!"),
-    gettext_noop("Superb!"),
+    gettext_noop("Super!"),
     gettext_noop("Wow!"),
     gettext_noop("So strong!"),
     gettext_noop("Just great!"),
-    gettext_noop("Far above the goal!"),
-    gettext_noop("A super step!"),
+    gettext_noop("Far above!"),
+    gettext_noop("What power!"),
     gettext_noop("Well above!"),
     gettext_noop("Way over!"),
-    gettext_noop("Far over the goal!"),
+    gettext_noop("Far over!"),
     gettext_noop("That was strong!"),
 )
 
 FAR_BELOW = join(
-    gettext_noop("Far below the goal."),
+    gettext_noop("Far below."),
     gettext_noop("Clearly below."),
-    gettext_noop("Far under the goal."),
+    gettext_noop("Far under."),
     gettext_noop("Clearly under."),
-    gettext_noop("Far from the goal."),
-    gettext_noop("A long way below."),
-    gettext_noop("Much below the goal."),
+    gettext_noop("Far off."),
+    gettext_noop("A long way."),
+    gettext_noop("Well below."),
     gettext_noop("The goal is far up."),
-    gettext_noop("A wide gap below."),
+    gettext_noop("A wide gap."),
     gettext_noop("Still far below."),
-    gettext_noop("Far below this time."),
-    gettext_noop("A long way to go."),
+    gettext_noop("Quite far off."),
+    gettext_noop("A way to go."),
 )
 
 BELOW = join(
     gettext_noop("Below the goal."),
     gettext_noop("Under the goal."),
-    gettext_noop("Just below the goal."),
+    gettext_noop("Just below."),
     gettext_noop("A little below."),
-    gettext_noop("Slightly below."),
+    gettext_noop("Not far below."),
     gettext_noop("Short of the goal."),
     gettext_noop("Not at the goal."),
-    gettext_noop("Just under the goal."),
+    gettext_noop("Just under."),
     gettext_noop("A bit below."),
-    gettext_noop("Not quite there."),
+    gettext_noop("Not quite."),
     gettext_noop("A little short."),
-    gettext_noop("Close, but below."),
+    gettext_noop("Near, but below."),
 )
 
 NOTHING_LOST = join(
-    gettext_noop("No points lost."),
-    gettext_noop("Nothing lost."),
+    gettext_noop("No point lost."),
+    gettext_noop("None lost."),
     gettext_noop("Points kept."),
-    gettext_noop("All points kept."),
-    gettext_noop("Nothing taken."),
+    gettext_noop("All are kept."),
+    gettext_noop("All still there."),
     gettext_noop("No loss."),
-    gettext_noop("The points stay."),
-    gettext_noop("Points as before."),
-    gettext_noop("No change."),
-    gettext_noop("The same score."),
-    gettext_noop("Your points stay."),
+    gettext_noop("Points stay."),
+    gettext_noop("Points are safe."),
+    gettext_noop("As before."),
+    gettext_noop("Same score."),
+    gettext_noop("Still the same."),
     gettext_noop("As many points."),
 )

@@ -235,7 +235,7 @@ def test_a_lost_network_loses_and_doubles_nothing(server, browser):
         expect(page.locator(".note")).to_have_text("There is no connection. Try again in a moment.")
         wire.come_up()
         until_step(page, feet.number)
-        looks(page, "feedback", "You met the goal!")
+        looks(page, "feedback", "Goal met!")
 
         wire.freeze()  # nothing is closed: the tablet's Wi-Fi is just gone
         feet.walk(0.8, 0.8)

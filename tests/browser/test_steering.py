@@ -64,11 +64,11 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         feet.hear("start")
         feet.walk(1.0)
         at_step(tablet, 1)
-        expect(words).to_have_text("You met the goal!")
+        expect(words).to_have_text("Goal met!")
 
         monitor.get_by_label("Goal up").click()
         expect(monitor.locator("[data-show=goal]")).to_have_text("4.10")
-        expect(words).to_have_text("You met the goal!")  # not before the next step
+        expect(words).to_have_text("Goal met!")  # not before the next step
         feet.walk(1.0)
         at_step(tablet, 2)
         expect(words).to_have_text("Nearly there.")
@@ -94,7 +94,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         at_step(tablet, 5)
         expect(tablet.locator("body")).to_have_attribute("data-chart", "line")
         expect(tablet.locator(".dots circle").first).to_be_hidden()
-        expect(words).to_have_text("You met the goal!")
+        expect(words).to_have_text("Goal met!")
 
         steer_the_robot(server, walk, monitor)
 
@@ -108,7 +108,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(words).to_have_text("")  # what was said belongs to the type before
         feet.walk(0.5)
         at_step(tablet, 13)
-        expect(words).to_have_text("Far below the goal.")
+        expect(words).to_have_text("Far below.")
         expect(emblem).to_have_attribute("data-emblem", "loss")
         expect(monitor.locator("[data-show=types]")).to_have_text("Positive, changed to Negative")
 

@@ -99,7 +99,7 @@ export function createFitting(body, scene) {
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + (sign === "below" ? SIGN_HIGH : AIR);
     const beside = isBelow ? 0 : total;
-    const ground = goal + under + (landscape.matches ? Math.max(badge, beside) : badge + beside);
+    const ground = goal + under + (landscape.matches && !isHalf ? Math.max(badge, beside) : badge + beside);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle is the thermometer, or where the total is below it, it and the badge.
     const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
@@ -130,17 +130,21 @@ export function createFitting(body, scene) {
     return fits;
   }
 
-  // Make the words' place as narrow as it can be without more lines: so they stand near the thermometer.
+  // Make the words' place as narrow as it can be: so they stand near the thermometer. One line may become two where
+  // the frame has room for them; more there are not for that.
   function narrow(samples, high) {
     const said = words.firstChild;
+    const heightOf = (sample) => {
+      words.textContent = sample;
+      return words.offsetHeight;
+    };
+    const two = Math.min(high, 2 * parseFloat(getComputedStyle(words).lineHeight) + 1);
+    const most = samples.map((sample) => Math.max(heightOf(sample), two));
     let [fits, not] = [phrase.parentElement.clientWidth, 0];
     for (let i = 0; i < HALVINGS; i++) {
       const width = (fits + not) / 2;
       body.style.setProperty("--measure", `${width}px`);
-      const isHeld = samples.every((sample) => {
-        words.textContent = sample;
-        return words.offsetHeight <= high && !isTooWide(words);
-      });
+      const isHeld = samples.every((sample, index) => heightOf(sample) <= most[index] && !isTooWide(words));
       if (isHeld) fits = width;
       else not = width;
     }

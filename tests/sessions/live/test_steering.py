@@ -72,7 +72,7 @@ async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, be
     assert (again["valence"], again["changed_to"], again["score"]) == ("negative", ["negative"], 0)
     assert {"after": 2, "kind": "type", "value": "Negative"} in again["marks"]
     assert (await (await place.robot().dial()).hello())["cue"]["below"] == "varied"
-    assert (await place.tablet(session).watch())["last"]["words"] == "Far below the goal."
+    assert (await place.tablet(session).watch())["last"]["words"] == "Far below."
 
 
 async def test_a_robot_that_was_silenced_stays_so_in_every_type(place, ready):
