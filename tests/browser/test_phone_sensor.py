@@ -189,6 +189,7 @@ def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
 @pytest.mark.essential
 def test_a_therapist_shows_the_square_once(visit: Visit):
     page = visit("/stations/", size="laptop")
+    page.eval_on_selector("details:has-text('Add a device')", "one => (one.open = true)")
     page.click("text=Pair a phone")
     page.check("[name=side][value=right]")
     page.click("text=Show the QR code")

@@ -22,6 +22,7 @@ def test_a_paired_tablet_follows_its_station(server: Server, browser: Browser, v
         set_screen(tablet, "tablet-portrait")
         tablet.goto("/tablet/")
         pt.click("text=Stations")
+        pt.eval_on_selector("details:has-text('Add a device')", "one => (one.open = true)")
         pt.click("text=Pair a tablet")
         pt.fill("#code", tablet.inner_text(".code").lower())
         pt.click("text=It shows this code")

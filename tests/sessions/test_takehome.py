@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from datetime import timedelta
+from datetime import time, timedelta
 
 import pytest
 from django.urls import reverse
@@ -74,6 +74,10 @@ def test_it_says_when_the_next_visit_is_and_what_it_is_all_for(world, patient):
     plan_visit(patient, HERE.date() + timedelta(days=7), None)
     words = read(world, patient)
     assert f"We see you again on {HERE + timedelta(days=7):%A %-d %B}." in words
+    plan_visit(patient, HERE.date(), time.max)
+    assert f"We see you again on {HERE:%A %-d %B}, 23:59." in read(world, patient)
+    plan_visit(patient, HERE.date(), HERE.time())
+    assert "23:59" not in read(world, patient)
     assert "Your goal: Walk to the bakery" in words
 
 

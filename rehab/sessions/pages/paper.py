@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from django.db.models import Q
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
@@ -52,12 +53,11 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     summary = describe_take_home(sessions, now)
     if patient.blinded:  # points, hits and how they went tell the arm
         summary |= {"bars": [], "development": "", "last_hits": None, "streak": ""}
+    later = Q(day__gt=now.date()) | Q(day=now.date(), at__gt=now.time())
     context = {
         "patient": patient,
         "summary": summary,
         "today": now.date(),
-        "visit": None
-        if patient.ended_at
-        else patient.visits.filter(day__gt=now.date()).order_by("day").first(),
+        "visit": None if patient.ended_at else patient.visits.filter(later).first(),
     }
     return render(request, "sessions/takehome.html", context)

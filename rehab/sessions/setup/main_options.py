@@ -19,6 +19,7 @@ from rehab.sessions.setup.option import (
     MINUTES,
     PERCENT,
     Conversion,
+    Group,
     Option,
     OptionColumn,
 )
@@ -151,6 +152,7 @@ MAIN_OPTIONS = (
         default=DEFAULT_GESTURE,
         is_required=True,
         place="valence.cue.above",
+        group=Group.ROBOT,
         is_derived=True,
     ),
     Option(
@@ -161,6 +163,7 @@ MAIN_OPTIONS = (
         default=DEFAULT_GESTURE,
         is_required=True,
         place="valence.cue.below",
+        group=Group.ROBOT,
         is_derived=True,
     ),
 )

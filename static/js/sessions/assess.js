@@ -10,6 +10,7 @@ if (timer) {
   const time = timer.querySelector(".time");
   const run = timer.querySelector("[data-run]");
   const lap = timer.querySelector("[data-lap]");
+  const rest = document.getElementById("rest"); // asked for once the walk is over
   let startedAt = null;
   let passed_s = 0;
   let laps = 0;
@@ -47,12 +48,12 @@ if (timer) {
     run.textContent = _("Again");
     run.classList.remove("primary");
     if (lap) lap.disabled = true;
+    if (rest) rest.parentElement.hidden = false;
     if (lapTest_s) measure();
     else result.value = passed_s.toFixed(2);
     show();
     timer.querySelector("[role=status]").textContent = time.textContent;
-    if (lapTest_s) document.getElementById("rest").focus();
-    else result.focus();
+    (rest ?? result).focus();
   }
 
   run.addEventListener("click", () => (startedAt === null ? start() : stop()));
