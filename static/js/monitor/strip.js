@@ -8,7 +8,7 @@ import { fitViewBox, shape, text } from "garry/shared/svg";
 import { drawAnnotations } from "garry/monitor/strip_annotations";
 
 const SPACING = 4; // pixels between strides, at least
-const FEWEST = 60; // strides that the width is made for
+const FEWEST = 30; // strides that the width is made for
 const LETTER = 8; // pixels
 const AXIS = 18; // pixels, for the minutes
 const LANE = 20; // pixels below the scale, for strides that were not measured
