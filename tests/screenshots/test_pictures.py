@@ -109,7 +109,7 @@ from rehab.people.sign_in.first_start import first_clinic
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient, User
 from rehab.sessions.corrections import CorrectedField, correct_session
-from rehab.sessions.log import SessionEvent
+from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
 from rehab.sessions.setup.presets import Preset
@@ -176,10 +176,12 @@ for station, kind, name, seen in (
         created_at=timezone.now() - timedelta(days=1)
     )
     Device.everywhere.filter(name="Old tablet").update(revoked_at=timezone.now())
-for number, (kind, value) in enumerate([("borg", 3), ("rest", None), ("pain", 3), ("borg", 5)]):
-    at = timezone.now() - timedelta(minutes=5 - number)
+for number, kind, value in (
+    (60, "borg", 3), (180, "pain", 3), (332, "rest", None), (480, "borg", 5),
+):
+    at = Step.everywhere.get(session=last, number=number).received_at
     SessionEvent.everywhere.create(
-        session=last, kind=kind, value=value, after_number=90 * number, at=at
+        session=last, kind=kind, value=value, after_number=number, at=at
     )
 today = timezone.now().date()
 plan_visit(rosa, today, time(9, 30))

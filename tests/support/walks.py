@@ -93,7 +93,8 @@ def visit(
     patient: Patient, valence: str, seed: int, days_ago: int, count: int = 420, now: datetime = NOW
 ) -> TrainingSession:
     """Let a simulated patient walk a whole visit, with all phases, two goal changes and a pause."""
-    began = now - timedelta(days=days_ago, seconds=1.2 * count)
+    paused_at, rest = 2 * count // 3, timedelta(seconds=30)
+    began = now - timedelta(days=days_ago, seconds=1.1 * count + 2) - rest
     half = (count - 54 - 12 - 40) // 2
     session = make_session(
         patient,
@@ -114,13 +115,13 @@ def visit(
     aggregate = SessionAggregate(session)
     rows = list(aggregate.change(Change(ChangeKind.START), None, began))
     for number in range(1, count + 1):
-        at = began + timedelta(seconds=1.1 * number)
+        at = began + timedelta(seconds=1.1 * number) + (number >= paused_at) * rest
         if number in {count // 2, 3 * count // 4}:
             goal = round(1.05 * (aggregate.fold.goal or GOAL), 2)
             rows += aggregate.change(Change(ChangeKind.GOAL, goal), None, at)
-        if number == 2 * count // 3:
-            rows += aggregate.change(Change(ChangeKind.PAUSE), None, at)
-            rows += aggregate.change(Change(ChangeKind.RESUME), None, at + timedelta(seconds=30))
+        if number == paused_at:
+            rows += aggregate.change(Change(ChangeKind.PAUSE), None, at - rest)
+            rows += aggregate.change(Change(ChangeKind.RESUME), None, at)
         rows.append(aggregate.record_step(walker.next_stride(aggregate.fold.phase), at))
     rows += aggregate.change(Change(ChangeKind.FINISH), None, now - timedelta(days=days_ago))
     store(aggregate, rows)

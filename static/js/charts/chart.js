@@ -13,6 +13,9 @@ function axis(extra) {
   return { font, stroke: () => color("muted"), grid: lines, ticks: { show: false }, gap: 8, ...extra };
 }
 
+// Whether a chart has a phone's width.
+export const isNarrow = (element) => element.clientWidth < 500;
+
 // Draw a chart that fills its element and keeps its size. `under(marks)` draws before the series and
 // `paint(marks)` after them; `onCursor` gets the index under the pointer; the rest is uPlot's own.
 export function draw(element, { data, series, xAxis, yAxis, under, paint, onCursor, ...more }) {
@@ -25,7 +28,7 @@ export function draw(element, { data, series, xAxis, yAxis, under, paint, onCurs
   const options = {
     ...size(),
     series: [{}, ...series],
-    axes: [axis({ size: 34, grid: { show: false }, ...xAxis }), axis({ size: 56, ...yAxis })],
+    axes: [axis({ size: 34, grid: { show: false }, ...xAxis }), axis({ size: isNarrow(element) ? 36 : 56, ...yAxis })],
     legend: { show: false },
     hooks,
     ...more,
@@ -67,9 +70,9 @@ export class Marks {
     this.ctx.fillRect(this.x(x) - half + shift * this.unit, this.y(y) - half, 2 * half, 2 * half);
   }
 
-  // A short level line through x, at most as wide as its share of the chart.
+  // A short level line through x, at most as wide as its room [px].
   dash(x, y, stroke, room) {
-    const half = Math.min(34 * this.unit, (0.4 * this.box.width) / room);
+    const half = Math.min(34, 0.4 * room) * this.unit;
     this.line(this.x(x) - half, this.y(y), this.x(x) + half, this.y(y), stroke, 3);
   }
 

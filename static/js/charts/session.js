@@ -1,7 +1,7 @@
 // One session: every stride against the goal, phases behind it, what was changed above it.
 import { _, fill, number } from "garry/shared/language";
 import { reasonName } from "garry/shared/labels";
-import { color, draw, paths } from "garry/charts/chart";
+import { color, draw, isNarrow, paths } from "garry/charts/chart";
 
 const data = document.getElementById("session");
 const { strides, phases, marks: changes, unit } = data ? JSON.parse(data.textContent) : {};
@@ -51,17 +51,17 @@ function drawPhases(marks) {
     if (right <= left) continue;
     ctx.fillStyle = color(phase.feedback ? "card" : "well");
     ctx.fillRect(left, box.top, right - left, box.height);
-    marks.line(left, box.top - 64 * marks.unit, left, box.top + box.height, color("border"), 1);
+    marks.line(left, 12 * marks.unit, left, box.top + box.height, color("border"), 1);
     if (marks.widthOf(phase.name) < right - left - 12 * marks.unit) {
       const fill = color("text");
       const from = { align: "left", weight: 700, fill };
-      marks.text(phase.name, left + 7 * marks.unit, box.top - 50 * marks.unit, from);
+      marks.text(phase.name, left + 7 * marks.unit, 26 * marks.unit, from);
     }
   }
 }
 
-// Return one label for all that was changed after a stride.
-function groupChanges() {
+// Return one label for all that was changed after a stride: its words, or where these have no room its number.
+function groupChanges(numbered) {
   const groups = new Map();
   for (const { after, kind, words } of changes) {
     const group = groups.get(after) ?? { after, isGoal: false, isPain: false, words: [] };
@@ -70,32 +70,52 @@ function groupChanges() {
     group.words.push(words);
     groups.set(after, group);
   }
-  return [...groups.values()].map((group) => ({ ...group, words: group.words.join(" · ") }));
+  return [...groups.values()].map((group, index) => {
+    const words = group.words.join(" · ");
+    return { ...group, words, label: numbered ? `${index + 1}` : words };
+  });
 }
 
-function drawChanges(marks) {
+function drawChanges(marks, groups) {
   const { box, unit: pixel } = marks;
   const free = [box.left, box.left]; // labels never run into each other: two rows of them
   const labels = [];
-  for (const { after, isGoal, isPain, words } of groupChanges()) {
+  for (const { after, isGoal, isPain, label } of groups) {
     const x = marks.x(after + 0.5);
     if (x < box.left || x > box.left + box.width) continue;
     const fill = color(isGoal ? "c-goal" : isPain ? "error" : "c-third");
-    const wide = marks.widthOf(words, 13);
+    const wide = marks.widthOf(label, 13);
     const start = Math.min(x + 5 * pixel, box.left + box.width - wide);
     const row = free.findIndex((end) => start >= end);
     const foot = box.top - (row === 1 ? 28 : 8) * pixel;
     marks.line(x, foot, x, box.top + box.height, fill, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
     if (row < 0) continue;
-    labels.push({ words, start, wide, foot, fill });
+    labels.push({ label, start, wide, foot, fill });
     free[row] = start + wide + 10 * pixel;
   }
   // Over the lines of the row above.
-  for (const { words, start, wide, foot, fill } of labels) {
+  for (const { label, start, wide, foot, fill } of labels) {
     marks.ctx.fillStyle = color("card");
     marks.ctx.fillRect(start - 2 * pixel, foot - 15 * pixel, wide + 4 * pixel, 16 * pixel);
-    marks.text(words, start, foot - 3 * pixel, { size: 13, weight: 700, align: "left", fill });
+    marks.text(label, start, foot - 3 * pixel, { size: 13, weight: 700, align: "left", fill });
   }
+}
+
+function cell(tag, text) {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  return made;
+}
+
+function listChanges(groups) {
+  const list = document.createElement("ol");
+  list.className = "key";
+  for (const { label, words } of groups) {
+    const entry = cell("li", ` ${words}`);
+    entry.prepend(cell("b", label));
+    list.append(entry);
+  }
+  return list;
 }
 
 function drawGaps(marks) {
@@ -114,8 +134,11 @@ function drawStrides(element) {
   const [least, most] = [Math.min(...seen), Math.max(...seen, 0.001)];
   const air = 0.06 * (most - Math.min(least, 0.9 * most));
   const bottom = least > 0.3 * most ? least - 2 * air : Math.min(0, least); // what lies far above zero fills the page
+  const narrow = isNarrow(element);
   const isDense = element.clientWidth / strides.number.length < DENSE_PX;
-  const [size, width] = isDense ? [5, 1.5] : [8, 2];
+  const [size, width] = isDense ? (narrow ? [4, 1] : [5, 1.5]) : [8, 2];
+  const groups = groupChanges(narrow);
+  if (narrow && groups.length) element.after(listChanges(groups));
   draw(element, {
     data: [
       strides.number,
@@ -133,7 +156,7 @@ function drawStrides(element) {
       { stroke: () => color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
     scales: { x: { time: false }, y: { range: () => [bottom, most + air] } },
-    padding: [76, 26, 0, 0],
+    padding: [76, narrow ? 6 : 26, 0, 0],
     cursor: { y: false, points: { show: false }, drag: { x: true, y: false } },
     under: drawPhases,
     paint: (marks) => {
@@ -144,19 +167,14 @@ function drawStrides(element) {
           marks.square(strides.number[index], value, size / 2.6, color("c-third"));
         }
       });
+      marks.text(unit, 0, marks.box.top - 11 * marks.unit, { align: "left" });
       drawGaps(marks);
-      drawChanges(marks);
+      drawChanges(marks, groups);
     },
     onCursor: showReadout,
-    yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), label: unit, labelSize: 22, space: 44 },
+    yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), space: 44 },
     xAxis: { space: 70 },
   });
-}
-
-function cell(tag, text) {
-  const made = document.createElement(tag);
-  made.textContent = text;
-  return made;
 }
 
 // Thousands of rows are only made when somebody opens them.

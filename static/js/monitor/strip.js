@@ -8,9 +8,10 @@ import { fitViewBox, shape, text } from "garry/shared/svg";
 import { drawAnnotations } from "garry/monitor/strip_annotations";
 
 const SPACING = 4; // pixels between strides, at least
-const FEWEST = 60; // strides that the width is made for
+const FEWEST = 30; // strides that the width is made for
 const LETTER = 8; // pixels
 const AXIS = 18; // pixels, for the minutes
+const HEAD = 30; // pixels above the scale, for flags and names of phases
 const LANE = 20; // pixels below the scale, for strides that were not measured
 const MINUTE_S = 60;
 
@@ -70,12 +71,16 @@ export function drawStrip(svg, strides, annotations, session) {
   const [width, height] = fitViewBox(svg);
   const shown = strides.slice(-Math.max(20, Math.floor((width - 70) / SPACING)));
   const dx = (width - 70) / Math.max(shown.length - 1, FEWEST);
+  const starts = [...shown.keys()].filter(
+    (index) => index && shown[index].phase !== undefined && shown[index].phase !== shown[index - 1].phase,
+  );
+  const top = annotations.length || starts.length ? HEAD : 10;
   const floor = height - AXIS;
   const { range, isJudged, valueOf, lines } = scaleOf(shown, strides, session);
   const x = (index) => 56 + index * dx;
   const y = (value) => {
     const inside = Math.min(Math.max(value, range[0]), range[1]);
-    return floor - LANE - ((inside - range[0]) * (floor - 30 - LANE)) / (range[1] - range[0]);
+    return floor - LANE - ((inside - range[0]) * (floor - top - LANE)) / (range[1] - range[0]);
   };
 
   function drawScale() {
@@ -108,9 +113,6 @@ export function drawStrip(svg, strides, annotations, session) {
   }
 
   function drawPhases() {
-    const starts = [...shown.keys()].filter(
-      (index) => index && shown[index].phase !== undefined && shown[index].phase !== shown[index - 1].phase,
-    );
     return starts.map((index, n) => {
       const left = x(index) - dx / 2;
       const room = (n + 1 < starts.length ? x(starts[n + 1]) : width) - left;
