@@ -58,7 +58,7 @@ def test_pictures_of_the_largest_words(
 
 def test_pictures_of_a_fall(server: Server, browser: Browser) -> None:
     screen = {"screen_text": "largest"}
-    (walk,) = make_walks(server, {"name": "Rosa", "screen": screen})
+    walk, _other = make_walks(server, {"name": "Rosa", "screen": screen}, {"name": "Tom"})
     with signed_in(browser, server, walk, reduced_motion="reduce") as context:
         patient, laptop = context.new_page(), context.new_page()
         patient.goto(walk.path)
@@ -71,7 +71,7 @@ def test_pictures_of_a_fall(server: Server, browser: Browser) -> None:
             feet.walk(*WALKED)
             take(laptop, "monitor-laptop")
             laptop.click("[data-fall]")
-            expect(laptop.locator("[data-show=fall]")).to_contain_text("Noted.")
+            expect(laptop.locator(".alarm.red")).to_contain_text("Rosa fell")
             for page, name in ((laptop, "fall-laptop"), (patient, "fall-patient")):
                 take(page, name)
             second = context.new_page()
@@ -79,6 +79,8 @@ def test_pictures_of_a_fall(server: Server, browser: Browser) -> None:
                 second.goto(path)
                 set_screen(second, size)
                 take(second, name)
+            laptop.click(".alarm .seen")
+            take(laptop, "fall-seen-laptop")
 
 
 def second_screens(walk: Walk) -> list[tuple[str, str, str]]:

@@ -134,7 +134,7 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     assert f"by {by}" in listed
     assert "The robot of Iris stopped by itself." in listed
     assert "Not seen yet" in listed
-    assert "Falls 1 Near falls 0 Robot stopped 1" in words(listed)
+    assert "Falls 1 Near falls 0 Robot stopped by itself 1" in words(listed)
     assert "! incident" in plain(
         pt.get(reverse("history", args=[session.patient_id])).content.decode()
     )
@@ -154,7 +154,7 @@ def test_what_is_counted_is_listed_with_what_was_done_then(world, session):
     note(session, "pause")
     note(session, "dizziness")
     listed = words(seen(client_of(world), "incidents"))
-    assert "Falls 0 Near falls 1 Robot stopped 0 Pain 1 Dizziness 1" in listed
+    assert "Falls 0 Near falls 1 Robot stopped by itself 0 Pain 1 Dizziness 1" in listed
     for line in (
         f"Iris: near fall Noted by {by} · pause {NOW:%H:%M}",
         f"Iris: pain 6 of 10 Pause {NOW:%H:%M}",

@@ -84,7 +84,7 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
         "today": sorted(patients_today(user, now), key=lambda row: row.patient.pk not in fallen),
         "patients": shown[:MAX_PATIENTS],
         "more": len(shown) > MAX_PATIENTS,
-        "open": sorted(open_sessions(user), key=lambda one: one.patient_id not in fallen),
+        "open": [one for one in open_sessions(user) if one.patient_id not in fallen],
         "fallen": fallen,
     }
 

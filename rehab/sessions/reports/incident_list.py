@@ -68,7 +68,7 @@ def count_adverse(entries: Iterable[Entry]) -> list[tuple[str, int]]:
     named = {
         Alarm.FALL.value: gettext("Falls"),
         Remark.NEAR_FALL.value: gettext("Near falls"),
-        Alarm.ROBOT_STOP.value: gettext("Robot stopped"),
+        Alarm.ROBOT_STOP.value: gettext("Robot stopped by itself"),
     }
     named |= {kind: capfirst(str(EVENTS[kind])) for kind in ADVERSE if kind not in named}
     return [(name, found[kind]) for kind, name in named.items()]

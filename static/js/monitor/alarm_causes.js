@@ -2,7 +2,7 @@
 // it hides, a sentence with the cure, and what its button does.
 //
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
-//   action                    [label, what is done]; or a function of the session that returns it
+//   action, undo              functions of the session that return what is offered: [label, what is done]
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
 
@@ -14,6 +14,7 @@ import { describeReason } from "garry/monitor/robot_text";
 
 const FIRST_STRIDE_S = 10; // a walk needs longer to begin
 const RESTART_S = 15; // after which what has not come back is told
+export const TAKEN_BACK_WITHIN_S = 10; // a fall that was tapped by mistake
 const LAST = 10; // strides, of which half may not count before that is told
 const STORAGE = {
   late: _("The database is not answering: strides are waiting, and the robot is standing still."),
@@ -57,6 +58,15 @@ function describeFall(session, { robot }) {
     _("Belt: not known to GARRY"),
   ];
   return [fell, where || "", ...facts.filter(Boolean)].join("\n");
+}
+
+// Whoever tapped by mistake takes the note back, and only that: going on, and letting the robot move, are taps of
+// their own.
+function offerUndo(_session, { state }) {
+  const left_s = TAKEN_BACK_WITHIN_S - state.sinceFell_s;
+  if (left_s <= 0) return null;
+  const label = fill(_("It was not a fall (%(count)s s)"), { count: Math.ceil(left_s) });
+  return [label, ({ remark }) => remark("fall_withdrawn")];
 }
 
 // Who takes care of it, in the pause.
@@ -145,10 +155,17 @@ export const CAUSES = [
     hides: ["seen", "robot_stop", "restart", "ended", "source", "signals", "strides", "tablet", "robot", "why"],
     isRed: true,
     describe: describeFall,
-    isOwn: ({ state }) => state.fellHere,
+    isOwn: ({ state }) => state.fellHereAt !== null,
     action: () => [_("I’ll take care of it"), ({ remark }) => remark("fall_acknowledged")],
+    undo: offerUndo,
   },
-  { cause: "seen", hides: [], describe: describeSeen, isCalm: true },
+  {
+    cause: "seen",
+    hides: [],
+    describe: describeSeen,
+    isCalm: true,
+    action: ({ about }) => [fill(_("Is %(name)s hurt?"), { name: about.nickname }), ({ fall }) => fall.ask()],
+  },
   {
     cause: "robot_stop",
     hides: ["robot"],

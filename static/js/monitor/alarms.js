@@ -40,12 +40,12 @@ export function createAlarms(page) {
     banner.firstChild.after(told); // the button stays where it is
   }
 
-  function drawButton(banner, action) {
-    let button = banner.querySelector("button");
+  function drawButton(banner, look, action) {
+    let button = [...banner.children].find(({ className }) => className === look);
     if (!action) return button?.remove();
     if (!button) {
       button = banner.appendChild(document.createElement("button"));
-      button.className = banner.classList.contains("red") ? "btn big seen" : "btn small";
+      button.className = look;
     }
     const [label, act] = action;
     if (button.textContent !== label) button.textContent = label;
@@ -65,7 +65,8 @@ export function createAlarms(page) {
       const banner = shown.get(row.cause);
       if (place.children[index] !== banner) place.insertBefore(banner, place.children[index] ?? null);
       drawWords(banner, sentence);
-      drawButton(banner, row.action?.(session));
+      drawButton(banner, row.isRed ? "btn big seen" : "btn small", row.action?.(session));
+      drawButton(banner, "btn quiet", row.undo?.(session, page));
     });
     document.body.classList.toggle("stale", causes.has("server"));
   }

@@ -93,6 +93,7 @@ const page = {
   orderStop: () => robot.order("stop"),
 };
 const robot = (page.robot = new RobotPanel(document.querySelector(".robot"), page));
+const fall = (page.fall = createFall(page));
 const connections = createConnections(page);
 const parts = [
   createRunState(page),
@@ -109,7 +110,7 @@ const parts = [
   createRemarks(page),
   createNote(page),
   createWalking(page),
-  createFall(page),
+  fall,
   createStrideCharts(page),
   robot,
   createAlarms(page),

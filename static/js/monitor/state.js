@@ -30,7 +30,7 @@ export class MonitorState {
   strides = [];
   annotations = []; // changes and remarks, each after a stride
   lastStride = null;
-  fellHere = false; // a fall was tapped on this page
+  fellHereAt = null; // when a fall was tapped on this page, until it is seen or taken back
   hadTablet = false; // since the start, or shortly before it
   hadRobot = false;
   #snapshotAt = 0;
@@ -99,6 +99,11 @@ export class MonitorState {
   get sinceRunning_s() {
     this.#keepRunning();
     return this.#runningAt === null ? 0 : (performance.now() - this.#runningAt) / 1000;
+  }
+
+  // Seconds since a fall was tapped here.
+  get sinceFell_s() {
+    return this.fellHereAt === null ? Infinity : (performance.now() - this.fellHereAt) / 1000;
   }
 
   // Seconds since the last stride and since the tablet was heard; null for never.
