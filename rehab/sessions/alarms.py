@@ -80,7 +80,7 @@ class OpenAlarms:
         if event.kind == Remark.FALL_WITHDRAWN:
             falls = self._raised[Alarm.FALL]
             return [falls.pop()] if falls else None
-        if event.kind == ChangeKind.RESUME:
+        if event.kind in (ChangeKind.START, ChangeKind.RESUME):
             self._fall_seen = None
         if event.kind not in ENDED_BY:
             return None
@@ -97,6 +97,10 @@ class OpenAlarms:
     def has_fallen(self) -> bool:
         """Whether the patient fell and nobody has acknowledged it."""
         return bool(self._raised[Alarm.FALL])
+
+    def describe_to_patient(self) -> Message:
+        """Return what the patient's page gets: whether somebody fell, and takes care of it."""
+        return {"fell": self.has_fallen, "fall_seen": self._fall_seen is not None}
 
     def check_seen_to_fall(self) -> None:
         """Raise NotAllowed where nothing may move: the patient fell, nobody acknowledged it."""

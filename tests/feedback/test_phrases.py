@@ -20,11 +20,13 @@ BLAME = {
     *("schlecht", "falsch", "schwach", "mal", "débil", "mauvais", "faible", "faux"),
 }
 ALL = [(slug, language) for slug in VALENCES for language, _ in LANGUAGES]
+# Ours are shorter than a clinic's may be: in half an upright tablet the longest word sets the size.
+OURS = LENGTHS | {"en": (19, 8)}
 
 
 @pytest.mark.parametrize(("slug", "language"), ALL)
 def test_each_band_has_twelve_phrases_that_fit(slug: str, language: str) -> None:
-    longest, word = LENGTHS[language]
+    longest, word = OURS[language]
     valence = default_valence(slug, language)
     for band in valence.bands:
         if not valence.has_points:

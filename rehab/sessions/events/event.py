@@ -81,7 +81,7 @@ def remark_event(fold: SessionFold, what: str, value: float | None) -> LiveEvent
 
 def alarms_event(fold: SessionFold, alarms: OpenAlarms) -> LiveEvent:
     """Return the event that an alarm was raised or acknowledged. The patient's page stays calm."""
-    patient = {"kind": "alarms", "fell": alarms.has_fallen}
+    patient = {"kind": "alarms", **alarms.describe_to_patient()}
     return event_for(fold, patient=patient, monitor={"kind": "alarms", **alarms.describe()})
 
 

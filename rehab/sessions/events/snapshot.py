@@ -85,7 +85,7 @@ def snapshot(
         "steps": [entry for entry in entries if entry is not None],
     }
     if audience is Audience.PATIENT:
-        message |= {"last": _last_step(fold, recent), "fell": alarms.has_fallen}
+        message |= {"last": _last_step(fold, recent), **alarms.describe_to_patient()}
     if audience is Audience.MONITOR:
         message |= {
             **describe_types(fold),

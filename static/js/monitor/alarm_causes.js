@@ -44,12 +44,13 @@ function describeServer({ number }, { socket }) {
 // Whether somebody fell, and nobody has said yet that they saw it: until then nothing goes on.
 export const hasFallen = (session) => Boolean(session?.alarms && alarmOf(session, "fall"));
 
-function describeFall(session, { robot }) {
+function describeFall(session, { robot, state }) {
   const alarm = alarmOf(session, "fall");
   if (!alarm) return "";
   const fell = fill(_("%(name)s fell, %(time)s."), { name: session.about.nickname, time: timeOf(alarm) });
   const { station: place } = document.getElementById("monitor").dataset;
-  const where = place && fill(_("Where: %(place)s"), { place });
+  const isHere = state.fellHereAt !== null;
+  const where = place && fill(isHere ? _("Where: %(place)s") : _("Go to %(place)s."), { place });
   const noted = fill(_("Noted by %(who)s"), { who: alarm.by || "–" });
   const facts = [
     `${noted}, ${minutesAgo(alarm.at)}`,
@@ -161,7 +162,7 @@ export const CAUSES = [
   },
   {
     cause: "seen",
-    hides: [],
+    hides: ["robot"], // its panel lets it move
     describe: describeSeen,
     isCalm: true,
     action: ({ about }) => [fill(_("Is %(name)s hurt?"), { name: about.nickname }), ({ fall }) => fall.ask()],

@@ -47,7 +47,7 @@ export function createPhaseBar(list) {
     [...list.children].forEach((item, index) => {
       const isNow = index === phase.index;
       const text = isNow && left ? fill(_("%(phase)s · %(left)s left"), { phase: phaseName(phase.name), left }) : "";
-      const isHeld = isNow && session.state === "paused" && hasFallen(session);
+      const isHeld = isNow && session.state === "paused" && (session.fall_seen || hasFallen(session));
       const label = isHeld ? _("Paused") : text || phaseName(phases[index].name);
       if (item.textContent !== label) item.textContent = label;
       item.style.setProperty("--share", long[index]);

@@ -15,13 +15,13 @@ const ENOUGH = 0.99; // of the largest size that is possible
 const WORTH = [ENOUGH, 0.9, 0.6];
 const LEAST = 0.1; // of the promised size
 const HALVINGS = 8; // of the search for what fits
+const TWO = 2.02; // lines, with what is lost by rounding
 
 const EDGE = 24; // of the screen
 const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 170;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
-const NARROW = 600; // the total has no room beside the thermometer: it is below it
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 260; // of the thermometer
 const BESIDE_WORDS = 420; // the same, where words are beside it and so may be smaller for its sake
@@ -82,24 +82,28 @@ export function createFitting(body, scene) {
     if (was[2] !== undefined) key.dataset.lost = was[2];
     if (isTooLarge) return null;
 
-    const { column } = body.dataset;
+    const { column, text, theme, pxPerMm: isMeasured } = body.dataset;
     const isHalf = column === "right" || column === "left";
+    const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
+    // Badge and total, one below the other; the total below the thermometer.
+    const isStacked = isHalf || (landscape.matches ? isLargest && !isMeasured : !column);
+    const isBelow = !landscape.matches && (isHalf ? isMeasured || theme === "explicit" : column === "center");
+    if (isBeside && isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const sign = isBeside ? (isHalf ? "below" : "behind") : column === "center" ? "over" : "before"; // scene.js
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
-    const isBelow = width < NARROW || (column === "center" && !landscape.matches); // the total
     const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const hasBadge = level < BADGE && body.dataset.theme !== "explicit"; // walk.css
+    const hasBadge = level < BADGE && theme !== "explicit"; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + (sign === "below" ? SIGN_HIGH : AIR);
     const beside = isBelow ? 0 : total;
-    const ground = goal + under + (landscape.matches && !isHalf ? Math.max(badge, beside) : badge + beside);
+    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle is the thermometer, or where the total is below it, it and the badge.
     const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
@@ -138,7 +142,7 @@ export function createFitting(body, scene) {
       words.textContent = sample;
       return words.offsetHeight;
     };
-    const two = Math.min(high, 2 * parseFloat(getComputedStyle(words).lineHeight) + 1);
+    const two = Math.min(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const most = samples.map((sample) => Math.max(heightOf(sample), two));
     let [fits, not] = [phrase.parentElement.clientWidth, 0];
     for (let i = 0; i < HALVINGS; i++) {

@@ -22,6 +22,7 @@ export function applyEvent(session, event) {
       break;
     case "state":
       session.state = event.state;
+      if (event.state === "running") session.fall_seen = false;
       session.pause_reason = event.pause_reason;
       break;
     case "phase":
@@ -33,6 +34,7 @@ export function applyEvent(session, event) {
       break;
     case "alarms":
       session.fell = event.fell;
+      session.fall_seen = event.fall_seen;
       break;
     case "robot_stopped":
       session.robot_stopped = event.stopped;

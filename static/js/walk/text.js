@@ -4,6 +4,7 @@ import { clock } from "garry/shared/format";
 import { _, fill, n_, number } from "garry/shared/language";
 
 const SAFE = _("Your score is safe.");
+const STAY = [_("Stay where you are."), _("Help is coming.")];
 const KEEP_WALKING = _("Keep walking if you feel well.");
 const sentences = (...all) => all.filter(Boolean).join("\n");
 
@@ -34,6 +35,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "still":
       return [_("No steps measured."), sentences(KEEP_WALKING, safe)];
     case "paused":
+      if (session.fall_seen) return STAY;
       return [
         _("Pause."),
         sentences(
@@ -48,7 +50,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "offline":
       return [fill(_("No connection for %(count)s s."), { count: silent_s }), KEEP_WALKING];
     case "fell":
-      return [_("Stay where you are."), _("Help is coming.")];
+      return STAY;
     case "ended":
       return [_("You have finished."), _("Next: your scores.")];
     case "closed":
@@ -86,7 +88,7 @@ export function phaseLeft({ phase, phase_s, phase_strides }) {
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
 }
 
-const NOT_MEASURED = _("Step not seen.");
+const NOT_MEASURED = _("Not seen.");
 
 // Return the words after a step; without points they are the goal, beside which the value stands.
 export function phraseOf(step) {
