@@ -266,8 +266,14 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             expect(page.locator("[data-alarm=seen]")).to_contain_text(care)
         expect(monitor.locator("dialog[open]")).to_contain_text("Is Iris hurt?")
         expect(second.locator("dialog[open]")).to_have_count(0)  # asked where it was tapped
-        expect(patient.locator(".words")).to_have_text("Pause.")
-    assert [kind for kind, _ in noted(server, walk)][-1] == "fall_acknowledged"
+        # Who fell is not told to walk until the belt stops, but to stay, until the walk goes on.
+        expect(patient.locator("body")).to_have_attribute("data-look", "paused")
+        expect(patient.locator(".words")).to_have_text("Stay where you are.")
+        assert [kind for kind, _ in noted(server, walk)][-1] == "fall_acknowledged"
+        monitor.get_by_role("button", name="Answer later").click()
+        monitor.get_by_role("button", name="Resume").click()
+        expect(patient.locator("body")).not_to_have_attribute("data-look", "paused")
+        expect(patient.locator(".words")).not_to_have_text("Stay where you are.")
     start.goto("/incidents/")
     listed = start.get_by_role("listitem").filter(has_text="Iris fell.")
     expect(listed).to_contain_text("by walker")

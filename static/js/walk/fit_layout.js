@@ -89,7 +89,7 @@ export function createFitting(body, scene) {
     // Badge and total, one below the other; the total below the thermometer.
     const isStacked = isHalf || (landscape.matches ? isLargest && !isMeasured : !column);
     const isBelow = !landscape.matches && (isHalf ? isMeasured || theme === "explicit" : column === "center");
-    if (isBeside && isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
+    if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const sign = isBeside ? (isHalf ? "below" : "behind") : column === "center" ? "over" : "before"; // scene.js
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];

@@ -45,6 +45,7 @@ async def test_a_fall_is_told_everywhere_until_somebody_acknowledges_it(place, s
     await other.say({"type": "remark", "what": "fall_acknowledged", "id": "a"})
     await until_open(monitor)
     await until_fell(tablet, False)
+    assert tablet.last("alarms")["fall_seen"]
     row = await SessionEvent.everywhere.select_related("by").aget(kind="fall_acknowledged")
     assert (row.session_id, row.by) == (session.pk, place.pt)
 
