@@ -88,9 +88,16 @@ export function createFitting(body, scene) {
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
     // Badge and total, one below the other; the total below the thermometer.
     const isStacked = isHalf || (landscape.matches ? isLargest && !isMeasured : !column);
-    const isBelow = !landscape.matches && (isHalf ? isMeasured || theme === "explicit" : column === "center");
+    const isExplicit = theme === "explicit";
+    const isBelow = !landscape.matches && (isExplicit || (isHalf ? isMeasured : column === "center"));
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    const sign = isBeside ? (isHalf ? "below" : "behind") : column === "center" ? "over" : "before"; // scene.js
+    const sign = isBeside
+      ? isHalf || (isLargest && isExplicit)
+        ? "below"
+        : "behind"
+      : column === "center"
+        ? "over"
+        : "before"; // scene.js
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
@@ -99,7 +106,7 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const hasBadge = level < BADGE && theme !== "explicit"; // walk.css
+    const hasBadge = level < BADGE && !isExplicit; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + (sign === "below" ? SIGN_HIGH : AIR);
     const beside = isBelow ? 0 : total;
