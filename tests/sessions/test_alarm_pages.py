@@ -156,8 +156,8 @@ def test_what_is_counted_is_listed_with_what_was_done_then(world, session):
     listed = words(seen(client_of(world), "incidents"))
     assert "Falls 0 Near falls 1 Robot stopped by itself 0 Pain 1 Dizziness 1" in listed
     for line in (
-        f"Iris: near fall Noted by {by} · pause {NOW:%H:%M}",
-        f"Iris: pain 6 of 10 Pause {NOW:%H:%M}",
+        f"Iris: near fall Noted by {by} · then: pause, {NOW:%H:%M}",
+        f"Iris: pain 6 of 10 Then: pause, {NOW:%H:%M}",
         "Iris: dizziness During a pause",
     ):
         assert re.search(rf"\d\d:\d\d {re.escape(line)}", listed), line

@@ -179,7 +179,7 @@ def test_cookies_of_https_stay_there_and_nobody_is_locked_out(client: Client, cl
 
 @pytest.mark.django_db
 def test_a_phones_square_leads_to_https(pt: Client, lead: Client, world: World, clinic_folder):
-    wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
+    wish = {"station": world.add_station().pk, "side": "left"}
     assert 'href="/https/"' in pt.get("/phones/pair/").content.decode()
     lead.post("/https/")
     page = pt.post("/phones/pair/", wish).content.decode()

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.django_db
 def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     station = world.add_station()
     assert "Show the QR code" in pt.get("/phones/pair/").content.decode()
-    wish = {"station": station.pk, "place": "shank", "side": "left"}
+    wish = {"station": station.pk, "side": "left"}
     answer = pt.post("/phones/pair/", wish)
     assert "no-store" in answer.headers["Cache-Control"]
     page = answer.content.decode()
@@ -45,7 +45,7 @@ def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
 
 def test_a_new_token_of_a_phone_ends_as_early_as_the_first(pt: Client, world: World):
     station = world.add_station()
-    pt.post("/phones/pair/", {"station": station.pk, "place": "shank", "side": "left"})
+    pt.post("/phones/pair/", {"station": station.pk, "side": "left"})
     device = Device.everywhere.get(station=station)
     first = device.token_expires_at
     pt.post(f"/devices/{device.pk}/")
@@ -83,7 +83,7 @@ def ask(who: Client, way: str, wish: dict[str, Any], **request: Any) -> tuple[st
 @pytest.mark.parametrize("way", WAYS)
 def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
     """A source is told the feedback type of the session that is open at its station."""
-    wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
+    wish = {"station": world.add_station().pk, "side": "left"}
     assessor = User.everywhere.create_user("assessor", role=Role.PT, clinic=world.clinic)
     give_mark(running_study(world), assessor, Task.ASSESSOR, None, NOW)
     client = signed_in(assessor)
@@ -96,7 +96,7 @@ def test_a_blinded_assessor_is_given_no_phones_token(world: World, way):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way):
-    wish = {"station": world.add_station().pk, "place": "shank", "side": "left"}
+    wish = {"station": world.add_station().pk, "side": "left"}
     type(world.clinic).everywhere.update(networks="192.168.7.0/24")
     afar: dict[str, Any] = {"REMOTE_ADDR": "203.0.113.9"}
     token, page = ask(world.pt, way, wish, **afar)
@@ -108,7 +108,7 @@ def test_no_phones_token_is_given_outside_the_clinics_networks(world: World, way
 def test_a_phones_token_ends_with_who_paired_it_and_after_a_day(world: World, way):
     """Also one that was only tried: it is the station's, whatever is walked there next."""
     station, who = world.add_station(), world.people[Role.PT]
-    wish = {"station": station.pk, "place": "shank", "side": "left"}
+    wish = {"station": station.pk, "side": "left"}
     token, _page = ask(world.pt, way, wish)
     now = timezone.now()
     assert find_device(token, now) is not None
@@ -138,11 +138,11 @@ def test_a_phone_that_is_let_in_leaves_the_one_before_out(world: World):
     assert find_device(second, now) is not None
 
 
-@pytest.mark.parametrize("wrong", [{"station": "0"}, {"place": "head"}, {"side": "both"}])
+@pytest.mark.parametrize("wrong", [{"station": "0"}, {"side": "both"}])
 def test_what_cannot_be_paired_is_refused(pt: Client, world: World, wrong):
-    wish = {"station": world.add_station().pk, "place": "foot", "side": "right"} | wrong
+    wish = {"station": world.add_station().pk, "side": "right"} | wrong
     page = pt.post("/phones/pair/", wish).content.decode()
-    assert "Choose a station, a place and a leg." in page
+    assert "Choose a station and a leg." in page
     assert not Device.everywhere.filter(name__startswith="Phone").exists()
 
 
@@ -159,7 +159,7 @@ def test_setup_offers_what_the_paired_sensors_measure(pt: Client, world: World):
     setup = f"/patients/{patient.pk}/new/"
     assert "ankle push-off power A2" in pt.get(setup).content.decode()
     for side in ("left", "right"):
-        pt.post("/phones/pair/", {"station": station.pk, "place": "shank", "side": side})
+        pt.post("/phones/pair/", {"station": station.pk, "side": side})
         page = pt.get(setup).content.decode()
         assert "shank lean" in page
         assert "ankle push-off power A2" not in page

@@ -41,7 +41,7 @@ def pair_tablet(person: Client, station: Station, tablet: Client | None = None) 
 
 def pair_phone(person: Client, station: Station) -> str:
     """Return the token of a phone that a person pairs as a sensor; empty where it is refused."""
-    worn = {"station": station.pk, "place": "shank", "side": "left"}
+    worn = {"station": station.pk, "side": "left"}
     page = person.post("/phones/pair/", worn).content.decode()
     return page.partition("token=")[2].partition("&")[0]
 

@@ -19,6 +19,14 @@ from rehab.people.networks import is_outside
 consent_withdrawn = Signal()
 
 REMOTE_VIEW_TEXT = _("Remote view: your therapist may watch a session from another place.")
+CLOSING_TEXT = _(
+    "You may say no to any of these, and change your mind at any time. Your care does not "
+    "depend on research, boards or family view."
+)
+REMOTE_CLOSING_TEXT = _(
+    "You may say no to any of these, and change your mind at any time. Your care does not "
+    "depend on research, boards, remote view or family view."
+)
 # The first text of a clinic, in its language. The clinic may change it.
 DEFAULT_TEXT = (
     _(
@@ -40,15 +48,15 @@ DEFAULT_TEXT = (
         "Family view: people whom you choose see on a page of their own when you walked, how many "
         "steps reached your goal, and your next visit, until the link ends."
     ),
-    _(
-        "You may say no to any of these, and change your mind at any time. Your care does not "
-        "depend on research, boards, remote view or family view."
-    ),
+    CLOSING_TEXT,
+    REMOTE_CLOSING_TEXT,
 )
 
 
 def _is_included(clinic: Clinic, paragraph: Any) -> bool:
-    return paragraph is not REMOTE_VIEW_TEXT or Purpose.REMOTE in offered_purposes(clinic)
+    if Purpose.REMOTE in offered_purposes(clinic):
+        return paragraph is not CLOSING_TEXT
+    return paragraph is not REMOTE_VIEW_TEXT and paragraph is not REMOTE_CLOSING_TEXT
 
 
 def current_text(clinic: Clinic) -> ConsentText:

@@ -17,7 +17,13 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
 from rehab.sessions.corrections import CorrectedField, can_correct, describe_corrections
-from rehab.sessions.formatting import clinic_time, format_day, format_rate, format_state
+from rehab.sessions.formatting import (
+    MISSING,
+    clinic_time,
+    format_day,
+    format_rate,
+    format_state,
+)
 from rehab.sessions.forms.correction import CorrectionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
@@ -48,9 +54,13 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     )
     review = review_session(user, session)
     summary, point = format_summary(session.to_plan(), review), load_point(user, session)
+    mean = format_mean(session, point)
     corrections = describe_corrections(session, user)
     notes = (entry.new for entry in corrections if entry.row.field == CorrectedField.NOTE)
     note = next(notes, "")
+    whether = (
+        entry.row.reason for entry in corrections if entry.row.field == CorrectedField.COUNTS
+    )
     by_name = may_see_names(user.role)
     start = clinic_time(session.began_at, session.clinic)
     now = clinic_time(timezone.now(), session.clinic)
@@ -65,10 +75,11 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "can_correct": by_name and can_correct(session),
         "corrections": corrections,
         "note": note,
+        "why_left_out": next(whether, ""),
         "text": write_text_note(user, session, review, note) if by_name else "",
         "review": review,
         "incidents": _list_incidents(user, session) if by_name else [],
-        "figures": [summary.hit_rate, format_mean(session, point)],
+        "figures": [summary.hit_rate, *([mean] if mean.value != MISSING else [])],
         "facts": summary,
         "alarms": format_incidents(review, session),
         "phases": format_phases(review),

@@ -93,7 +93,8 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         "last_goal": same and same.goal,
         "last_baseline": point and point.baseline and point.baseline.mean,
         "protocols": [
-            (choice, outlines[choice.data["value"].value]) for choice in form["protocol"]
+            (choice, outlines[choice.data["value"].value])
+            for choice in sorted(form["protocol"], key=lambda choice: not choice.data["selected"])
         ],
         "sources": sources,
         "tried": tried,

@@ -8,6 +8,7 @@ from django.shortcuts import redirect, render
 from django.templatetags.static import static
 from django.urls import reverse
 from django.utils import timezone
+from django.utils.html import format_html
 from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
@@ -62,9 +63,11 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
 
 
 def _show_code(request: HttpRequest, code: str) -> HttpResponse:
-    place = request.build_absolute_uri(reverse("pair"))  # without the code: a person compares it
+    path = reverse("pair")  # without the code: a person compares it
+    place = request.build_absolute_uri(path)
     drawing = segno.make(place, micro=False).svg_inline(omitsize=True, border=2)
-    context = {"code": code, "qr": drawing, "place": place}
+    broken = format_html("{}<wbr>{}", place.removesuffix(path), path)
+    context = {"code": code, "qr": drawing, "place": broken}
     return render(request, "sessions/tablet.html", context)
 
 

@@ -141,7 +141,8 @@ def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: Use
     if before and before[-1].kind in PAUSES:
         done = gettext("during a pause")
     elif after:
-        done = f"{EVENTS[after[0].kind]} {clinic_time(after[0].at, clinic):%H:%M}"
+        what, at = EVENTS[after[0].kind], clinic_time(after[0].at, clinic)
+        done = gettext("then: %(what)s, %(time)s") % {"what": what, "time": f"{at:%H:%M}"}
     else:
         done = gettext("walked on")
     if remark.by is None:

@@ -28,12 +28,11 @@ from rehab.stations.device_trust import NotTrusted, check_approval
 from rehab.stations.https.certificate import secure_host
 from rehab.stations.models import Device, Station
 from rehab.stations.pages.https import certificate_square
-from rehab.training.measures import WORN
 from rehab.training.steps import Side
 
 STANDS_S, RATE_HZ = 5.0, 60.0  # of the simulated leg
 LEGS = {Side.LEFT: gettext_lazy("left"), Side.RIGHT: gettext_lazy("right")}
-PLACES = {"shank": gettext_lazy("shin"), "foot": gettext_lazy("foot")}
+PLACE = "shank"  # a phone on the foot would be too heavy
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)
@@ -47,7 +46,6 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
     context: dict[str, Any] = {
         "stations": Station.objects.visible_to(user),
         "legs": LEGS.items(),
-        "places": PLACES.items(),
         "is_secure": secure_host() is not None or request.is_secure(),
     }
     if request.method == "POST":
@@ -67,17 +65,17 @@ def _pair(request: HttpRequest, user: User) -> dict[str, Any]:
     check_approval(user, client_address(request), "phone", now)
     stations = Station.objects.visible_to(user)
     station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
-    place, side = request.POST.get("place"), request.POST.get("side")
-    if station is None or place not in WORN or side not in LEGS:
-        return {"problem": _("Choose a station, a place and a leg.")}
-    where = {"leg": LEGS[Side(side)], "place": PLACES[place]}
+    side = request.POST.get("side")
+    if station is None or side not in LEGS:
+        return {"problem": _("Choose a station and a leg.")}
+    where = {"leg": LEGS[Side(side)], "place": _("shin")}
     device = Device(
         clinic_id=station.clinic_id,
         station=station,
         kind=Device.Kind.SOURCE,
         name=_("Phone, %(leg)s %(place)s") % where,
         side=side,
-        place=place,
+        place=PLACE,
     )
     token = device.new_token()
     device.note_issuer(user, now)
@@ -87,7 +85,7 @@ def _pair(request: HttpRequest, user: User) -> dict[str, Any]:
     host = secure_host()
     here = f"https://{host}" if host else f"{request.scheme}://{request.get_host()}"
     page = sensor_path(clinic_of(user))
-    worn = f"#token={token}&place={place}&side={side}"
+    worn = f"#token={token}&place={PLACE}&side={side}"
     drawing = segno.make(f"{here}{page}{worn}", micro=False).svg_inline(omitsize=True, border=2)
     trial = trial_path(clinic_of(user), token, Side(side))
     return {"device": device, "qr": drawing, "trial": trial, **certificate_square()}
@@ -101,7 +99,7 @@ def sensor_path(clinic: Clinic) -> str:
 def trial_path(clinic: Clinic, token: str, side: Side) -> str:
     """Return the path of a phone's page on which a recording is tried."""
     # Behind the # nothing of it reaches a server's log.
-    return f"{sensor_path(clinic)}&trial#token={token}&place=shank&side={side}"
+    return f"{sensor_path(clinic)}&trial#token={token}&place={PLACE}&side={side}"
 
 
 @public

@@ -1,5 +1,5 @@
-// The size of this screen: a drawing that is made as wide as a bank card, or the screen's diagonal; and which sizes of
-// words it can hold.
+// The size of this screen: a drawing that is made as wide as a bank card, or the screen's diagonal; and how large it
+// shows each size of words.
 
 import { pixelsOfDegree } from "garry/walk/fit_layout";
 
@@ -13,23 +13,28 @@ const LETTERS = { phrase: 30, word: 12 };
 const LETTER_WIDTH = 0.56;
 const LINE = 1.04;
 const NUMBER = 2.1;
+const STEP = 5; // percent
 const USED = { width: 0.93, height: 0.85 }; // of the screen
 
 const form = document.querySelector("main form");
 const [width, diagonal] = ["[data-width]", "[data-diagonal]"].map((name) => form.querySelector(name));
 const { px_per_mm: field, distance_m: distance } = form.elements;
 
+function isHeld(word) {
+  const inLine = Math.floor((USED.width * screen.width) / (word * LETTER_WIDTH));
+  const lines = Math.ceil(LETTERS.phrase / inLine);
+  return inLine >= LETTERS.word && word * (lines * LINE + NUMBER) <= USED.height * screen.height;
+}
+
 function show(pxPerMm) {
   width.value = pxPerMm;
   form.querySelector(".bank-card").style.setProperty("--px-per-mm", pxPerMm);
   const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
   for (const row of form.querySelectorAll("[data-factor]")) {
-    const word = degree * Number(row.dataset.factor);
-    const inLine = Math.floor((USED.width * screen.width) / (word * LETTER_WIDTH));
-    const lines = Math.ceil(LETTERS.phrase / inLine);
-    const isHeld = inLine >= LETTERS.word && word * (lines * LINE + NUMBER) <= USED.height * screen.height;
-    const [fits, not] = row.querySelectorAll(".badge");
-    [fits.hidden, not.hidden] = [!isHeld, isHeld];
+    let percent = 100;
+    while (percent > STEP && !isHeld((degree * Number(row.dataset.factor) * percent) / 100)) percent -= STEP;
+    row.querySelector("output").value = percent < 100 ? `≈ ${percent} %` : "100 %";
+    row.firstElementChild.classList.toggle("warn", percent < 100);
   }
 }
 
