@@ -1,5 +1,6 @@
 """Tags and filters of all templates."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from django import template
@@ -7,6 +8,7 @@ from django.templatetags.static import static
 from django.urls import reverse
 from django.utils.html import format_html, json_script
 from django.utils.safestring import SafeString
+from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 
 from rehab.people.web.help_pages import find_part
@@ -73,6 +75,19 @@ def tour(context: dict[str, Any]) -> dict[str, object]:
 def left_tour(context: dict[str, Any]) -> int:
     """Return the step at which the tour was left; 0 for none, negative while it runs."""
     return -where_in_tour(context["request"])
+
+
+@register.filter
+def with_labels(cells: Iterable[str], headers: Iterable[dict[str, Any]]) -> list[str]:
+    """Return the cells of a row of the admin, each with its column's name for cards of a phone."""
+    return [
+        cell
+        if "action-checkbox" in cell[:30]
+        else SafeString(
+            cell.replace("<td", format_html('<td data-label="{}"', capfirst(header["text"])), 1)
+        )
+        for cell, header in zip(cells, headers, strict=True)
+    ]
 
 
 @register.filter

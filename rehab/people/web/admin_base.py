@@ -144,6 +144,9 @@ class ScopedOptions(admin.options.BaseModelAdmin):
 class TrackedAdmin(admin.ModelAdmin):
     """A list with its model's name as title, and pages of a row with our own change history."""
 
+    actions_on_top = False
+    actions_on_bottom = True  # what is ticked is followed by what to do with it
+
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
         """Return a row; by its key where ``from_field`` is empty, on which Django fails."""
         row = super().get_object(request, object_id, from_field or None)

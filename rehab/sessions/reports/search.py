@@ -25,8 +25,12 @@ from rehab.people.roles import may_see_names
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 
-# Name in the form → the column, and how many units of the form are one unit of the column.
-RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal": ("goal", 1)}
+# Name in the form → label, column, and how many units of the form are one unit of the column.
+RANGES = {
+    "score": (_("Score"), "metric_score", 1),
+    "hits": (_("Hit rate"), "metric_hit_rate", 100),
+    "goal": (_("Goal"), "goal", 1),
+}
 
 # Limits that leave room for a day more or less, in every time zone.
 FIRST_DAY, LAST_DAY = date(1900, 1, 1), date(2999, 12, 31)
@@ -72,10 +76,16 @@ class SessionSearchForm(forms.Form):
     def clean(self) -> dict[str, Any]:
         """Return the cleaned data. Refuses ranges that begin after their end."""
         data: dict[str, Any] = super().clean() or {}
-        for low, high in (("first", "last"), *((f"{n}_min", f"{n}_max") for n in RANGES)):
+        over = gettext("%(what)s from %(first)s to %(last)s: the first is larger.")
+        problems = {("first", "last"): gettext("It ends before it starts.")} | {
+            (low := f"{name}_min", high := f"{name}_max"): over
+            % {"what": label, "first": self[low].data, "last": self[high].data}
+            for name, (label, *_column) in RANGES.items()
+        }
+        for (low, high), problem in problems.items():
             start, end = data.get(low), data.get(high)
             if start is not None and end is not None and start > end:
-                self.add_error(high, ValidationError(gettext("It ends before it starts.")))
+                self.add_error(high, ValidationError(problem))
         return data
 
     def filter_sessions(self, sessions: QuerySet[Any], zone: str) -> QuerySet[Any]:
@@ -91,7 +101,7 @@ class SessionSearchForm(forms.Form):
             begun = begun.filter(**{"patient" if by_name else "patient__pseudonym": data["who"]})
         if data.get("place"):
             begun = begun.filter(station=data["place"])
-        for name, (column, units) in RANGES.items():
+        for name, (_label, column, units) in RANGES.items():
             for end, lookup in (("min", "gte"), ("max", "lte")):
                 value = data[f"{name}_{end}"]
                 if value is not None:
