@@ -183,7 +183,8 @@ TAG = re.compile(r"{%.*?%}|{{.*?}}", re.DOTALL)
 # an attribute, stands in single quotes: yesno:'true,false'.
 SPEAKS = re.compile(
     r"""\|(?:default|default_if_none|add):["'][^"']*[A-Za-z]{2}"""
-    r"""|\|pluralize|\|yesno(?!:'|:_)|\|(?:date|time):["'](?![A-Z_]+_FORMAT|[, cHis:]+["']|Y-m-d["'])"""
+    r"""|\|pluralize|\|yesno(?!:'|:_)"""
+    r"""|\|(?:date|time):["'](?![A-Z_]+_FORMAT|[, cHis:]+["']|Y-m-d["'])"""
     r"""|{% now ["'](?![A-Z_]+_FORMAT)"""
 )
 
