@@ -43,7 +43,7 @@ ENDED_BY = {
 
 
 # What a session's alarms, and who takes care of them, follow from.
-FOLDED_KINDS = (*ALARM_KINDS, ChangeKind.RESUME.value)
+FOLDED_KINDS = (*ALARM_KINDS, ChangeKind.START.value, ChangeKind.RESUME.value)
 
 # Holds the reason of a stop where the session has its robot off: no alarm, no harm.
 UNASKED = "unasked"

@@ -109,8 +109,9 @@ def play_back(user: User, session: TrainingSession) -> Message:
         # What was noted before the start belongs to it, and a clock may be set back.
         at_s = max(at_s, round((at - began).total_seconds(), 2))
         events = _events(fold, row, late)
-        if isinstance(row, SessionEvent) and row.kind in ALARM_KINDS:
+        if isinstance(row, SessionEvent):
             alarms.apply(row)
+        if isinstance(row, SessionEvent) and row.kind in ALARM_KINDS:
             events.append(alarms_event(fold, alarms))
         for event in events:
             texts = [event.text(audience) for audience in AUDIENCES]

@@ -2,7 +2,7 @@
 // it hides, a sentence with the cure, and what its button does.
 //
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
-//   action, undo              functions of the session that return what is offered: [label, what is done]
+//   action, undo              functions of the session that return what is offered: [label, what is done, seconds left]
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
 
@@ -66,13 +66,15 @@ function describeFall(session, { robot, state }) {
 function offerUndo(_session, { state }) {
   const left_s = TAKEN_BACK_WITHIN_S - state.sinceFell_s;
   if (left_s <= 0) return null;
-  const label = fill(_("It was not a fall (%(count)s s)"), { count: Math.ceil(left_s) });
-  return [label, ({ remark }) => remark("fall_withdrawn")];
+  return [_("It was not a fall"), ({ remark }) => remark("fall_withdrawn"), Math.ceil(left_s)];
 }
 
+const isSeen = ({ fall_seen: seen, state }) => Boolean(seen && state === "paused");
+
 // Who takes care of it, in the pause.
-function describeSeen({ fall_seen: seen, state, about }) {
-  if (!seen || state !== "paused") return "";
+function describeSeen(session) {
+  if (!isSeen(session)) return "";
+  const { fall_seen: seen, about } = session;
   const values = { who: seen.by, name: about.nickname, time: timeOf(seen) };
   return fill(_("%(who)s takes care of %(name)s’s fall, %(time)s."), values);
 }
@@ -136,7 +138,7 @@ function describeRobot(session, { state, robot }) {
   if (state.hadRobot && !session.presence.robot) {
     return _("The robot has dropped out and is standing still. Check its switch and its network.");
   }
-  return robot.alarm;
+  return isSeen(session) ? "" : robot.alarm; // its panel lets it move
 }
 
 function describePause({ state, pause_reason: reason, rest_s: rest, fall_seen: seen }) {
@@ -162,7 +164,7 @@ export const CAUSES = [
   },
   {
     cause: "seen",
-    hides: ["robot"], // its panel lets it move
+    hides: [],
     describe: describeSeen,
     isCalm: true,
     action: ({ about }) => [fill(_("Is %(name)s hurt?"), { name: about.nickname }), ({ fall }) => fall.ask()],

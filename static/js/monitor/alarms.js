@@ -47,8 +47,9 @@ export function createAlarms(page) {
       button = banner.appendChild(document.createElement("button"));
       button.className = look;
     }
-    const [label, act] = action;
+    const [label, act, left_s] = action;
     if (button.textContent !== label) button.textContent = label;
+    if (left_s) button.dataset.left = left_s; // drawn by CSS: screen readers are not told each second
     button.onclick = () => act(page);
   }
 

@@ -42,6 +42,7 @@ export class MonitorState {
     this.strides = snapshot.steps.slice(-KEPT_STRIDES);
     this.annotations = snapshot.marks;
     this.lastStride ??= this.strides.at(-1) ?? null;
+    if (!snapshot.alarms.some(({ kind }) => kind === "fall")) this.fellHereAt = null; // answered meanwhile
     this.#snapshotAt = this.#presenceAt = performance.now();
     this.#keepRunning();
     this.#keepDevices();

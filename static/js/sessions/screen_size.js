@@ -54,7 +54,7 @@ diagonal.addEventListener("input", () => {
   if (inches > 0) take(DIAGONAL / (inches * INCH_MM));
 });
 for (const button of form.querySelectorAll("[data-by]"))
-  button.addEventListener("click", () => take(Number(width.value) * (1 + FINE * Number(button.dataset.by))));
+  button.addEventListener("click", () => take(Number(field.value || USUAL) * (1 + FINE * Number(button.dataset.by))));
 distance.addEventListener("change", () => show(Number(field.value || USUAL)));
 if (field.value) tellDiagonal(Number(field.value));
 show(Number(field.value || USUAL));

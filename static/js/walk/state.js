@@ -48,7 +48,8 @@ export function screenOf(session, page) {
   if (!session) return page.link === "lost" ? "offline" : "connecting";
   if (session.state === "finished" || session.state === "aborted") return "ended";
   if (page.link === "lost") return "offline";
-  if (session.fell) return "fell";
+  // Whoever fell stays until the walk goes on, which the therapist's page alone orders.
+  if (session.fell || (session.fall_seen && session.state !== "running")) return "fell";
   if (session.state === "ready") return "ready";
   if (session.state === "paused") return page.asking ? "ask" : "paused";
   if (!session.presence.source) return session.number ? "lost" : "waiting";

@@ -4,7 +4,6 @@ import { clock } from "garry/shared/format";
 import { _, fill, n_, number } from "garry/shared/language";
 
 const SAFE = _("Your score is safe.");
-const STAY = [_("Stay where you are."), _("Help is coming.")];
 const KEEP_WALKING = _("Keep walking if you feel well.");
 const sentences = (...all) => all.filter(Boolean).join("\n");
 
@@ -35,7 +34,6 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "still":
       return [_("No steps measured."), sentences(KEEP_WALKING, safe)];
     case "paused":
-      if (session.fall_seen) return STAY;
       return [
         _("Pause."),
         sentences(
@@ -50,7 +48,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "offline":
       return [fill(_("No connection for %(count)s s."), { count: silent_s }), KEEP_WALKING];
     case "fell":
-      return STAY;
+      return [_("Stay where you are."), _("Help is coming.")];
     case "ended":
       return [_("You have finished."), _("Next: your scores.")];
     case "closed":

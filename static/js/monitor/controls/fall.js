@@ -16,9 +16,9 @@ export function createFall({ state: told, announce, onPress, change, note, remar
   onPress("[data-fall]", async (_button, session) => {
     orderStop();
     if (session.state === "running") change("pause");
+    announce(_("The robot is told to stop, and the session to pause."));
     if (told.sinceFell_s < TAKEN_BACK_WITHIN_S || hasFallen(session)) return; // tapped twice: one fall
     told.fellHereAt = performance.now();
-    announce(_("The robot is told to stop, and the session to pause."));
     try {
       await note("fall");
       announce(""); // the alarm says so
