@@ -2,7 +2,7 @@
 // it hides, a sentence with the cure, and what its button does.
 //
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
-//   action, undo              functions of the session that return what is offered: [label, what is done, seconds left]
+//   action, undo              functions of the session that return what is offered: [label, act, seconds left]
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
 
