@@ -117,7 +117,7 @@ STRONGEST = join(
     gettext_noop("So strong!"),
     gettext_noop("Just great!"),
     gettext_noop("Far above!"),
-    gettext_noop("What power!"),
+    gettext_noop("Great stride!"),
     gettext_noop("Well above!"),
     gettext_noop("Way over!"),
     gettext_noop("Far over!"),
