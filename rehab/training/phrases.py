@@ -131,7 +131,7 @@ FAR_BELOW = join(
     gettext_noop("Clearly under."),
     gettext_noop("Far off."),
     gettext_noop("A long way."),
-    gettext_noop("Well below."),
+    gettext_noop("Way below."),
     gettext_noop("The goal is far up."),
     gettext_noop("A wide gap."),
     gettext_noop("Still far below."),
