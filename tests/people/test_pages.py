@@ -36,7 +36,7 @@ def test_pages_allow_no_foreign_script(client):
 
 def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
     row = world.pt.get("/admin/rehab/trainingsession/").content.decode()
-    found = re.findall(r'<td class="field-(\w+)[^"]*"[^>]*>(.*?)</td>', row)
+    found = re.findall(r'<td[^>]* class="field-(\w+)[^"]*"[^>]*>(.*?)</td>', row)
     cells = {name: strip_tags(re.sub(" ?<br>", " / ", cell)) for name, cell in found}
     patient = world.patient
     assert f'href="{reverse("session", args=[world.session.pk])}"' in dict(found)["who"]
