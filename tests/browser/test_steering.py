@@ -173,7 +173,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
 
         admin.get_by_role("link", name="Edit Positive").click()
         admin.get_by_role("link", name="Back to the defaults").click()
-        admin.click("[type=submit][value='Back to the defaults']")
+        admin.get_by_role("button", name="Back to the defaults").click()
         expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("as usual")
         feet.walk(1.15)
         at_step(tablet, 3)

@@ -18,14 +18,9 @@ from rehab.people.networks import is_outside
 # Sent in the transaction of a withdrawal, with patient, purpose, by and now.
 consent_withdrawn = Signal()
 
-REMOTE_VIEW_TEXT = _("Remote view: your therapist may watch a session from another place.")
-CLOSING_TEXT = _(
-    "You may say no to any of these, and change your mind at any time. Your care does not "
-    "depend on research, boards or family view."
-)
-REMOTE_CLOSING_TEXT = _(
-    "You may say no to any of these, and change your mind at any time. Your care does not "
-    "depend on research, boards, remote view or family view."
+REMOTE_VIEW_TEXT = _(
+    "Remote view: your therapist may watch a session from another place. Your care does not "
+    "depend on it."
 )
 # The first text of a clinic, in its language. The clinic may change it.
 DEFAULT_TEXT = (
@@ -48,15 +43,15 @@ DEFAULT_TEXT = (
         "Family view: people whom you choose see on a page of their own when you walked, how many "
         "steps reached your goal, and your next visit, until the link ends."
     ),
-    CLOSING_TEXT,
-    REMOTE_CLOSING_TEXT,
+    _(
+        "You may say no to any of these, and change your mind at any time. Your care does not "
+        "depend on research, boards or family view."
+    ),
 )
 
 
 def _is_included(clinic: Clinic, paragraph: Any) -> bool:
-    if Purpose.REMOTE in offered_purposes(clinic):
-        return paragraph is not CLOSING_TEXT
-    return paragraph is not REMOTE_VIEW_TEXT and paragraph is not REMOTE_CLOSING_TEXT
+    return paragraph is not REMOTE_VIEW_TEXT or Purpose.REMOTE in offered_purposes(clinic)
 
 
 def current_text(clinic: Clinic) -> ConsentText:

@@ -111,8 +111,8 @@ def play_back(user: User, session: TrainingSession) -> Message:
         events = _events(fold, row, late)
         if isinstance(row, SessionEvent):
             alarms.apply(row)
-        if isinstance(row, SessionEvent) and row.kind in ALARM_KINDS:
-            events.append(alarms_event(fold, alarms))
+            if row.kind in ALARM_KINDS:
+                events.append(alarms_event(fold, alarms))
         for event in events:
             texts = [event.text(audience) for audience in AUDIENCES]
             if any(texts):

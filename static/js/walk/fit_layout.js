@@ -91,13 +91,8 @@ export function createFitting(body, scene) {
     const isExplicit = theme === "explicit";
     const isBelow = !landscape.matches && (isExplicit || (isHalf ? isMeasured : column === "center"));
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    const sign = isBeside
-      ? isHalf || (isLargest && isExplicit)
-        ? "below"
-        : "behind"
-      : column === "center"
-        ? "over"
-        : "before"; // scene.js
+    let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
+    if (isBeside) sign = isHalf || (isLargest && isExplicit) ? "below" : "behind";
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
