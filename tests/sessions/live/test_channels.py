@@ -217,3 +217,22 @@ async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, mo
     await place.tablet(session).watch()
     told = {str(record.exc_info[1]) for record in caplog.records if record.exc_info}
     assert told == set(failed)
+
+
+async def test_a_session_stays_in_memory_while_an_order_is_checked(
+    place, elsewhere, ready, monkeypatch
+):
+    monkeypatch.setattr(periodic_tasks, "ROBOT_HEARTBEAT_S", 0.001)
+    runtime = runtimes.current()
+    session, other = await ready(place), await ready(elsewhere)
+    checked = await runtime.session(session.pk)
+    with checked.gate.closed():
+        checked.recently_used = False
+        await runtime.session(other.pk)
+        async with asyncio.timeout(10):
+            while other.pk in runtime.sessions:
+                await turns()
+        assert runtime.sessions[session.pk] is checked
+    async with asyncio.timeout(10):
+        while session.pk in runtime.sessions:
+            await turns()

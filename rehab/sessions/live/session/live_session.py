@@ -110,7 +110,8 @@ class LiveSession:
     def is_idle(self) -> bool:
         """Whether nothing needs it in memory."""
         devices = self.source or self.companion or self.robot
-        return not (self.feed.subscribers or devices or self.uncommitted)
+        used = self.feed.subscribers or devices or self.uncommitted
+        return self.gate.is_open and not used
 
     @property
     def is_running(self) -> bool:
