@@ -43,7 +43,12 @@ ENDED_BY = {
 
 
 # What a session's alarms, and who takes care of them, follow from.
-FOLDED_KINDS = (*ALARM_KINDS, ChangeKind.START.value, ChangeKind.RESUME.value)
+FOLDED_KINDS = (
+    *ALARM_KINDS,
+    Remark.FALL_SEVERITY.value,
+    ChangeKind.START.value,
+    ChangeKind.RESUME.value,
+)
 
 # Holds the reason of a stop where the session has its robot off: no alarm, no harm.
 UNASKED = "unasked"
@@ -67,6 +72,7 @@ class OpenAlarms:
         self._raised: defaultdict[Alarm, list[SessionEvent]] = defaultdict(list)
         self.stop_reason = ""  # of the robot's latest stop, where it stopped by itself
         self._fall_seen: SessionEvent | None = None  # a fall's acknowledgment, until all goes on
+        self._severity: int | None = None  # of that fall, a `FallSeverity`
         for event in events:
             self.apply(event)
 
@@ -82,10 +88,12 @@ class OpenAlarms:
             return [falls.pop()] if falls else None
         if event.kind in (ChangeKind.START, ChangeKind.RESUME):
             self._fall_seen = None
+        if event.kind == Remark.FALL_SEVERITY:
+            self._severity = int(event.value or 0)
         if event.kind not in ENDED_BY:
             return None
         if event.kind == Remark.FALL_ACKNOWLEDGED:
-            self._fall_seen = event
+            self._fall_seen, self._severity = event, None
         return self._raised.pop(ENDED_BY[event.kind], None)
 
     @property
@@ -121,6 +129,7 @@ class OpenAlarms:
         seen = self._fall_seen and {
             "by": str(self._fall_seen.by or "–"),
             "at": self._fall_seen.at.isoformat(),
+            "severity": self._severity,
         }
         return {"alarms": alarms, "stop_reason": self.stop_reason, "fall_seen": seen}
 

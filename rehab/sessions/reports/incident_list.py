@@ -32,7 +32,7 @@ RESUMES = {ChangeKind.START.value, ChangeKind.RESUME.value}
 class Entry:
     """One of them, as text; ``at`` by the clinic's clock.
 
-    ``hurt``: how badly, by a fall. ``is_one``: nobody took it back.
+    ``hurt``: how badly, by a fall, or that nobody said. ``is_one``: nobody took it back.
     """
 
     kind: str
@@ -48,6 +48,11 @@ class Entry:
     def icon(self) -> str:
         """The name of its drawing."""
         return DRAWN[self.kind]
+
+    @property
+    def outcome(self) -> str:
+        """How badly somebody was hurt, and what was done; "" where nobody said either."""
+        return capfirst(" · ".join(filter(None, (self.hurt, "" if self.is_open else self.done))))
 
     @property
     def is_counted(self) -> bool:
@@ -83,6 +88,7 @@ def _from_incident(user: User, incident: Incident) -> Entry:
         if is_fall
         else gettext("The robot of %(name)s stopped by itself.")
     )
+    hurt = gettext("not said whether hurt") if is_fall and incident.was_one else ""
     done = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
     if not incident.was_one:
         done = gettext("it was not a fall")
@@ -95,7 +101,7 @@ def _from_incident(user: User, incident: Incident) -> Entry:
         at=clinic_time(raised.at, clinic),
         what=what % {"name": raised.session.patient.nickname},
         done=done,
-        hurt="" if incident.severity is None else str(incident.severity.label),
+        hurt=hurt if incident.severity is None else str(incident.severity.label),
         is_open=ended is None,
         is_one=incident.was_one,
     )

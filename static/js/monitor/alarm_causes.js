@@ -2,6 +2,7 @@
 // it hides, a sentence with the cure, and what its button does.
 //
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
+//   asks                      the template of a question that its banner asks
 //   action, undo              functions of the session that return what is offered: [label, act, seconds left]
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
@@ -53,10 +54,10 @@ function describeFall(session, { robot, state }) {
   const where = place && fill(isHere ? _("Where: %(place)s") : _("Go to %(place)s."), { place });
   const noted = fill(_("Noted by %(who)s"), { who: alarm.by || "–" });
   const facts = [
+    _("Nobody takes care of it yet"),
     `${noted}, ${minutesAgo(alarm.at)}`,
     session.state === "paused" && _("Session paused"),
     robot.isHere && robot.isStopped && _("Robot stopped"),
-    _("Belt: not known to GARRY"),
   ];
   return [fell, where || "", ...facts.filter(Boolean)].join("\n");
 }
@@ -69,7 +70,14 @@ function offerUndo(_session, { state }) {
   return [_("It was not a fall"), ({ remark }) => remark("fall_withdrawn"), Math.ceil(left_s)];
 }
 
-const isSeen = ({ fall_seen: seen, state }) => Boolean(seen && state === "paused");
+const isSeen = (session) => Boolean(session?.fall_seen && session.state === "paused");
+
+// Why nothing goes on yet: nobody has seen to a fall, or said how the patient is; "" where it may.
+export function whyHeld(session) {
+  if (hasFallen(session)) return _("once the fall is seen to");
+  if (!isSeen(session) || session.fall_seen.severity !== null) return "";
+  return fill(_("first: is %(name)s hurt?"), { name: session.about.nickname });
+}
 
 // Who takes care of it, in the pause.
 function describeSeen(session) {
@@ -167,7 +175,7 @@ export const CAUSES = [
     hides: [],
     describe: describeSeen,
     isCalm: true,
-    action: ({ about }) => [fill(_("Is %(name)s hurt?"), { name: about.nickname }), ({ fall }) => fall.ask()],
+    asks: "fall-severity",
   },
   {
     cause: "robot_stop",

@@ -16,12 +16,13 @@ export function createAlarms(page) {
   const steps = document.getElementById("fall-steps");
   const shown = new Map(); // the banner of each cause
 
-  function make({ cause, isRed, isCalm, isOwn }) {
+  function make({ cause, isRed, isCalm, isOwn, asks }) {
     const banner = document.createElement("div");
     banner.className = "notice alarm row wrap";
     banner.classList.toggle("red", Boolean(isRed));
     banner.dataset.alarm = cause;
     banner.append(Object.assign(element("div"), { className: "grow" }));
+    if (asks) banner.append(document.getElementById(asks).content.cloneNode(true));
     if (!isCalm && !isOwn?.(page)) soundAlarm();
     return banner;
   }

@@ -93,7 +93,6 @@ const page = {
   orderStop: () => robot.order("stop"),
 };
 const robot = (page.robot = new RobotPanel(document.querySelector(".robot"), page));
-const fall = (page.fall = createFall(page));
 const connections = createConnections(page);
 const parts = [
   createRunState(page),
@@ -110,7 +109,7 @@ const parts = [
   createRemarks(page),
   createNote(page),
   createWalking(page),
-  fall,
+  createFall(page),
   createStrideCharts(page),
   robot,
   createAlarms(page),

@@ -2,7 +2,7 @@
 
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
-import { hasFallen } from "garry/monitor/alarm_causes";
+import { whyHeld } from "garry/monitor/alarm_causes";
 import { RobotPlacing } from "garry/monitor/robot_placing";
 import {
   cureOf,
@@ -192,7 +192,7 @@ export class RobotPanel {
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
     this.#button("arm").hidden = !this.#isHeld;
-    this.#button("arm").disabled = hasFallen(this.#page.state.session);
+    this.#button("arm").disabled = Boolean(whyHeld(this.#page.state.session));
   }
 
   #enlarge(button) {

@@ -1,18 +1,14 @@
-// Fall: the robot stops and the session pauses at once, and it is noted. How badly somebody is hurt is asked when
-// somebody takes care of it, here where it was tapped.
+// Fall: the robot stops and the session pauses at once, and it is noted. How badly somebody is hurt is asked once
+// somebody takes care of it.
 
 import { _, fill } from "garry/shared/language";
 import { TAKEN_BACK_WITHIN_S, hasFallen } from "garry/monitor/alarm_causes";
-import { openDialog } from "garry/monitor/controls/open_dialog";
+import { markPressed } from "garry/monitor/controls/button_group";
 
 export function createFall({ state: told, announce, onPress, change, note, remark, orderStop }) {
   const button = document.querySelector("[data-fall]");
-  const dialog = document.getElementById("fall");
 
-  function ask() {
-    openDialog(dialog, (answer) => answer && remark("fall_severity", Number(answer)));
-  }
-
+  onPress("[data-severity] button", ({ value }) => remark("fall_severity", Number(value)));
   onPress("[data-fall]", async (_button, session) => {
     orderStop();
     if (session.state === "running") change("pause");
@@ -29,15 +25,15 @@ export function createFall({ state: told, announce, onPress, change, note, remar
   });
 
   return {
-    ask,
     draw(session) {
       button.disabled = !["ready", "running", "paused"].includes(session.state);
+      const asked = document.querySelector("[data-severity]");
+      if (asked) markPressed(asked, session.fall_seen?.severity);
     },
     events: {
-      remark(_session, { what }) {
-        if (told.fellHereAt === null || !["fall_acknowledged", "fall_withdrawn"].includes(what)) return;
-        told.fellHereAt = null;
-        if (what === "fall_acknowledged") ask();
+      remark(session, { what, value }) {
+        if (["fall_acknowledged", "fall_withdrawn"].includes(what)) told.fellHereAt = null;
+        if (what === "fall_severity" && session.fall_seen) session.fall_seen.severity = value;
       },
     },
   };

@@ -3,7 +3,7 @@
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
 import { icon } from "garry/shared/svg";
-import { hasFallen } from "garry/monitor/alarm_causes";
+import { whyHeld } from "garry/monitor/alarm_causes";
 import { openDialog } from "garry/monitor/controls/open_dialog";
 
 // The one main button, by the session's state: the change it asks for, its label and icon.
@@ -36,15 +36,15 @@ export function createRunState({ state, show, onPress, change }) {
 
   function drawButtons(session) {
     const [kind, label, iconId] = MAIN[session.state] ?? [""];
-    const waits = ["start", "resume"].includes(kind) && hasFallen(session);
+    const held = ["start", "resume"].includes(kind) ? whyHeld(session) : "";
     end.disabled = !kind;
-    main.disabled = !kind || waits;
-    const drawn = `${kind} ${waits}`;
+    main.disabled = Boolean(!kind || held);
+    const drawn = `${kind} ${held}`;
     if (main.dataset.of === drawn) return;
     main.dataset.of = drawn;
     main.value = kind;
-    const why = waits ? `<small>${_("once the fall is seen to")}</small>` : "";
-    main.innerHTML = kind ? `${icon(iconId)}<span>${label}${why}</span>` : _("Ended");
+    main.innerHTML = kind ? `${icon(iconId)}<span>${label}</span>` : _("Ended");
+    if (held) main.lastChild.append(Object.assign(document.createElement("small"), { textContent: held }));
   }
 
   return {
