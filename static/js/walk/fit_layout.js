@@ -28,9 +28,8 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_HIGH = 96; // of the goal, where it is below its line
+const SIGN_BESIDE = 28; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
-const PAIR = 24; // between it and the badge, both in the middle
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -82,19 +81,20 @@ export function createFitting(body, scene) {
     if (was[2] !== undefined) key.dataset.lost = was[2];
     if (isTooLarge) return null;
 
-    const { column, text, theme, pxPerMm: isMeasured } = body.dataset;
+    const { column, text, theme } = body.dataset;
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
     // Badge and total, one below the other; the total below the thermometer.
-    const isStacked = isHalf || (landscape.matches ? isLargest && !isMeasured : !column);
+    const isStacked = isHalf || !landscape.matches;
     const isExplicit = theme === "explicit";
-    const isBelow = !landscape.matches && (isExplicit || (isHalf ? isMeasured : column === "center"));
+    const isBelow = !landscape.matches && (isExplicit || isLargest || column);
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
-    if (isBeside) sign = isHalf || (isLargest && isExplicit) ? "below" : "behind";
+    if (isBeside) sign = isHalf || isLargest ? "beside" : "behind";
+    const air = AIR + (sign === "beside" ? SIGN_BESIDE : 0);
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
-    const [sky, bottom] = [main.offsetTop / u + high / u + AIR, height - EDGE];
+    const [sky, bottom] = [main.offsetTop / u + high / u + air, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
@@ -103,13 +103,11 @@ export function createFitting(body, scene) {
     const goal = zero - (2 / 3) * (zero - top);
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
-    const under = reach + (sign === "below" ? SIGN_HIGH : AIR);
+    const under = reach + air;
     const beside = isBelow ? 0 : total;
     const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
-    // In the middle is the thermometer, or where the total is below it, it and the badge.
-    const pair = isBelow && hasBadge ? SCENE + PAIR : 0;
-    const inset = column === "center" ? (width - SCENE + pair) / 2 - EDGE : 0;
+    const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = goal + under - main.offsetTop / u;
     return { width, height, sign, inset, top, zero, goal, reach, above, high };
   }

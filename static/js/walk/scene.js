@@ -11,13 +11,14 @@ const EDGE = 24;
 // The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
-// The goal's sign: behind the thermometer where there is room, else on the horizon before or behind it, or below that.
+// The goal's sign: it points at the line, behind or before the thermometer, or stands on the horizon.
+const AT_LINE = "M0 0l20 -40h132v80h-132z";
 const ON_LINE = "M0 40l20 -80h132v80z";
 const SIGNS = {
-  behind: { path: "M0 0l20 -40h132v80h-132z", room: 230, rise: 0, turn: 1 },
+  behind: { path: AT_LINE, room: 230, rise: 0, turn: 1 },
+  beside: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: -1 },
   over: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: 1 },
   before: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: -1 },
-  below: { path: "M0 -40l20 80h132v-80z", room: BULB_RADIUS, rise: -43, turn: -1 },
 };
 
 export function createScene(svg) {
