@@ -95,11 +95,11 @@ def test_words_are_as_large_as_promised(
         assert found["word"] == pytest.approx(promised, rel=0.01), text
         usual = 2.0
         # Where no size is promised it leaves room to the others, on the side that is seen.
-        if not measured and side in HALVES:
-            usual = 1.5 if valence == "explicit" else 1.6 if width > height else 1
-        elif not measured and text == "largest" and side not in COLUMNS:
-            usual = 1.5 if valence == "explicit" else 1.1 if width > height else 2
-        large = 1 if found["lost"] else usual  # points that were lost are not the largest of all
+        if not measured and valence == "explicit":
+            usual = 1.5 if side in HALVES or (text == "largest" and side not in COLUMNS) else 2.0
+        elif not measured and side in HALVES:
+            usual = 1.6 if width > height else 2.0
+        large = 1.4 if found["lost"] else usual  # points that were lost are smaller
         assert found["key"] == pytest.approx(large * promised, rel=0.01), text
         # What goes, goes in this order.
         assert (found["chart"], found["emblem"], found["scene"]) == (

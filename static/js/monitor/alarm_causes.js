@@ -70,7 +70,7 @@ function offerUndo(_session, { state }) {
   return [_("It was not a fall"), ({ remark }) => remark("fall_withdrawn"), Math.ceil(left_s)];
 }
 
-const isSeen = (session) => Boolean(session?.fall_seen && session.state === "paused");
+const isSeen = (session) => Boolean(session?.fall_seen && session.state !== "running");
 
 // Why nothing goes on yet: nobody has seen to a fall, or said how the patient is; "" where it may.
 export function whyHeld(session) {
@@ -79,7 +79,7 @@ export function whyHeld(session) {
   return fill(_("first: is %(name)s hurt?"), { name: session.about.nickname });
 }
 
-// Who takes care of it, in the pause.
+// Who takes care of it, until the walk goes on.
 function describeSeen(session) {
   if (!isSeen(session)) return "";
   const { fall_seen: seen, about } = session;
