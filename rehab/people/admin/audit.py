@@ -55,7 +55,7 @@ class AuditAdmin(LogAdmin):
     search_fields = ("patient__nickname", "patient__code", "by__username", "about")
     list_select_related = ("by", "patient")
 
-    @admin.display(description=gettext_lazy("about"), ordering="about")
+    @admin.display(description=gettext_lazy("where in GARRY"), ordering="about")
     def page(self, entry: AuditEntry) -> str:
         """Return the name of the page, or what else was asked for."""
         return describe_page(entry.about)

@@ -109,12 +109,16 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return rows.order_by(*ordering) if ordering else rows
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Return the fields without those of persons whom this person may not know."""
-        hidden = hidden_fields(request, self.model)
+        """Return the fields without those that are left out."""
+        omitted = self.get_omitted_fields(request, obj)
         return [
-            (title, {**options, "fields": omit_fields(options["fields"], hidden)})
+            (title, {**options, "fields": omit_fields(options["fields"], omitted)})
             for title, options in super().get_fieldsets(request, obj)
         ]
+
+    def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
+        """Return the fields of persons whom this person may not know."""
+        return hidden_fields(request, self.model)
 
     def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
         """Return the field without Django's icons beside it, which open windows."""
@@ -229,18 +233,15 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
         own = {"clinic_id": user_of(request).clinic_id} if hasattr(self.model, "clinic") else {}
         return with_values(form, **own)
 
-    def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Return the fields without those that can only be read and say nothing yet."""
+    def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
+        """Return as well the fields that can only be read and say nothing yet."""
         names = {field.name for field in self.model._meta.concrete_fields}
         silent = {
             name
             for name in names.intersection(self.get_readonly_fields(request, obj))
             if obj is None or getattr(obj, name) in (None, "")
         }
-        return [
-            (title, {**options, "fields": omit_fields(options["fields"], silent)})
-            for title, options in super().get_fieldsets(request, obj)
-        ]
+        return super().get_omitted_fields(request, obj) | silent
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return URLs and labels of further pages about a row."""
