@@ -116,14 +116,11 @@ class PatientAdmin(ScopedAdmin):
         """Return how far the patient agreed to boards; "" for not at all."""
         return "" if patient.boards == BoardsConsent.OWN else patient.get_boards_display()
 
-    @admin.display(description="")
+    @admin.display(description=_("simulated"), ordering="simulated")
     def badge(self, patient: Patient) -> str:
         """Return that nobody walks as this patient; "" for a person."""
-        return (
-            format_html('<span class="badge warn">{}</span>', _("simulated"))
-            if patient.simulated
-            else ""
-        )
+        badge = format_html('<span class="badge warn">{}</span>', gettext("yes"))
+        return badge if patient.simulated else ""
 
     @admin.display(description=_("leaderboards"))
     def boards_agreed(self, patient: Patient) -> Any:
