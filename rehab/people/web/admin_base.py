@@ -236,11 +236,9 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
     def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
         """Return as well the fields that can only be read and say nothing yet."""
         names = {field.name for field in self.model._meta.concrete_fields}
-        silent = {
-            name
-            for name in names.intersection(self.get_readonly_fields(request, obj))
-            if obj is None or getattr(obj, name) in (None, "")
-        }
+        if obj is None or self.has_change_permission(request, obj):
+            names.intersection_update(self.get_readonly_fields(request, obj))
+        silent = {name for name in names if obj is None or getattr(obj, name) in (None, "", [])}
         return super().get_omitted_fields(request, obj) | silent
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:

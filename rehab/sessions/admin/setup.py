@@ -146,7 +146,7 @@ class ProtocolAdmin(SharedAdmin):
 
     form = ProtocolForm
     change_form_template = "sessions/protocol_form.html"
-    list_display = ("named", "whose", "phase_count", "length", "about")
+    list_display = ("named", "phase_count", "length", "whose", "about")
     search_fields = ("name", "description", "phases__name")
     formfield_overrides: ClassVar[Any] = {
         models.TextField: {"widget": AdminTextareaWidget(attrs={"rows": 3})}

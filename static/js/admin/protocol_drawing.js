@@ -7,7 +7,8 @@ const LETTER = 8.2; // pixels of a letter of its name
 const LETTERS_MAX = 20; // that no phase is widened for
 const OPEN_PHASE_S = 300; // a phase without an end is drawn as if it took this long
 const GROUND = 130;
-const MINUTE_FROM_S = 55;
+const MINUTE_FROM_S = 90;
+const MINUTE_WITHIN_S = 5; // fifty strides count as a minute
 
 // Divide the room by weight, so that no part is narrower than its least width.
 function divide(room, weights, least) {
@@ -34,9 +35,9 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
 
   function formatLength(seconds) {
     if (seconds === null) return labels.open;
-    if (seconds < MINUTE_FROM_S) return `${Math.round(seconds)} s`;
-    const minutes = Math.round(seconds / 30) / 2;
-    return `${minutes.toLocaleString(document.documentElement.lang)} ${labels.minutes}`;
+    const minutes = Math.round(seconds / 60);
+    const isMinute = Math.abs(seconds - 60) <= MINUTE_WITHIN_S;
+    return seconds < MINUTE_FROM_S && !isMinute ? `${Math.round(seconds)} s` : `${minutes} ${labels.minutes}`;
   }
 
   function drawPhase(phase, index, left, width) {
