@@ -29,17 +29,16 @@ from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.training.feedback_bands import BANDS_MAX
 from rehab.training.valences import VALENCES
 
-WORDS = tuple(word_fields())
 READ_ONLY_FIELDS = ("from_percent", "words", "confetti")
 
 
 class BandInline(ScopedOptions, admin.StackedInline):
-    """A type's bands on its page, each with its words in two lines of two languages."""
+    """A type's bands on its page, each with its words in one language below the other."""
 
     model = FeedbackBand
     form = BandForm
     formset = BandFormSet
-    fields = (("from_percent", "confetti"), WORDS[:2], WORDS[2:])
+    fields = (("from_percent", "confetti"), *word_fields())
     ordering = ("from_percent",)
     max_num = BANDS_MAX
 

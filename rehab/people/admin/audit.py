@@ -46,7 +46,7 @@ class LogAdmin(ReadOnlyAdmin):
 class AuditAdmin(LogAdmin):
     """Who looked at or exported patients' data, or commanded a robot."""
 
-    list_display = ("at", "who", "act", "count", "patient", "page", "address")
+    list_display = ("at", "who", "act", "times", "patient", "page", "address")
     list_filter: ClassVar[Any] = (
         "act",
         ("by", RelatedOnlyFieldListFilter),
@@ -54,6 +54,11 @@ class AuditAdmin(LogAdmin):
     )
     search_fields = ("patient__nickname", "patient__code", "by__username", "about")
     list_select_related = ("by", "patient")
+
+    @admin.display(description=gettext_lazy("times"), ordering="count")
+    def times(self, entry: AuditEntry) -> str:
+        """Return how often it was done; "" for once."""
+        return f"{entry.count} ×" if entry.count > 1 else ""
 
     @admin.display(description=gettext_lazy("where in GARRY"), ordering="about")
     def page(self, entry: AuditEntry) -> str:

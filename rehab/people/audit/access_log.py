@@ -122,7 +122,8 @@ def describe_page(path: str) -> str:
         return path
     if (model := _model_of(match)) is not None:
         return capfirst(str(model._meta.verbose_name_plural))
-    return gettext(match.url_name.replace("-", " ").capitalize())
+    name = "admin" if match.url_name == "index" else match.url_name
+    return gettext(name.replace("-", " ").capitalize())
 
 
 @cache

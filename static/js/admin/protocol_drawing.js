@@ -75,5 +75,5 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   svg.innerHTML = drawn.join("") + shape("path", { class: "ground", d: `M0 ${GROUND + 1}H${width}` });
 
   const known_s = lengths.reduce((all, one) => all + (one ?? 0), 0);
-  return phases.length ? `${formatLength(known_s)}${lengths.includes(null) ? " +" : ""}` : "";
+  return known_s ? `${formatLength(known_s)}${lengths.includes(null) ? " +" : ""}` : "";
 }
