@@ -32,7 +32,7 @@ class Participants(TextChoices):
 class CountedTypes(TextChoices):
     """Which feedback types count on a board."""
 
-    SAME = "same", _("Same as the session at hand")
+    SAME = "same", _("Same as this session")
     CHOSEN = "chosen", _("Chosen types")
     ALL = "all", _("All types")
 

@@ -88,12 +88,12 @@ class Leaderboard(ClinicModel):
     )
     valences = models.JSONField(_("which types"), default=list, blank=True)
     min_valid_strides = models.PositiveIntegerField(
-        _("fewest steps"),
+        _("minimum steps"),
         default=100,
         help_text=_("A session counts from so many valid steps with feedback on."),
     )
     min_minutes = models.PositiveSmallIntegerField(
-        _("or fewest minutes"),
+        _("or minimum minutes"),
         null=True,
         blank=True,
         help_text=_("A session with fewer steps counts as well if it was walked so long."),
@@ -141,7 +141,7 @@ class Leaderboard(ClinicModel):
         _("names"), max_length=16, choices=NameStyle.choices, default=NameStyle.PSEUDONYM
     )
     min_participants = models.PositiveSmallIntegerField(
-        _("fewest patients"),
+        _("minimum patients"),
         default=FEWEST_PATIENTS,
         validators=between(FEWEST_PATIENTS),
         help_text=_("With fewer, everyone sees the own sessions only."),

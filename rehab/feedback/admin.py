@@ -12,6 +12,7 @@ from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.urls import reverse
+from django.utils.choices import flatten_choices
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, override
 
@@ -31,13 +32,13 @@ from rehab.training.valences import VALENCES
 READ_ONLY_FIELDS = ("from_percent", "words", "confetti")
 
 
-class BandInline(ScopedOptions, admin.TabularInline):
-    """A type's bands on its page."""
+class BandInline(ScopedOptions, admin.StackedInline):
+    """A type's bands on its page, each with its words in one language below the other."""
 
     model = FeedbackBand
     form = BandForm
     formset = BandFormSet
-    fields = ("from_percent", *word_fields(), "confetti")
+    fields = (("from_percent", "confetti"), *word_fields())
     ordering = ("from_percent",)
     max_num = BANDS_MAX
 
@@ -108,10 +109,13 @@ class FeedbackTypeAdmin(PreviewAdmin):
         clinic = clinic_of(user_of(request))
         rows = {row.slug: row for row in self.get_queryset(request)}
         add = reverse("admin:rehab_feedbacktype_add")
+        gestures = dict(flatten_choices(gesture_choices(user_of(request))))
         types = [
             {
                 "valence": valence,
                 "own": slug in rows,
+                "above": gestures.get(valence.cue.above, valence.cue.above),
+                "below": gestures.get(valence.cue.below, valence.cue.below),
                 "url": reverse("admin:rehab_feedbacktype_change", args=[rows[slug].pk])
                 if slug in rows
                 else f"{add}?slug={slug}",

@@ -7,7 +7,6 @@ from typing import Any
 
 from django import forms
 from django.core.exceptions import ValidationError
-from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
@@ -109,8 +108,7 @@ class BandForm(forms.ModelForm):
 
 for _field, _language in word_fields().items():
     BandForm.base_fields[_field] = forms.CharField(
-        label=format_lazy(_("phrases, {language}"), language=dict(LANGUAGES)[_language]),
-        help_text=_("One a line; they take turns."),
+        label=dict(LANGUAGES)[_language],
         max_length=POOL_MAX * TEXT_MAX,
         required=False,
         widget=forms.Textarea,

@@ -285,7 +285,7 @@ class Migration(migrations.Migration):
                     "is_service",
                     models.BooleanField(
                         default=False,
-                        help_text="Of a program: nobody signs in; any lead makes tokens for it.",
+                        help_text="For a program, not a person: any lead can create its tokens.",
                         verbose_name="service account",
                     ),
                 ),
@@ -1310,7 +1310,7 @@ class Migration(migrations.Migration):
                     "types",
                     models.CharField(
                         choices=[
-                            ("same", "Same as the session at hand"),
+                            ("same", "Same as this session"),
                             ("chosen", "Chosen types"),
                             ("all", "All types"),
                         ],
@@ -1328,7 +1328,7 @@ class Migration(migrations.Migration):
                     models.PositiveIntegerField(
                         default=100,
                         help_text="A session counts from so many valid steps with feedback on.",
-                        verbose_name="fewest steps",
+                        verbose_name="minimum steps",
                     ),
                 ),
                 (
@@ -1337,7 +1337,7 @@ class Migration(migrations.Migration):
                         blank=True,
                         help_text="A session with fewer steps counts as well if it was walked so long.",
                         null=True,
-                        verbose_name="or fewest minutes",
+                        verbose_name="or minimum minutes",
                     ),
                 ),
                 (
@@ -1460,7 +1460,7 @@ class Migration(migrations.Migration):
                         default=5,
                         help_text="With fewer, everyone sees the own sessions only.",
                         validators=[django.core.validators.MinValueValidator(5)],
-                        verbose_name="fewest patients",
+                        verbose_name="minimum patients",
                     ),
                 ),
                 (
@@ -2403,7 +2403,7 @@ class Migration(migrations.Migration):
                     "close_percent",
                     models.PositiveSmallIntegerField(
                         blank=True,
-                        help_text="A step pays and takes nothing where more than this part of its interval (95 %) lies beyond the goal. Left empty, each step is a hit or a miss.",
+                        help_text="Steps too close to the goal to call neither earn nor cost points. Leave empty to call every step a hit or a miss.",
                         null=True,
                         validators=[django.core.validators.MaxValueValidator(49)],
                         verbose_name="close steps, % beyond the goal",

@@ -16,13 +16,7 @@ from rehab.people.consent.services import offered_purposes, record_boards_consen
 from rehab.people.field_policy import details
 from rehab.people.models import SIDES, BoardsConsent, EndReason, ErasureReason, Patient, User
 from rehab.people.ranges import say_ranges
-
-
-class MonthField(forms.DateField):
-    """A month, stored as its first day."""
-
-    widget = forms.DateInput(format="%Y-%m", attrs={"type": "month", "placeholder": "2026-03"})
-    input_formats = ("%Y-%m", "%Y-%m-%d")
+from rehab.people.web.row_forms import MonthField
 
 
 class _PatientFieldsForm(forms.ModelForm):

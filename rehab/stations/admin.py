@@ -10,7 +10,7 @@ from django.db.models import Prefetch, QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
-from django.utils.html import format_html, format_html_join
+from django.utils.html import format_html_join
 from django.utils.safestring import mark_safe
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
@@ -104,8 +104,7 @@ class StationAdmin(ScopedAdmin):
         devices = [device for device in station.devices.all() if device.kind == kind]
         states = format_device_states(devices, now)
         found = [(device.name, format_badge(device, state, now)) for device, state in states]
-        none = format_html('<span class="badge free">– {}</span>', gettext("none"))
-        return format_html_join(mark_safe("<br>"), "{} {}", found) or none
+        return format_html_join(mark_safe("<br>"), "{} {}", found)
 
     @admin.display(description=_("Leaving the patient’s page"))
     def has_pin(self, station: Station) -> str:

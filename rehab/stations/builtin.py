@@ -24,7 +24,7 @@ def builtin_device(station: Station, kind: Device.Kind, by: User | None = None) 
     device = Device.everywhere.filter(station=station, kind=kind, builtin=True).first()
     if device is None:
         with override(station.clinic.language):
-            name = _("Built in")
+            name = _("Built-in robot") if kind == Device.Kind.ROBOT else _("Built-in sensor")
         device = Device(
             clinic_id=station.clinic_id, station=station, kind=kind, name=name, builtin=True
         )

@@ -29,7 +29,7 @@ class PinForm(forms.ModelForm):
             "Four to eight digits, asked for at this station’s tablet. Leave empty to keep it."
         ),
     )
-    no_pin = forms.BooleanField(label=_("No PIN: leaving takes one tap more"), required=False)
+    no_pin = forms.BooleanField(label=_("No PIN (leaving takes one extra tap)"), required=False)
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)

@@ -174,7 +174,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
         admin.get_by_role("link", name="Edit Positive").click()
         admin.get_by_role("link", name="Back to the defaults").click()
         admin.get_by_role("button", name="Back to the defaults").click()
-        expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("as usual")
+        expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("default")
         feet.walk(1.15)
         at_step(tablet, 3)
         expect(tablet.locator(".words")).to_have_text("Above the goal!")

@@ -7,7 +7,11 @@ from typing import Any
 from django.contrib import admin, messages
 from django.contrib.admin.utils import unquote
 from django.contrib.auth.admin import UserAdmin
-from django.contrib.auth.forms import AdminUserCreationForm
+from django.contrib.auth.forms import (
+    AdminUserCreationForm,
+    ReadOnlyPasswordHashField,
+    UserChangeForm,
+)
 from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.db.models import QuerySet
@@ -41,6 +45,12 @@ class NewAccountForm(AdminUserCreationForm):
         return username
 
 
+class AccountForm(UserChangeForm):
+    """Django's form of an account, without its sentence about how passwords are stored."""
+
+    password = ReadOnlyPasswordHashField(label=_("Password"))
+
+
 @admin.register(User)
 class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
     """Accounts: a lead manages those of the own clinic, a host all of them."""
@@ -57,6 +67,7 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
     list_filter = ("role", "is_active", "last_login", ("clinic", admin.RelatedOnlyFieldListFilter))
     list_select_related = ("clinic",)
     show_facets = admin.ShowFacets.NEVER
+    form = AccountForm
     add_form = NewAccountForm
     filter_horizontal = ()
     ordering = ("username",)
@@ -150,8 +161,9 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         if obj is None:
             passwords = ("usable_password", "password1", "password2")
             return [(None, {"fields": ("username", *passwords, *role_fields, "is_service")})]
+        service = ("is_service",) if obj.is_service else ()
         return [
-            (None, {"fields": ("username", "password", *role_fields, "is_service", "is_active")}),
+            (None, {"fields": ("username", "password", *role_fields, *service, "is_active")}),
             (_("Person"), {"fields": ("first_name", "last_name", "email")}),
         ]
 

@@ -10,6 +10,7 @@ from django.contrib.admin import RelatedOnlyFieldListFilter
 from django.http import HttpRequest
 from django.utils.translation import gettext_lazy
 
+from rehab.people.audit.access_log import describe_page
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.audit.row_history import describe_actor
@@ -45,7 +46,7 @@ class LogAdmin(ReadOnlyAdmin):
 class AuditAdmin(LogAdmin):
     """Who looked at or exported patients' data, or commanded a robot."""
 
-    list_display = ("at", "who", "act", "count", "patient", "about", "address")
+    list_display = ("at", "who", "act", "times", "patient", "page", "address")
     list_filter: ClassVar[Any] = (
         "act",
         ("by", RelatedOnlyFieldListFilter),
@@ -53,6 +54,16 @@ class AuditAdmin(LogAdmin):
     )
     search_fields = ("patient__nickname", "patient__code", "by__username", "about")
     list_select_related = ("by", "patient")
+
+    @admin.display(description=gettext_lazy("times"), ordering="count")
+    def times(self, entry: AuditEntry) -> str:
+        """Return how often it was done; "" for once."""
+        return f"{entry.count} ×" if entry.count > 1 else ""
+
+    @admin.display(description=gettext_lazy("where in GARRY"), ordering="about")
+    def page(self, entry: AuditEntry) -> str:
+        """Return the name of the page, or what else was asked for."""
+        return describe_page(entry.about)
 
 
 @admin.register(HistoryEntry)

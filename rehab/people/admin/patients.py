@@ -16,9 +16,10 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import format_alias
 from rehab.people.field_policy import details
-from rehab.people.models import Patient
+from rehab.people.models import BoardsConsent, Patient
 from rehab.people.models.hidden_patients import is_in_running_study
 from rehab.people.web.admin_base import ScopedAdmin
+from rehab.people.web.row_forms import MonthField
 
 
 @admin.register(Patient)
@@ -31,8 +32,8 @@ class PatientAdmin(ScopedAdmin):
         "paretic_side",
         "session_count",
         "last_here",
-        "boards",
-        "simulated",
+        "on_boards",
+        "badge",
     )
     list_filter = ("paretic_side", "boards", "blinded", "simulated", "language", "created_at")
     list_select_related = ("clinic",)
@@ -84,6 +85,12 @@ class PatientAdmin(ScopedAdmin):
         else:
             super().save_model(request, obj, form, change)
 
+    def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Return the field; of the stroke the month alone."""
+        if db_field.name == "stroke_month":
+            kwargs |= {"form_class": MonthField, "widget": MonthField.widget}
+        return super().formfield_for_dbfield(db_field, request, **kwargs)
+
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to start a session, to past sessions and to consent."""
         return [
@@ -103,6 +110,17 @@ class PatientAdmin(ScopedAdmin):
         """Return the date of the last session in the clinic's time zone."""
         zone = ZoneInfo(patient.clinic.time_zone)
         return patient.last_visit and patient.last_visit.astimezone(zone).date()
+
+    @admin.display(description=_("leaderboards"), ordering="boards")
+    def on_boards(self, patient: Patient) -> str:
+        """Return how far the patient agreed to boards; "" for not at all."""
+        return "" if patient.boards == BoardsConsent.OWN else patient.get_boards_display()
+
+    @admin.display(description=_("simulated"), ordering="simulated")
+    def badge(self, patient: Patient) -> str:
+        """Return that nobody walks as this patient; "" for a person."""
+        badge = format_html('<span class="badge warn">{}</span>', gettext("yes"))
+        return badge if patient.simulated else ""
 
     @admin.display(description=_("leaderboards"))
     def boards_agreed(self, patient: Patient) -> Any:

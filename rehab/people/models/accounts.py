@@ -72,7 +72,7 @@ class User(AbstractUser):
     is_service = models.BooleanField(
         _("service account"),
         default=False,
-        help_text=_("Of a program: nobody signs in; any lead makes tokens for it."),
+        help_text=_("For a program, not a person: any lead can create its tokens."),
     )
     # Raised to end all sign-ins from before.
     sign_in_generation = models.PositiveIntegerField(default=0, editable=False)

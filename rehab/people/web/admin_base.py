@@ -50,6 +50,12 @@ class RestrictedChangeList(ChangeList):
     rows its value could be guessed letter by letter.
     """
 
+    def get_results(self, request: HttpRequest) -> None:
+        """Find the rows. Where nothing was searched, they are all there are."""
+        super().get_results(request)
+        if not (self.query or self.has_active_filters):
+            self.full_result_count = self.result_count
+
     def get_filters(self, request: HttpRequest) -> Any:
         """Return the filters. Refuses unknown lookups and impossible dates."""
         try:
@@ -103,12 +109,23 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return rows.order_by(*ordering) if ordering else rows
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Return the fields without those of persons whom this person may not know."""
-        hidden = hidden_fields(request, self.model)
+        """Return the fields without those that are left out."""
+        omitted = self.get_omitted_fields(request, obj)
         return [
-            (title, {**options, "fields": omit_fields(options["fields"], hidden)})
+            (title, {**options, "fields": omit_fields(options["fields"], omitted)})
             for title, options in super().get_fieldsets(request, obj)
         ]
+
+    def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
+        """Return the fields of persons whom this person may not know."""
+        return hidden_fields(request, self.model)
+
+    def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Return the field without Django's icons beside it, which open windows."""
+        field = super().formfield_for_dbfield(db_field, request, **kwargs)
+        if field is not None:
+            field.widget = getattr(field.widget, "widget", field.widget)
+        return field
 
     def get_field_queryset(self, db: str | None, db_field: Any, request: HttpRequest) -> Any:
         """Return the related rows that this person may see."""
@@ -144,6 +161,7 @@ class ScopedOptions(admin.options.BaseModelAdmin):
 class TrackedAdmin(admin.ModelAdmin):
     """A list with its model's name as title, and pages of a row with our own change history."""
 
+    empty_value_display = ""  # so that a card of a phone leaves the column out
     actions_on_top = False
     actions_on_bottom = True  # what is ticked is followed by what to do with it
 
@@ -176,7 +194,7 @@ class TrackedAdmin(admin.ModelAdmin):
         parts = [inline.model for inline in self.get_inline_instances(request, row)]
         context = {
             **self.admin_site.each_context(request),
-            "title": gettext("Changes: %(row)s") % {"row": row},
+            "title": gettext("History: %(row)s") % {"row": row},
             "object": row,
             "opts": self.opts,
             "module_name": capfirst(self.opts.verbose_name_plural),
@@ -215,6 +233,14 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
         own = {"clinic_id": user_of(request).clinic_id} if hasattr(self.model, "clinic") else {}
         return with_values(form, **own)
 
+    def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
+        """Return as well the fields that can only be read and say nothing yet."""
+        names = {field.name for field in self.model._meta.concrete_fields}
+        if obj is None or self.has_change_permission(request, obj):
+            names.intersection_update(self.get_readonly_fields(request, obj))
+        silent = {name for name in names if obj is None or getattr(obj, name) in (None, "", [])}
+        return super().get_omitted_fields(request, obj) | silent
+
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return URLs and labels of further pages about a row."""
         return []
@@ -250,6 +276,17 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
     def get_deleted_objects(self, objs: Any, request: HttpRequest) -> Any:
         """Return what is deleted as well, and what stays without its reference."""
         deleted, *others = super().get_deleted_objects(objs, request)
+        return ([*deleted, *self._kept(objs, request)], *others)
+
+    def render_delete_form(self, request: HttpRequest, context: dict[str, Any]) -> HttpResponse:
+        """Show what is deleted apart from what stays."""
+        kept = self._kept([context["object"]], request)
+        deleted = context["deleted_objects"]
+        context |= {"kept": kept, "deleted_objects": deleted[: len(deleted) - len(kept)]}
+        return super().render_delete_form(request, context)
+
+    def _kept(self, objs: Any, request: HttpRequest) -> list[str]:
+        kept = []
         keys = [row.pk for row in objs]
         for relation in self.model._meta.related_objects:
             referrer = relation.related_model
@@ -263,8 +300,8 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
                     "things": referrer._meta.verbose_name_plural,
                     "count": count,
                 }
-                deleted.append(template % values)
-        return (deleted, *others)
+                kept.append(template % values)
+        return kept
 
 
 class ReadOnlyAdmin(ScopedAdmin):

@@ -9,6 +9,13 @@ from django import forms
 from rehab.people.ranges import say_ranges
 
 
+class MonthField(forms.DateField):
+    """A month, stored as its first day."""
+
+    widget = forms.DateInput(format="%Y-%m", attrs={"type": "month", "placeholder": "2026-03"})
+    input_formats = ("%Y-%m", "%Y-%m-%d")
+
+
 class LabeledFormSet(forms.BaseInlineFormSet):
     """Rows of a tabular inline whose fields are labeled for screen readers."""
 

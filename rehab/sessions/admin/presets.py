@@ -13,6 +13,7 @@ from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin
 from rehab.people.web.row_forms import ClinicForm
 from rehab.sessions.available_tests import ClinicTest
+from rehab.sessions.formatting import format_rate
 from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.option import Group, Option
 from rehab.sessions.setup.options import ANSWERS, OPTIONS, options_of, preset_options
@@ -111,6 +112,10 @@ class PresetAdmin(ScopedAdmin):
     ) -> Any:
         """Return the form with a field for each option."""
         fields = PresetOptionForm(by=user_of(request)).fields
+        for option in preset_options():  # what js/shared/applies.js hides
+            if option.applies_to:
+                of, meant = option.applies_to
+                fields[option.name].widget.attrs |= {"data-of": of, "data-is": " ".join(meant)}
         form = type(PresetForm.__name__, (PresetForm,), dict(fields))
         return super().get_form(request, obj, change, **kwargs, form=form)
 
@@ -119,10 +124,11 @@ class PresetAdmin(ScopedAdmin):
         """Its feedback type, goal and duration."""
         return preset.summary
 
-    @admin.display(description=_("target hit rate, % of steps"))
-    def wanted_hits(self, preset: Preset) -> int | None:
+    @admin.display(description=_("target hit rate"))
+    def wanted_hits(self, preset: Preset) -> str:
         """The wanted share of hits."""
-        return preset.values["wanted_hits"]  # type: ignore[no-any-return]
+        percent = preset.values["wanted_hits"]
+        return format_rate(percent / 100) if percent else ""
 
     @admin.display(description=_("robot"))
     def robot(self, preset: Preset) -> str:

@@ -155,7 +155,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         )
         return format_html(
             '{} <br><span class="muted s">{}</span>{}',
-            date_format(self.date(session), "DATE_FORMAT"),
+            self.date(session),
             " · ".join(filter(None, below)),
             format_html_join(
                 "", ' <span class="badge warn">{}</span>', ((word,) for word in unusual if word)
@@ -181,9 +181,9 @@ class TrainingSessionAdmin(ScopedAdmin):
         return session.patient.pseudonym
 
     @admin.display(description=_("date"), ordering="created_at")
-    def date(self, session: TrainingSession) -> Any:
+    def date(self, session: TrainingSession) -> str:
         """The day of the session in the clinic's time zone."""
-        return clinic_time(session.began_at, session.clinic).date()
+        return date_format(clinic_time(session.began_at, session.clinic), "DATE_FORMAT")
 
     @admin.display(description=_("start time"), ordering="started_at")
     def start_time(self, session: TrainingSession) -> str | None:
@@ -207,14 +207,14 @@ class TrainingSessionAdmin(ScopedAdmin):
         """The goal with its unit."""
         return None if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
 
-    @admin.display(description=_("score"), ordering="metric_score", empty_value="")
+    @admin.display(description=_("score"), ordering="metric_score")
     def score(self, session: Any) -> str | None:
         """The points; None for explicit feedback and sessions that have not ended."""
         if session.metric_score is None:
             return None
         return gettext("%(score)s points") % {"score": format_number(session.metric_score, 0)}
 
-    @admin.display(description=_("hit rate"), ordering="metric_hit_rate", empty_value="")
+    @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
     def hit_rate(self, session: Any) -> str | None:
         """The share of hits."""
         if session.metric_hit_rate is None:
@@ -257,7 +257,7 @@ class TrainingSessionAdmin(ScopedAdmin):
                     entry.old or "–",
                     entry.new or "–",
                     entry.by or "–",
-                    f"{entry.at:%Y-%m-%d %H:%M}",
+                    date_format(entry.at, "DATETIME_FORMAT"),
                     entry.row.reason,
                 )
                 for entry in session.described_corrections

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import Any, ClassVar
 
 from django import forms
 from django.contrib import admin, messages
+from django.contrib.admin.widgets import AdminTextareaWidget
 from django.core.exceptions import ValidationError
-from django.db import transaction
+from django.db import models, transaction
 from django.db.models import F, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
@@ -145,8 +146,11 @@ class ProtocolAdmin(SharedAdmin):
 
     form = ProtocolForm
     change_form_template = "sessions/protocol_form.html"
-    list_display = ("named", "whose", "phase_count", "length", "about")
+    list_display = ("named", "phase_count", "length", "whose", "about")
     search_fields = ("name", "description", "phases__name")
+    formfield_overrides: ClassVar[Any] = {
+        models.TextField: {"widget": AdminTextareaWidget(attrs={"rows": 3})}
+    }
     inlines = (PhaseInline,)
     actions = row_actions = viewer_actions = ("copy_to_clinic",)
 
@@ -167,6 +171,12 @@ class ProtocolAdmin(SharedAdmin):
             return fields
         readable: dict[Any, str] = {"name": "named", "description": "about"}
         return [readable.get(field, field) for field in fields]
+
+    def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the name, which stands above the drawing, and the other fields."""
+        [(_title, options)] = super().get_fieldsets(request, obj)
+        name, *others = options["fields"]
+        return [(None, {"fields": [name]}), (None, {"fields": others})]
 
     @admin.display(description=_("description"))
     def about(self, protocol: Protocol) -> str:

@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.formatting import format_quantity, format_rate
+from rehab.sessions.formatting import format_duration, format_quantity, format_rate
 from rehab.sessions.setup.cue_gestures import DEFAULT_GESTURE, known_gesture_choices
 from rehab.sessions.setup.option import OptionForm
 from rehab.sessions.setup.options import build_parts, preset_options
@@ -131,7 +131,7 @@ class Preset(ClinicModel):
     def summary(self) -> str:
         """Valence, goal and duration in a few words."""
         minutes = self.values["minutes"]
-        duration = gettext("%(count)s min") % {"count": minutes} if minutes else ""
+        duration = format_duration(60 * minutes) if minutes else ""
         return " · ".join(filter(None, (self.valence_label, self.goal_label, duration)))
 
     def to_initial(self, by: User) -> dict[str, Any]:

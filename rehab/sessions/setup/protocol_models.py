@@ -140,8 +140,8 @@ class Protocol(ClinicModel):
         blank=True,
         validators=between(most=49, unit="%"),
         help_text=_(
-            "A step pays and takes nothing where more than this part of its interval (95 %) lies "
-            "beyond the goal. Left empty, each step is a hit or a miss."
+            "Steps too close to the goal to call neither earn nor cost points. Leave empty to call "
+            "every step a hit or a miss."
         ),
     )
     # Slugs of what the patient is asked after a session (sessions/questionnaires.py).

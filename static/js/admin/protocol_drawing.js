@@ -3,18 +3,21 @@
 import { fitText, shape, text, title } from "garry/shared/svg";
 
 const NARROWEST = 58; // pixels of a phase
+const LETTER = 8.2; // pixels of a letter of its name
+const LETTERS_MAX = 20; // that no phase is widened for
 const OPEN_PHASE_S = 300; // a phase without an end is drawn as if it took this long
 const GROUND = 130;
 const MINUTE_FROM_S = 90;
+const MINUTE_WITHIN_S = 5; // fifty strides count as a minute
 
-// Divide the room by weight, so that no part is narrower than can be read.
-function divide(room, weights) {
+// Divide the room by weight, so that no part is narrower than its least width.
+function divide(room, weights, least) {
   const narrow = new Set();
   for (;;) {
-    const left = room - NARROWEST * narrow.size;
+    const left = room - least.reduce((all, width, index) => (narrow.has(index) ? all + width : all), 0);
     const sum = weights.reduce((all, weight, index) => (narrow.has(index) ? all : all + weight), 0) || 1;
-    const widths = weights.map((weight, index) => (narrow.has(index) ? NARROWEST : (weight / sum) * left));
-    const next = widths.findIndex((width, index) => width < NARROWEST && !narrow.has(index));
+    const widths = weights.map((weight, index) => (narrow.has(index) ? least[index] : (weight / sum) * left));
+    const next = widths.findIndex((width, index) => width < least[index] && !narrow.has(index));
     if (next < 0) return widths;
     narrow.add(next);
   }
@@ -32,11 +35,13 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
 
   function formatLength(seconds) {
     if (seconds === null) return labels.open;
-    return seconds < MINUTE_FROM_S ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} ${labels.minutes}`;
+    const minutes = Math.round(seconds / 60);
+    const isMinute = Math.abs(seconds - 60) <= MINUTE_WITHIN_S;
+    return seconds < MINUTE_FROM_S && !isMinute ? `${Math.round(seconds)} s` : `${minutes} ${labels.minutes}`;
   }
 
   function drawPhase(phase, index, left, width) {
-    const letters = Math.floor((width - 12) / 8.2);
+    const letters = Math.floor((width - 12) / LETTER);
     const isOpen = lengths[index] === null;
     const height = phase.feedback ? (92 * Math.min(Math.max(phase.gain, 0.5), 1.5)) / 1.5 + 8 : 22;
     const kind = `${phase.feedback ? "on" : "off"}${isOpen ? " endless" : ""}`;
@@ -56,7 +61,8 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
 
   // Widths grow with the square root, so that a block of ten minutes leaves room for one of 13 s.
   const weights = lengths.map((seconds) => Math.sqrt(seconds ?? OPEN_PHASE_S));
-  const widths = divide(room, weights);
+  const least = phases.map(({ name }) => Math.max(NARROWEST, Math.min(name.length, LETTERS_MAX) * LETTER + 14));
+  const widths = divide(room, weights, least);
   const width = widths.reduce((all, one) => all + one, 0);
   let left = 0;
   const drawn = phases.map((phase, index) => {
@@ -69,5 +75,5 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   svg.innerHTML = drawn.join("") + shape("path", { class: "ground", d: `M0 ${GROUND + 1}H${width}` });
 
   const known_s = lengths.reduce((all, one) => all + (one ?? 0), 0);
-  return phases.length ? `${formatLength(known_s)}${lengths.includes(null) ? " +" : ""}` : "";
+  return known_s ? `${formatLength(known_s)}${lengths.includes(null) ? " +" : ""}` : "";
 }

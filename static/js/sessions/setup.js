@@ -46,14 +46,6 @@ document.querySelector("select[name=measure]")?.addEventListener("change", ({ ta
   last?.remove();
 });
 
-// Only the numbers that the chosen rule asks for.
-for (const row of document.querySelectorAll("[data-of]")) {
-  const choice = document.querySelector(`select[name=${row.dataset.of}]`);
-  const show = () => (row.hidden = !row.dataset.is.split(" ").includes(choice.value));
-  choice.addEventListener("change", show);
-  show();
-}
-
 // A protocol whose phases all have an end sets the minutes, and one that asks for a share of hits that share.
 const targets = JSON.parse(document.getElementById("targets").textContent);
 for (const choice of document.querySelectorAll("input[name=protocol]")) {

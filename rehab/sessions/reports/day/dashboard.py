@@ -27,7 +27,6 @@ from rehab.training.changes import OPEN_STATES, State
 
 MAX_ENDED = 40  # ended sessions of today that are listed; open ones are all listed
 OPEN_TOO_LONG = timedelta(hours=3)  # no visit takes as long
-REVOKED_ALERT_FOR = timedelta(days=7)  # how long a revoked device is an alert
 # Running sessions come first, then those that can go on, then those that have ended.
 STATE_ORDER = [State.RUNNING, State.PAUSED, State.READY, State.FINISHED, State.ABORTED]
 
@@ -146,8 +145,6 @@ def _device_problem(device: Device, now: datetime) -> str | None:
         return gettext(
             "%(name)s at %(station)s has never connected. Give it its token, or revoke it."
         )
-    if device.revoked_at is not None and now - device.revoked_at < REVOKED_ALERT_FOR:
-        return gettext("%(name)s at %(station)s is revoked and shut out.")
     if device.has_expired(now):
         return gettext("The token of %(name)s at %(station)s has expired. Give it a new one.")
     if device.copy_seen_at is not None:
