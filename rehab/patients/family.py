@@ -79,7 +79,7 @@ class FamilyLink(ClinicModel):
         return self.ended_at is not None or self.expires_at <= now
 
 
-NOT_AGREED = _("The patient has not agreed to family view. Ask, and note the answer.")
+NOT_AGREED = _("The patient has not agreed to family view.")
 
 
 def refusal_reason(patient: Patient) -> str:

@@ -80,6 +80,9 @@ class PatientForm(_SpokenForm):
         fields: ClassVar = [*details(Patient), "language"]
         field_classes: ClassVar = {"stroke_month": MonthField}
         widgets: ClassVar = {"paretic_side": forms.RadioSelect}
+        help_texts: ClassVar = {
+            "body_mass_kg": _("Needed for some sensors; you can add it later."),
+        }
 
     def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
         super().__init__(*args, **options)

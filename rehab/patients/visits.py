@@ -19,7 +19,7 @@ from rehab.people.scope import ClinicModel, Scope
 from rehab.people.simulated import counted
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.day.today import IS_OPEN, todays_sessions
+from rehab.sessions.reports.day.today import IS_OPEN, begun_today, todays_sessions
 from rehab.training.changes import OPEN_STATES, State
 
 QUICK_VISIT_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
@@ -124,8 +124,14 @@ def parse_day(day: str, at: str, today: date) -> tuple[date, time | None]:
 
 
 def next_visit(patient_id: int, after: datetime) -> Visit | None:
-    """Return the next visit that a patient is expected for after a moment, in the clinic's zone."""
+    """Return the next visit that a patient is expected for after a moment, in the clinic's zone.
+
+    That of a day on which the patient has trained is over, whatever its time.
+    """
     planned = Visit.everywhere.filter(patient=patient_id, day__gte=after.date())
+    walked = TrainingSession.everywhere.filter(patient=patient_id, active_s__gt=0)
+    if walked.exclude(IS_OPEN).filter(begun_today(after)).exists():
+        planned = planned.exclude(day=after.date())
     return planned.exclude(day=after.date(), at__lt=after.time()).order_by("day", "at").first()
 
 

@@ -32,7 +32,6 @@ urlpatterns = [
     path("patients/<int:patient_id>/tests/", assessments.list_assessments, name="assessments"),
     path("patients/<int:patient_id>/tests/strike-out/", assessments.strike_out, name="strike-out"),
     path("patients/<int:patient_id>/tests/<slug:slug>/", assessments.assess, name="assess"),
-    path("patients/<int:patient_id>/home/", paper.show_take_home, name="take-home"),
     path("insight/", insight.show_insight, name="insight"),
     path("recordings/check/", recording.check_recording, name="check-recording"),
     path("recordings/part/", recording.add_recording_part, name="add-recording-part"),

@@ -167,7 +167,7 @@ def test_a_session_without_a_score_says_so_and_shows_the_others(client, patient,
     page = client.get(url_of(walk(patient, "positive", walked, end=end))).content.decode()
     told = " ".join(page.split())
     why = "It ended early." if end is ChangeKind.ABORT else "No step was scored."
-    assert f"This session has no score. {why} Your therapist will continue from here." in told
+    assert f"This walk has no score. {why}" in told
     rows = read(page, "same")
     assert [(row.session, row.you) for row in rows] == [(good.pk, False)]
 

@@ -102,7 +102,7 @@ def test_the_list_glides_to_the_newest_score_which_then_stands_out(server, sessi
 def test_one_list_of_own_scores_leads_on_at_the_right(server, sessions, browser, size):
     with tablet(browser, server, size, still=True) as page:
         page.goto(f"/sessions/{sessions[0]}/scores/")
-        expect(page.get_by_role("heading")).to_have_text("Your best so far, in points")
+        expect(page.get_by_role("heading")).to_have_text("Your best scores")
         assert page.get_by_role("tab").count() == 0
         way_on = page.get_by_role("link", name="Done")
         box = way_on.bounding_box()

@@ -61,7 +61,6 @@ def fresh_code(secret: str, after: str = "") -> str:
 
 def set_up_app(page: Page) -> tuple[str, str, list[str]]:
     """Read the secret, type the code, read the recovery codes."""
-    page.tap("main summary")
     secret = page.inner_text(".secret").replace(" ", "")
     code = fresh_code(secret)
     page.fill("#id_code", code)

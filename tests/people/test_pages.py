@@ -19,7 +19,7 @@ pytestmark = pytest.mark.django_db
 
 def test_the_front_page_says_what_can_be_done(client):
     page = client.get("/").content.decode()
-    for words in ("Positive", "Negative", "Binary", "Explicit", "Like last time", "Sign in"):
+    for words in ("Positive", "Negative", "Binary", "Explicit", "like last time", "Sign in"):
         assert words in page
 
 

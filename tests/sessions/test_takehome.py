@@ -43,7 +43,7 @@ def test_it_counts_what_was_walked(world, patient):
 @pytest.mark.parametrize(
     ("first", "last", "said"),
     [
-        (2.0, 2.5, "Your push-off was 25 % more than in your first session."),
+        (2.0, 2.5, "Your push-off was 25 % stronger than in your first session."),
         (2.0, 1.5, "Your push-off was 25 % less than in your first session."),
         (2.0, 2.02, "Your push-off is about as in your first session."),
     ],
@@ -70,15 +70,21 @@ def test_it_says_when_the_next_visit_is_and_what_it_is_all_for(world, patient):
     walk(patient, "positive", [HIT] * 4)
     Patient.everywhere.filter(pk=patient.pk).update(own_goal="Walk to the bakery")
     plan_visit(patient, HERE.date(), None)
-    assert "We see you again" not in read(world, patient)
+    assert "We’ll see you again" not in read(world, patient)
     plan_visit(patient, HERE.date() + timedelta(days=7), None)
     words = read(world, patient)
-    assert f"We see you again on {HERE + timedelta(days=7):%A %-d %B}." in words
+    assert f"We’ll see you again on {HERE + timedelta(days=7):%A %-d %B}." in words
     plan_visit(patient, HERE.date(), time.max)
-    assert f"We see you again on {HERE:%A %-d %B}, 23:59." in read(world, patient)
-    plan_visit(patient, HERE.date(), HERE.time())
-    assert "23:59" not in read(world, patient)
+    assert "23:59" not in read(world, patient)  # today's training is done
     assert "Your goal: Walk to the bakery" in words
+
+
+def test_the_next_visit_is_todays_until_its_time(world, patient):
+    walk(patient, "positive", [HIT] * 4, days_ago=1)
+    plan_visit(patient, HERE.date(), time.max)
+    assert f"We’ll see you again on {HERE:%A %-d %B}, 23:59." in read(world, patient)
+    plan_visit(patient, HERE.date(), time.min)
+    assert "see you again" not in read(world, patient)
 
 
 def test_nothing_walked_yet(world, patient):

@@ -39,7 +39,7 @@ class Scale(StrEnum):
 
 
 TITLES = {
-    Scale.POINTS: _("Your best so far, in points"),
+    Scale.POINTS: _("Your best scores"),
     Scale.KEPT: _("Points you kept"),
     Scale.RATE: _("Your steps at the goal"),
 }

@@ -8,7 +8,6 @@ from django.views.decorators.http import conditional_page, require_safe
 from django.views.i18n import JavaScriptCatalog
 
 from rehab.people.access import for_roles, public, user_of
-from rehab.people.commands import command
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 from rehab.people.web.help_pages import may_report, read_page
@@ -21,17 +20,7 @@ javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
     """Show the front page."""
-    return render(
-        request,
-        "people/home.html",
-        {
-            "valences": VALENCES.values(),
-            "runs": [
-                command("runsession --recording walk.csv --valence positive"),
-                command("runsession --synthetic 7 --valence binary"),
-            ],
-        },
-    )
+    return render(request, "people/home.html", {"valences": VALENCES.values()})
 
 
 @for_roles(*Role, patients=False)

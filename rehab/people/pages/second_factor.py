@@ -72,9 +72,10 @@ def add_app(request: HttpRequest) -> HttpResponse:
             return _finish_enrollment(request, user, new)
         form.add_error("code", WRONG_FIRST_CODE)
         sign_in_log.record_refused_factor(user, request)
-    drawing = segno.make(totp.provisioning_uri(secret, user.username), micro=False)
+    uri = totp.provisioning_uri(secret, user.username)
+    qr = segno.make(uri, micro=False).svg_inline(omitsize=True, border=2)
     spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
-    context = {"form": form, "qr": drawing.svg_inline(omitsize=True, border=2), "secret": spaced}
+    context = {"form": form, "uri": uri, "qr": qr, "secret": spaced}
     return render(request, "people/sign_in/add_app.html", context)
 
 

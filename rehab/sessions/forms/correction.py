@@ -59,7 +59,7 @@ class CorrectionForm(forms.Form):
         label=_("Reason for the correction (required)"),
         max_length=500,
         widget=forms.Textarea(attrs={"rows": 2}),
-        help_text=_("Stays with the session. Name nobody: researchers read it too."),
+        help_text=_("Stays with the session. Do not name anyone: researchers read it too."),
     )
 
     def __init__(self, *args: Any, session: TrainingSession, by: User, **options: Any) -> None:
@@ -102,10 +102,10 @@ class CorrectionForm(forms.Form):
 
     @property
     def shown(self) -> list[forms.BoundField]:
-        """The fields as the page has them. They are cleaned with the patient first, whose name
-        the others refuse.
+        """The fields as the page has them; they are cleaned with the patient first, whose name the
+        others refuse.
         """
-        return [self[name] for name in ("counts", "note", "reason", "patient")]
+        return [self[name] for name in ("counts", "patient", "note", "reason")]
 
     @property
     def counts_initial(self) -> str:

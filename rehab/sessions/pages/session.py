@@ -80,7 +80,12 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "review": review,
         "incidents": _list_incidents(user, session) if by_name else [],
         "figures": [summary.hit_rate, *([mean] if mean.value != MISSING else [])],
-        "facts": summary,
+        "facts": [
+            (summary.goal, " "),
+            (summary.duration, ", "),
+            (summary.strides, ", "),
+            (summary.score, " "),
+        ],
         "alarms": format_incidents(review, session),
         "phases": format_phases(review),
         "asked": list_answers(user, session),

@@ -267,6 +267,8 @@ def _describe_mean(before: Result, after: Result, session: TrainingSession) -> s
     match judge(change):
         case Change.SAME:
             text = _("%(what)s is about as in your first session.")
+        case Change.MORE if is_push:
+            text = _("%(what)s was %(change)s stronger than in your first session.")
         case Change.MORE:
             text = _("%(what)s was %(change)s more than in your first session.")
         case _:

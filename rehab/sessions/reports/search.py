@@ -25,12 +25,8 @@ from rehab.people.roles import may_see_names
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 
-# Name in the form → label, column, and how many units of the form are one unit of the column.
-RANGES = {
-    "score": (_("Score"), "metric_score", 1),
-    "hits": (_("Hit rate"), "metric_hit_rate", 100),
-    "goal": (_("Goal"), "goal", 1),
-}
+# Name in the form → column, and how many units of the form are one unit of the column.
+RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal": ("goal", 1)}
 
 # Limits that leave room for a day more or less, in every time zone.
 FIRST_DAY, LAST_DAY = date(1900, 1, 1), date(2999, 12, 31)
@@ -44,7 +40,7 @@ class SessionSearchForm(forms.Form):
     first = forms.DateField(required=False, validators=DAYS, label=_("From"))
     last = forms.DateField(required=False, validators=DAYS, label=_("To"))
     place: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
-        queryset=None, required=False, label=_("Station")
+        queryset=None, required=False, label=_("Station"), empty_label=_("Any station")
     )
     score_min = NumberField(required=False, label=_("Score from"))
     score_max = NumberField(required=False, label=_("Score to"))
@@ -58,6 +54,9 @@ class SessionSearchForm(forms.Form):
         fields: dict[str, Any] = self.fields
         for name in ("first", "last"):
             fields[name].widget = forms.DateInput(attrs={"type": "date"}, format="%Y-%m-%d")
+        for name in RANGES:
+            fields[f"{name}_min"].widget.attrs["placeholder"] = _("from")
+            fields[f"{name}_max"].widget.attrs["placeholder"] = _("to")
         fields["place"].queryset = Station.objects.visible_to(by)
         if not may_see_names(by.role):
             del fields["place"]
@@ -66,21 +65,22 @@ class SessionSearchForm(forms.Form):
             fields["who"] = forms.ChoiceField(
                 required=False,
                 label=_("Patient"),
-                choices=lambda: [("", "---------"), *((name, name) for name in names)],
+                choices=lambda: [("", _("Anybody")), *((name, name) for name in names)],
             )
         else:
             fields["who"] = forms.ModelChoiceField(
-                Patient.objects.visible_to(by), required=False, label=_("Patient")
+                Patient.objects.visible_to(by),
+                required=False,
+                label=_("Patient"),
+                empty_label=_("Anybody"),
             )
 
     def clean(self) -> dict[str, Any]:
         """Return the cleaned data. Refuses ranges that begin after their end."""
         data: dict[str, Any] = super().clean() or {}
-        over = gettext("%(what)s from %(first)s to %(last)s: the first is larger.")
+        over = gettext("The first number must not be larger than the second.")
         problems = {("first", "last"): gettext("It ends before it starts.")} | {
-            (low := f"{name}_min", high := f"{name}_max"): over
-            % {"what": label, "first": self[low].data, "last": self[high].data}
-            for name, (label, *_column) in RANGES.items()
+            (f"{name}_min", f"{name}_max"): over for name in RANGES
         }
         for (low, high), problem in problems.items():
             start, end = data.get(low), data.get(high)
@@ -101,7 +101,7 @@ class SessionSearchForm(forms.Form):
             begun = begun.filter(**{"patient" if by_name else "patient__pseudonym": data["who"]})
         if data.get("place"):
             begun = begun.filter(station=data["place"])
-        for name, (_label, column, units) in RANGES.items():
+        for name, (column, units) in RANGES.items():
             for end, lookup in (("min", "gte"), ("max", "lte")):
                 value = data[f"{name}_{end}"]
                 if value is not None:
@@ -161,7 +161,7 @@ class SessionSearchFilter(ListFilter):
         form = self.form
         alone = [(None, [form[name]]) for name in ("who", "place") if name in form.fields]
         return [
-            (_("Day"), [form["first"], form["last"]]),
+            (_("First and last day"), [form["first"], form["last"]]),
             *alone,
             (_("Score"), [form["score_min"], form["score_max"]]),
             (_("Hit rate, %"), [form["hits_min"], form["hits_max"]]),

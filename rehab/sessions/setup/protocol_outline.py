@@ -60,7 +60,9 @@ def outline_protocol(protocol: Protocol) -> Outline:
     phases = protocol.to_rules()
     minutes = protocol_minutes(protocol)
     return Outline(
-        gettext("open end") if minutes is None else format_duration(60 * minutes),
+        gettext("open end")
+        if minutes is None
+        else gettext("%(time)s in all") % {"time": format_duration(60 * minutes)},
         _describe_phases(phases),
         tuple(_draw_phases(phases)),
     )

@@ -80,13 +80,15 @@ function drawChanges(marks, groups) {
   const { box, unit: pixel } = marks;
   const free = [box.left, box.left]; // labels never run into each other: two rows of them
   const labels = [];
-  for (const { after, isGoal, isPain, label } of groups) {
+  for (const [index, { after, isGoal, isPain, label }] of groups.entries()) {
     const x = marks.x(after + 0.5);
     if (x < box.left || x > box.left + box.width) continue;
     const fill = color(isGoal ? "c-goal" : isPain ? "error" : "c-third");
     const wide = marks.widthOf(label, 13);
     const start = Math.min(x + 5 * pixel, box.left + box.width - wide);
-    const row = free.findIndex((end) => start >= end);
+    const next = index + 1 < groups.length ? marks.x(groups[index + 1].after + 0.5) : Infinity;
+    const rows = next < start + wide ? [1, 0] : [0, 1]; // over the line of the next, if that would cross it
+    const row = rows.find((each) => start >= free[each]) ?? -1;
     const foot = box.top - (row === 1 ? 28 : 8) * pixel;
     marks.line(x, foot, x, box.top + box.height, fill, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
     if (row < 0) continue;
@@ -168,6 +170,7 @@ function drawStrides(element) {
         }
       });
       marks.text(unit, 0, marks.box.top - 11 * marks.unit, { align: "left" });
+      marks.text(_("Stride"), 0, marks.box.top + marks.box.height + 22 * marks.unit, { align: "left" });
       drawGaps(marks);
       drawChanges(marks, groups);
     },

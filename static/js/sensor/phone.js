@@ -27,8 +27,12 @@ const HARMLESS = ["", "battery", "elsewhere"]; // strides count all the same
 const PLACES = { foot: _("foot"), shank: _("shin") };
 const SIDES = { left: _("left"), right: _("right") };
 const STRAPS = {
-  foot: _("On the shoe’s instep, under the laces, flat. Only a light sensor, never a phone."),
-  shank: _("On the inner front of the shin, a hand’s width below the knee, screen outward. Tight, never over a wound."),
+  foot: [_("On the shoe’s instep, flat, under the laces"), _("Only a light sensor, never a phone")],
+  shank: [
+    _("Inner front of the shin, a hand’s width below the knee"),
+    _("Screen outward, strap tight"),
+    _("Never over a wound"),
+  ],
 };
 // A locked page's count, by the leg that is measured.
 const UNITS = { left: _("strides of the left leg"), right: _("strides of the right leg") };
@@ -297,9 +301,9 @@ if (!isTrial && (!window.isSecureContext || !("DeviceMotionEvent" in window))) {
   refuse(_("Scan the QR code on the therapist’s page “A phone as a sensor”."));
 } else {
   sessionStorage.setItem("sensor", scanned);
-  body.dataset.place = place;
+  Object.assign(body.dataset, { place, side });
   show("where", fill(_("%(side)s %(place)s"), { side: SIDES[side], place: PLACES[place] }));
-  show("strap", STRAPS[place]);
+  show("strap", STRAPS[place].join("\n"));
   show("unit", UNITS[side]);
   const start = document.querySelector("[data-begin]");
   start.addEventListener("click", begin);
