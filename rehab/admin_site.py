@@ -36,7 +36,7 @@ HEADINGS = (
     (
         _("Leaderboards"),
         {
-            "Leaderboard": _("What is compared, who sees it, and when."),
+            "Leaderboard": _("A leaderboard says what is compared, who sees it and when."),
         },
     ),
     (

@@ -90,7 +90,7 @@ class Leaderboard(ClinicModel):
     min_valid_strides = models.PositiveIntegerField(
         _("minimum steps"),
         default=100,
-        help_text=_("A session counts from so many valid steps with feedback on."),
+        help_text=_("A session counts if it has at least so many valid steps with feedback."),
     )
     min_minutes = models.PositiveSmallIntegerField(
         _("or minimum minutes"),

@@ -50,8 +50,8 @@ class FeedbackType(ClinicModel):
         blank=True,
         help_text=format_lazy(_("For a step below the goal, −1 to −{most}."), most=POINTS_MAX),
     )
-    cue_above = models.CharField(_("after five strong seconds"), max_length=32, blank=True)
-    cue_below = models.CharField(_("after five weak seconds"), max_length=32, blank=True)
+    cue_above = models.CharField(_("robot, after five strong seconds"), max_length=32, blank=True)
+    cue_below = models.CharField(_("robot, after five weak seconds"), max_length=32, blank=True)
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("feedback type")

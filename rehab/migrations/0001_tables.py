@@ -957,13 +957,13 @@ class Migration(migrations.Migration):
                 (
                     "cue_above",
                     models.CharField(
-                        blank=True, max_length=32, verbose_name="after five strong seconds"
+                        blank=True, max_length=32, verbose_name="robot, after five strong seconds"
                     ),
                 ),
                 (
                     "cue_below",
                     models.CharField(
-                        blank=True, max_length=32, verbose_name="after five weak seconds"
+                        blank=True, max_length=32, verbose_name="robot, after five weak seconds"
                     ),
                 ),
                 (
@@ -1327,7 +1327,7 @@ class Migration(migrations.Migration):
                     "min_valid_strides",
                     models.PositiveIntegerField(
                         default=100,
-                        help_text="A session counts from so many valid steps with feedback on.",
+                        help_text="A session counts if it has at least so many valid steps with feedback.",
                         verbose_name="minimum steps",
                     ),
                 ),

@@ -79,7 +79,7 @@ class FamilyLink(ClinicModel):
         return self.ended_at is not None or self.expires_at <= now
 
 
-NOT_AGREED = _("The patient has not agreed to family view.")
+NOT_AGREED = _("The patient has not agreed to the family view yet.")
 
 
 def refusal_reason(patient: Patient) -> str:

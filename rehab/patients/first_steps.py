@@ -60,7 +60,7 @@ def _look_for_sensor(user: User, now: datetime) -> Found:
     here = [one.name for one in sources if one.pk in connected]
     if here:
         return Found(True, _("%(sensor)s is connected.") % {"sensor": ", ".join(here)})
-    words = _("Not connected now: %(sensors)s. Start its program on its computer.")
+    words = _("Not connected now: %(sensors)s. Start its program on the computer of the sensor.")
     return Found(False, words % {"sensors": ", ".join(one.name for one in sources)})
 
 

@@ -262,7 +262,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")
         picture(patient, "fall-on-the-patients-page")
-        told.get_by_role("button", name="I’ll take care of it").click()
+        told.get_by_role("button", name="I’m going there").click()
         expect(told).to_have_count(0)
         care = re.compile(r"walker\d+ takes care of Iris’s fall, \d\d:\d\d\.")
         expect(start.locator(".elsewhere")).to_have_text(care)

@@ -48,7 +48,7 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     told = seen(pt)
     assert f"Iris fell, {NOW:%H:%M}." in told
     assert "Finished" in told
-    assert "I’ll take care of it" in told
+    assert "I’m going there" in told
     assert "Iris fell" in seen(pt, but=session.pk)  # its page tells no more: it has ended
     TrainingSession.everywhere.filter(pk=session.pk).update(state="paused")
     assert "Iris" not in seen(pt, but=session.pk)
@@ -133,7 +133,7 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     pt = client_of(world)
     listed = seen(pt, "incidents")
     assert "Iris fell." in listed
-    assert re.search(rf"Slightly hurt · seen \d\d:\d\d by {by}", listed)
+    assert re.search(rf"Slightly hurt · seen after 0\ss by {by}", listed)
     assert "The robot of Iris stopped by itself." in listed
     assert "Not seen yet" in listed
     assert "Falls 1 Near falls 0 Robot stopped by itself 1" in words(listed)

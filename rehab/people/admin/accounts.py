@@ -50,6 +50,12 @@ class AccountForm(UserChangeForm):
 
     password = ReadOnlyPasswordHashField(label=_("Password"))
 
+    class Meta(UserChangeForm.Meta):
+        help_texts = {
+            "username": "",
+            "is_active": _("Untick to stop this person signing in. Do not delete the account."),
+        }
+
 
 @admin.register(User)
 class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):

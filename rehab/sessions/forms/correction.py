@@ -53,7 +53,7 @@ class CorrectionForm(forms.Form):
         show_hidden_initial=True,
         max_length=500,
         widget=forms.Textarea(attrs={"rows": 3}),
-        help_text=_("What whoever reads this session should know."),
+        help_text=_("For anyone who reads this session."),
     )
     reason = forms.CharField(
         label=_("Reason for the correction (required)"),

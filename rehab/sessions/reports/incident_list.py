@@ -14,7 +14,7 @@ from rehab.people.access import clinic_of
 from rehab.people.models import User
 from rehab.people.simulated import counted, is_counted
 from rehab.sessions.alarms import Alarm, Incident, find_incidents
-from rehab.sessions.formatting import clinic_time
+from rehab.sessions.formatting import clinic_time, format_duration
 from rehab.sessions.log import EVENTS, Remark, RuleEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.remarks import ADVERSE, ICONS, Noted
@@ -93,8 +93,8 @@ def _from_incident(user: User, incident: Incident) -> Entry:
     if not incident.was_one:
         done = gettext("it was not a fall")
     elif ended is not None:
-        seen = {"time": f"{clinic_time(ended.at, clinic):%H:%M}", "who": ended.by or "–"}
-        done = gettext("seen %(time)s by %(who)s") % seen
+        wait = format_duration((ended.at - raised.at).total_seconds())
+        done = gettext("seen after %(wait)s by %(who)s") % {"wait": wait, "who": ended.by or "–"}
     return Entry(
         kind=raised.kind,
         session=raised.session,

@@ -90,7 +90,7 @@ def _sum_up(session: TrainingSession, review: SessionReview, point: TrendPoint |
         return []
     rates = {"rate": format_rate(point.hit_rate), "wanted": format_rate(point.target_hit_rate)}
     told = [
-        _("%(rate)s of the steps reached the goal; %(wanted)s were wanted.") % rates
+        _("%(rate)s of the steps reached the goal; the target was %(wanted)s.") % rates
         if point.target_hit_rate
         else _("%(rate)s of the steps reached the goal.") % rates
     ]

@@ -1,4 +1,4 @@
-// A protocol drawn as it will be walked: a block for each phase, as wide as it is long and as high as its gain.
+// A protocol drawn as it will be walked: a block for each phase, as wide as it is long.
 
 import { fitText, shape, text, title } from "garry/shared/svg";
 
@@ -43,7 +43,7 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   function drawPhase(phase, index, left, width) {
     const letters = Math.floor((width - 12) / LETTER);
     const isOpen = lengths[index] === null;
-    const height = phase.feedback ? (92 * Math.min(Math.max(phase.gain, 0.5), 1.5)) / 1.5 + 8 : 22;
+    const height = phase.feedback ? 76 : 22;
     const kind = `${phase.feedback ? "on" : "off"}${isOpen ? " endless" : ""}`;
     const block = { x: left + 2, y: GROUND - height, width: width - 4, height, rx: 4 };
     const gain = { class: "gain", x: left + width / 2, y: 148 - height };

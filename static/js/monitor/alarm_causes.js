@@ -3,7 +3,7 @@
 //
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
 //   asks                      the template of a question that its banner asks
-//   action, undo              functions of the session that return what is offered: [label, act, seconds left]
+//   action, undo              functions (session, page) that return what is offered: [label, act, seconds left]
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
 
@@ -167,7 +167,10 @@ export const CAUSES = [
     isRed: true,
     describe: describeFall,
     isOwn: ({ state }) => state.fellHereAt !== null,
-    action: () => [_("I’ll take care of it"), ({ remark }) => remark("fall_acknowledged")],
+    action(_session, { state }) {
+      const label = state.fellHereAt === null ? _("I’m going there") : _("I’ll take care of it");
+      return [label, ({ remark }) => remark("fall_acknowledged")];
+    },
     undo: offerUndo,
   },
   {

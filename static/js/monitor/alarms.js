@@ -67,7 +67,7 @@ export function createAlarms(page) {
       const banner = shown.get(row.cause);
       if (place.children[index] !== banner) place.insertBefore(banner, place.children[index] ?? null);
       drawWords(banner, sentence);
-      drawButton(banner, row.isRed ? "btn big seen" : "btn small", row.action?.(session));
+      drawButton(banner, row.isRed ? "btn big seen" : "btn small", row.action?.(session, page));
       drawButton(banner, "btn quiet", row.undo?.(session, page));
     });
     document.body.classList.toggle("stale", causes.has("server"));

@@ -142,9 +142,7 @@ def find_alerts(
 
 def _device_problem(device: Device, now: datetime) -> str | None:
     if is_overdue(device, now):
-        return gettext(
-            "%(name)s at %(station)s has never connected. Give it its token, or revoke it."
-        )
+        return gettext("%(name)s at %(station)s has never connected. Connect it, or revoke it.")
     if device.has_expired(now):
         return gettext("The token of %(name)s at %(station)s has expired. Give it a new one.")
     if device.copy_seen_at is not None:
