@@ -47,7 +47,7 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     assert f"{HERE:%A} {HERE.day} {HERE:%B %Y, %H:%M}" in words
     assert "Positive · left leg" in words
     assert (
-        "75 % of the steps reached the goal; 60 % were wanted. Ankle push-off power A2 was 12 %"
+        "75 % of the steps reached the goal; the target was 60 %. Ankle push-off power A2 was 12 %"
         " above the baseline. The goal went from 2.00 to 2.40 W/kg."
     ) in words
     assert "Hit rate 75 % wanted 60 %" in words
