@@ -129,7 +129,7 @@ def next_visit(patient_id: int, after: datetime) -> Visit | None:
     That of a day on which the patient has trained is over, whatever its time.
     """
     planned = Visit.everywhere.filter(patient=patient_id, day__gte=after.date())
-    walked = TrainingSession.everywhere.filter(patient=patient_id, active_s__gt=0)
+    walked = TrainingSession.everywhere.filter(counted(), patient=patient_id, active_s__gt=0)
     if walked.exclude(IS_OPEN).filter(begun_today(after)).exists():
         planned = planned.exclude(day=after.date())
     return planned.exclude(day=after.date(), at__lt=after.time()).order_by("day", "at").first()

@@ -176,7 +176,8 @@ def fold_incidents(events: Iterable[SessionEvent]) -> list[Incident]:
     alarms, incidents = OpenAlarms(), dict[int, Incident]()
     for event in events:
         if event.kind == Remark.FALL_SEVERITY:
-            falls = [one for one in incidents.values() if one.raised.kind == Alarm.FALL]
+            among = [one for one in incidents.values() if one.raised.kind == Alarm.FALL]
+            falls = [one for one in among if one.was_one]
             if falls:
                 falls[-1].severity = FallSeverity(int(event.value or 0))
             continue

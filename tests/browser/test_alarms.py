@@ -95,6 +95,21 @@ def test_a_fall_stops_the_robot_pauses_and_is_noted_before_anything_is_asked(
         assert monitor.evaluate("heard") == []  # whoever tapped knows it
 
 
+def test_how_badly_somebody_is_hurt_is_asked_also_after_the_end(
+    server: Server, monitor: Page, walk: Walk
+) -> None:
+    with feet_of(server, walk) as feet:
+        begin(monitor, feet)
+        monitor.click("[data-fall]")
+        monitor.click(f"{FELL} .seen")
+        monitor.click("[data-end]")
+        monitor.get_by_role("button", name="End session").click()
+        expect(monitor.locator("[data-main]")).to_have_text("Ended")
+        monitor.get_by_role("button", name="Badly hurt").click()
+        monitor.wait_for_url("**/details/")
+    assert noted(server, walk)[-2:] == [("finish", None), ("fall_severity", 3.0)]
+
+
 @pytest.mark.essential
 @pytest.mark.realtime
 def test_a_fall_is_at_the_robot_within_a_tenth_of_a_second(

@@ -187,10 +187,14 @@ def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
 
 
 @pytest.mark.essential
-def test_a_phone_is_paired_by_https_alone(visit: Visit):
+def test_a_therapist_shows_the_square_once(visit: Visit):
     page = visit("/stations/", size="laptop")
     page.eval_on_selector("details:has-text('Add a device')", "one => (one.open = true)")
     page.click("text=Pair a phone")
+    page.check("[name=side][value=right]")
+    page.click("text=Show the QR code")
+    expect(page.locator(".qr svg")).to_be_visible()
+    expect(page.locator("main")).to_contain_text("Phone, right shin")
     expect(page.locator("main")).to_contain_text("without https")
-    expect(page.get_by_role("link", name="Set up https")).to_be_visible()
-    expect(page.get_by_role("button", name="Show the QR code")).to_be_disabled()
+    page.goto("/stations/")
+    expect(page.locator("main")).to_contain_text("Phone, right shin")

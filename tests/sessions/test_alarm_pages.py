@@ -133,7 +133,7 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     pt = client_of(world)
     listed = seen(pt, "incidents")
     assert "Iris fell." in listed
-    assert re.search(rf"Slightly hurt · seen after 0\ss by {by}", listed)
+    assert re.search(rf"Slightly hurt · seen \d\d:\d\d, after 0\ss, by {by}", listed)
     assert "The robot of Iris stopped by itself." in listed
     assert "Not seen yet" in listed
     assert "Falls 1 Near falls 0 Robot stopped by itself 1" in words(listed)
@@ -145,6 +145,18 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
         assert "Falls" in text
         assert "slightly hurt, seen" in text
         assert "Robot stopped by itself" in text
+
+
+def test_a_severity_is_of_the_fall_that_was_one(world, session):
+    by = world.people[Role.PT]
+    note(session, "fall")
+    note(session, "fall_acknowledged", by=by)
+    note(session, "fall")
+    note(session, "fall_withdrawn")
+    note(session, "fall_severity", value=2)
+    listed = words(seen(client_of(world), "incidents"))
+    assert re.search(rf"Moderately hurt · seen \d\d:\d\d, after 0\ss, by {by}", listed)
+    assert listed.count("hurt") == 1
 
 
 def test_what_is_counted_is_listed_with_what_was_done_then(world, session):

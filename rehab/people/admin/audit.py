@@ -8,14 +8,34 @@ from django.apps import apps
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
 from django.http import HttpRequest
+from django.urls import Resolver404, resolve
+from django.utils.html import format_html
 from django.utils.translation import gettext_lazy
 
-from rehab.people.audit.access_log import describe_page
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.audit.row_history import describe_actor
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, rights_for
+
+# What pages are called that are looked at often; others by their address.
+PAGES = {
+    "assessments": gettext_lazy("Standard tests"),
+    "caseload": gettext_lazy("Caseload"),
+    "consent": gettext_lazy("Consent"),
+    "family-links": gettext_lazy("Family view"),
+    "history": gettext_lazy("Past sessions"),
+    "incidents": gettext_lazy("Incidents"),
+    "insight": gettext_lazy("Hit rates compared"),
+    "monitor": gettext_lazy("Therapist’s page"),
+    "patient": gettext_lazy("Patient"),
+    "records": gettext_lazy("Consent and data"),
+    "replay": gettext_lazy("Replay"),
+    "report": gettext_lazy("Report"),
+    "session": gettext_lazy("Session"),
+    "take-home": gettext_lazy("For the patient"),
+    "walk": gettext_lazy("Patient’s page"),
+}
 
 
 class LogAdmin(ReadOnlyAdmin):
@@ -62,8 +82,12 @@ class AuditAdmin(LogAdmin):
 
     @admin.display(description=gettext_lazy("where in GARRY"), ordering="about")
     def page(self, entry: AuditEntry) -> str:
-        """Return the name of the page, or what else was asked for."""
-        return describe_page(entry.about)
+        """Return the name of the page, else its address or what was asked for."""
+        try:
+            name = resolve(entry.about).view_name
+        except Resolver404:
+            name = ""
+        return format_html('<span title="{}">{}</span>', entry.about, PAGES.get(name, entry.about))
 
 
 @admin.register(HistoryEntry)

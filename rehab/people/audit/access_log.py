@@ -15,9 +15,7 @@ from typing import Any
 from django.apps import apps
 from django.db.models import Model
 from django.http import HttpRequest, HttpResponseBase
-from django.urls import Resolver404, ResolverMatch, resolve
-from django.utils.text import capfirst
-from django.utils.translation import gettext
+from django.urls import ResolverMatch
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -110,20 +108,6 @@ def _model_of(match: ResolverMatch) -> type[Model] | None:
         return apps.get_model(parts[0], parts[1])
     except (LookupError, IndexError):
         return None
-
-
-def describe_page(path: str) -> str:
-    """Return what a page of people is called; calls and what is no address stay as they are."""
-    try:
-        match = resolve(path)
-    except Resolver404:
-        return path
-    if match.url_name is None or match.app_names not in ([], ["admin"]):
-        return path
-    if (model := _model_of(match)) is not None:
-        return capfirst(str(model._meta.verbose_name_plural))
-    name = "admin" if match.url_name == "index" else match.url_name
-    return gettext(name.replace("-", " ").capitalize())
 
 
 @cache

@@ -23,6 +23,7 @@ from rehab.sessions.log import Remark
 from rehab.training.changes import ENDED_STATES, Change, NotAllowed, State
 from rehab.training.controls import CONTROLS
 
+AFTER_THE_END = {*ACKNOWLEDGMENTS.values(), Remark.FALL_SEVERITY}
 MAX_RUNNING = 1_000  # sessions of a clinic: one process serves them all (docs/capacity.md)
 
 
@@ -54,7 +55,7 @@ async def carry_out(host: Host, session_id: int, order: Order) -> None:
     live = await host.settled_session(session_id)
     if isinstance(order, ChangeOrder):
         await _change(host, live, order)
-    elif live.aggregate.fold.state in ENDED_STATES and order.what not in ACKNOWLEDGMENTS.values():
+    elif live.aggregate.fold.state in ENDED_STATES and order.what not in AFTER_THE_END:
         raise NotAllowed("The session has ended.")
     else:
         await live.remark(order.what, order.value, order.by, timezone.now())

@@ -51,7 +51,7 @@ class Entry:
 
     @property
     def outcome(self) -> str:
-        """How badly somebody was hurt, and what was done; "" where nobody said either."""
+        """How badly somebody was hurt, and what was done, as far as it is known."""
         return capfirst(" · ".join(filter(None, (self.hurt, "" if self.is_open else self.done))))
 
     @property
@@ -93,8 +93,12 @@ def _from_incident(user: User, incident: Incident) -> Entry:
     if not incident.was_one:
         done = gettext("it was not a fall")
     elif ended is not None:
-        wait = format_duration((ended.at - raised.at).total_seconds())
-        done = gettext("seen after %(wait)s by %(who)s") % {"wait": wait, "who": ended.by or "–"}
+        seen = {
+            "time": f"{clinic_time(ended.at, clinic):%H:%M}",
+            "wait": format_duration(max((ended.at - raised.at).total_seconds(), 0.0)),
+            "who": ended.by or "–",
+        }
+        done = gettext("seen %(time)s, after %(wait)s, by %(who)s") % seen
     return Entry(
         kind=raised.kind,
         session=raised.session,

@@ -5,6 +5,7 @@
 
 import { _ } from "garry/shared/language";
 import { connect } from "garry/shared/session_socket";
+import { whyHeld } from "garry/monitor/alarm_causes";
 import { createAlarms } from "garry/monitor/alarms";
 import { createConnections } from "garry/monitor/connections";
 import { createActivationThreshold } from "garry/monitor/controls/activation_threshold";
@@ -109,15 +110,16 @@ const parts = [
   createRemarks(page),
   createNote(page),
   createWalking(page),
-  createFall(page),
   createStrideCharts(page),
   robot,
   createAlarms(page),
+  createFall(page), // in its banner
   createReadiness(robot),
 ];
 
+// Not before it is said how badly somebody who fell is hurt.
 function leaveWhenEnded() {
-  if (ENDED.has(state.session.state)) location.assign(root.dataset.details);
+  if (ENDED.has(state.session.state) && !whyHeld(state.session)) location.assign(root.dataset.details);
 }
 
 function draw() {

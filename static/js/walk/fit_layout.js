@@ -66,9 +66,13 @@ export function createFitting(body, scene) {
   // Return the frame that holds each of the samples and the number; null if none does.
   function frameOf(level, samples, number) {
     const was = [words.firstChild, key.textContent, key.dataset.lost];
+    const { column, text, theme } = body.dataset;
+    key.textContent = `−${number}`;
+    key.dataset.lost = "";
+    let [isTooLarge, high] = [["negative", "binary"].includes(theme) && isTooWide(key), 0];
     key.textContent = number;
     delete key.dataset.lost;
-    let [isTooLarge, high] = [isTooWide(key), 0];
+    isTooLarge ||= isTooWide(key);
     for (const sample of samples) {
       words.textContent = sample;
       isTooLarge ||= isTooWide(words);
@@ -81,7 +85,6 @@ export function createFitting(body, scene) {
     if (was[2] !== undefined) key.dataset.lost = was[2];
     if (isTooLarge) return null;
 
-    const { column, text, theme } = body.dataset;
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
