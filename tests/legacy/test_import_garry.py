@@ -375,7 +375,7 @@ def test_pages_and_api_tell_an_imported_session_without_strides(file, clinic):
     score = SessionMetric.everywhere.get(session=session).value
     page = client.get(f"/sessions/{session.pk}/details/").content.decode()
     assert "No strides recorded: imported from the original GARRY" in page
-    assert re.search(rf"Score\s+<b>{score:,.0f}</b>", page)
+    assert re.search(rf"Score</dt><dd>\s+<b>{score:,.0f}</b>", page)
     assert "left leg" not in page
     assert client.get(f"/sessions/{session.pk}/scores/").status_code == 200
     assert client.get(f"/sessions/{session.pk}/monitor/").status_code == 200

@@ -190,7 +190,7 @@ def test_without_a_name_it_says_what_it_is_and_never_the_same_twice(pt, world, p
     for _ in range(2):
         pt.post(f"/patients/{patient.pk}/new/", choices())
     names = Preset.everywhere.filter(options__valence="negative").values_list("name", flat=True)
-    words = "Negative · 4.05\N{NO-BREAK SPACE}W/kg · 12 min"
+    words = "Negative · 4.05\N{NO-BREAK SPACE}W/kg · 12\N{NO-BREAK SPACE}min"
     assert sorted(names) == [words, f"{words} (2)"]
 
 
