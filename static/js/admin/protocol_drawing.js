@@ -2,8 +2,8 @@
 
 import { fitText, shape, text, title } from "garry/shared/svg";
 
-const NARROWEST = 58; // pixels of a phase
-const LETTER = 8.2; // pixels of a letter of its name
+const NARROWEST = 52; // pixels of a phase
+const LETTER = 7; // pixels of a letter of its name
 const LETTERS_MAX = 20; // that no phase is widened for
 const OPEN_PHASE_S = 300; // a phase without an end is drawn as if it took this long
 const GROUND = 130;
@@ -41,7 +41,7 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   }
 
   function drawPhase(phase, index, left, width) {
-    const letters = Math.floor((width - 12) / LETTER);
+    const letters = Math.floor((width - 8) / LETTER);
     const isOpen = lengths[index] === null;
     const height = phase.feedback ? 76 : 22;
     const kind = `${phase.feedback ? "on" : "off"}${isOpen ? " endless" : ""}`;
@@ -61,7 +61,7 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
 
   // Widths grow with the square root, so that a block of ten minutes leaves room for one of 13 s.
   const weights = lengths.map((seconds) => Math.sqrt(seconds ?? OPEN_PHASE_S));
-  const least = phases.map(({ name }) => Math.max(NARROWEST, Math.min(name.length, LETTERS_MAX) * LETTER + 14));
+  const least = phases.map(({ name }) => Math.max(NARROWEST, Math.min(name.length, LETTERS_MAX) * LETTER + 8));
   const widths = divide(room, weights, least);
   const width = widths.reduce((all, one) => all + one, 0);
   let left = 0;

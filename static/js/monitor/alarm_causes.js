@@ -54,12 +54,11 @@ function describeFall(session, { robot, state }) {
   const where = place && fill(isHere ? _("Where: %(place)s") : _("Go to %(place)s."), { place });
   const noted = fill(_("Noted by %(who)s"), { who: alarm.by || "–" });
   const facts = [
-    _("Nobody takes care of it yet"),
     `${noted}, ${minutesAgo(alarm.at)}`,
     session.state === "paused" && _("Session paused"),
     robot.isHere && robot.isStopped && _("Robot stopped"),
   ];
-  return [fell, where || "", ...facts.filter(Boolean)].join("\n");
+  return [fell, where || "", _("Nobody takes care of it yet"), ...facts.filter(Boolean)].join("\n");
 }
 
 // Whoever tapped by mistake takes the note back, and only that: going on, and letting the robot move, are taps of

@@ -27,16 +27,17 @@ export function createAlarms(page) {
     return banner;
   }
 
-  // One sentence; or of a fall who, where, what to do, and what is so, as in sessions/alarm.html.
+  // One sentence; or of a fall who, where, what to do, that nobody did, and what else is so, as in sessions/alarm.html.
   function drawWords(banner, sentence) {
     if (banner.dataset.of === sentence) return;
     banner.dataset.of = sentence;
-    const [who, where, ...facts] = sentence.split("\n");
+    const [who, where, open, ...facts] = sentence.split("\n");
+    const badge = (text) => Object.assign(element("span", `${text} `), { className: "badge" });
     if (where === undefined) return banner.firstChild.replaceChildren(who);
     const heading = [`${who} `, where].filter(Boolean).map((text) => element("b", text));
-    banner.firstChild.replaceChildren(...heading, steps.content.cloneNode(true));
+    banner.firstChild.replaceChildren(...heading, steps.content.cloneNode(true), badge(open));
     const told = Object.assign(element("small"), { className: "row wrap" });
-    told.append(...facts.map((fact) => Object.assign(element("span", `${fact} `), { className: "badge" })));
+    told.append(...facts.map(badge));
     banner.querySelector("small")?.remove();
     banner.firstChild.after(told); // the button stays where it is
   }
