@@ -1,4 +1,4 @@
-// Start, pause, go on (with the controls held until it may), end (which is asked twice), and the clock beside the planned time.
+// Start, pause, go on (until it may, the controls are held), end (which is asked twice), and the clock.
 
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
