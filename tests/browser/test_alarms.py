@@ -275,7 +275,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             0
         )  # one way to her
         expect(patient.locator(".words")).to_have_text("Stay where you are.")
-        expect(patient.locator(".sub")).to_have_text("Help is coming.")
+        expect(patient.locator(".sub")).to_have_text("Help has been called.")
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")
         picture(patient, "fall-on-the-patients-page")
@@ -292,6 +292,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
         # Who fell is not told to walk until the belt stops, but to stay, until the walk goes on.
         expect(monitor.get_by_role("button", name="Resume")).to_be_enabled()
         expect(patient.locator("body")).to_have_attribute("data-look", "fell")
+        expect(patient.locator(".sub")).to_have_text("Help is coming.")
         assert noted(server, walk)[-2:] == [("fall_acknowledged", None), ("fall_severity", 0.0)]
         monitor.get_by_role("button", name="Resume").click()
         expect(patient.locator("body")).not_to_have_attribute("data-look", "fell")
