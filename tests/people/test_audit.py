@@ -252,6 +252,13 @@ def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
         assert client_of(world, role).get(changelist).status_code == 403
 
 
+def test_it_calls_pages_by_their_names(world):
+    path = reverse("records", args=[world.patient.pk])
+    world.lead.get(path)
+    log = world.lead.get(reverse("admin:rehab_auditentry_changelist")).content.decode()
+    assert f'<span title="{path}">Consent and data</span>' in log
+
+
 @pytest.mark.parametrize(
     ("address", "kept"),
     [
