@@ -80,7 +80,9 @@ def render_page(text: str) -> str:
         if opened.type == "heading_open":
             opened.attrSet("id", anchor_of(inline.content))
     html = str(markdown.renderer.render(tokens, markdown.options, {}))
-    html = re.sub(r'<img src="images/([^"]+)"(.*?)>', _picture, html)
+    html = re.sub(
+        r'src="images/([^"]+)"', lambda found: f'src="{static("docs/" + found[1])}"', html
+    )
     html = re.sub(r'href="([a-z-]+)\.md(#[^"]*)?"', _link, html)
     # What is not of the package leads nowhere here.
     html = re.sub(r'<a href="(?!#|https?:|/)[^"]*">(.*?)</a>', r"\1", html, flags=re.DOTALL)
@@ -88,12 +90,6 @@ def render_page(text: str) -> str:
     return html.replace("<table>", '<div class="wide"><table>').replace(
         "</table>", "</table></div>"
     )
-
-
-def _picture(found: re.Match[str]) -> str:
-    """Return a picture of ours, which opens by itself: a phone shows it small."""
-    address = static("docs/" + found[1])
-    return f'<a href="{address}"><img src="{address}"{found[2]}></a>'
 
 
 def _link(found: re.Match[str]) -> str:

@@ -23,7 +23,7 @@ from rehab.sessions.log import Remark
 from rehab.training.changes import ENDED_STATES, Change, NotAllowed, State
 from rehab.training.controls import CONTROLS
 
-AFTER_THE_END = {*ACKNOWLEDGMENTS.values(), Remark.FALL_SEVERITY}
+AFTER_THE_END = {*ACKNOWLEDGMENTS.values(), Remark.FALL_SEVERITY}  # may be noted then, too
 MAX_RUNNING = 1_000  # sessions of a clinic: one process serves them all (docs/capacity.md)
 
 
