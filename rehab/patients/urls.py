@@ -10,6 +10,7 @@ from rehab.patients.pages import (
     records,
     session_end,
     start,
+    take_home,
     visits,
 )
 
@@ -28,7 +29,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
     path("patients/<int:patient_id>/screen/check/", start.check_screen, name="check-screen"),
     path("sessions/<int:session_id>/ending/", session_end.show_ending, name="ending"),
-    path("patients/<int:patient_id>/home/", session_end.show_take_home, name="take-home"),
+    path("patients/<int:patient_id>/home/", take_home.show_take_home, name="take-home"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),
     path("patients/<int:patient_id>/family/", family.show_links, name="family-links"),

@@ -1,4 +1,4 @@
-"""What a patient sees when a session has ended, before the scores, and what is taken home."""
+"""The page that a patient sees when a session has ended, before the scores."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
 from rehab.patients.visits import next_visit
-from rehab.people.access import actor_of, for_roles, user_of
-from rehab.people.models import Patient
+from rehab.people.access import actor_of, for_roles
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time, format_duration
 from rehab.sessions.log import RobotEntry
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.questions import page_after
-from rehab.sessions.reports.patient_summary import describe_ending, describe_take_home
+from rehab.sessions.reports.patient_summary import describe_ending
 from rehab.stations.tablets import ENDING_STAYS_S
 from rehab.training.changes import OPEN_STATES, State
 
@@ -48,28 +47,3 @@ def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
         "with_robot": session.events.filter(kind=RobotEntry.GESTURE.value).exists(),
     } | describe_ending(session)
     return render(request, "patients/ending.html", context)
-
-
-@for_roles(Role.LEAD, Role.PT)
-@require_safe
-def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show in plain words what a patient has walked; a person's simulated sessions do not count."""
-    user = user_of(request)
-    patient = get_object_or_404(
-        Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
-    )
-    activate_patient_language(patient)
-    sessions = TrainingSession.objects.visible_to(user).filter(
-        patient=patient, simulated=patient.simulated
-    )
-    now = clinic_time(timezone.now(), patient.clinic)
-    summary = describe_take_home(sessions, now)
-    if patient.blinded:  # points, hits and how they went tell the arm
-        summary |= {"bars": [], "development": "", "last_hits": None, "streak": ""}
-    context = {
-        "patient": patient,
-        "summary": summary,
-        "today": now.date(),
-        "visit": None if patient.ended_at else next_visit(patient.pk, now),
-    }
-    return render(request, "sessions/takehome.html", context)

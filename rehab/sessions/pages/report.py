@@ -1,4 +1,4 @@
-"""A session's report, which is printed."""
+"""A session's report, to be read and printed."""
 
 from __future__ import annotations
 
