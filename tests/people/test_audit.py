@@ -74,7 +74,7 @@ SILENT = {
     *("new-station", "edit-station", "new-device"),
     *("own-sign-ins", "end-sign-ins", "help", "help-page", "problem-report"),
     *("studies", "new-study", "plan-study", "study-protocol", "study-protocol-pdf"),
-    *("study-power", "study-size"),
+    *("study-power", "study-size", "study-figures"),
     *("api:api-root", "api:openapi-json", "api:openapi-view", "api:show_me"),
     *("api:list_protocols", "api:list_stations", "api:list_boards", "api:list_measures"),
     *("api:show_capabilities",),
