@@ -84,12 +84,12 @@ def test_a_fall_stops_the_robot_pauses_and_is_noted_before_anything_is_asked(
         resume = monitor.get_by_role("button", name="Resume")
         expect(resume).to_be_disabled()
         expect(resume).to_contain_text("first: is Rosa hurt?")
-        expect(monitor.locator(".controls")).to_have_attribute("inert", "")
+        expect(monitor.locator(".panels")).to_have_attribute("inert", "")
         answer = monitor.get_by_role("button", name="Slightly hurt")
         answer.click()
         expect(monitor.locator("#strip")).to_contain_text("slightly hurt")
         expect(resume).to_be_enabled()
-        expect(monitor.locator(".controls")).not_to_have_attribute("inert", "")
+        expect(monitor.locator(".panels")).not_to_have_attribute("inert", "")
         monitor.reload()
         expect(answer).to_have_attribute("aria-pressed", "true")
         expect(resume).to_be_enabled()
@@ -144,7 +144,7 @@ def test_undo_withdraws_the_note_alone(server: Server, monitor: Page, walk: Walk
         undo = monitor.locator(f"{FELL} .quiet")
         expect(undo).to_have_text("It was not a fall")
         monitor.clock.fast_forward(3_000)
-        expect(undo).to_have_attribute("data-left", re.compile(r"^[4-7]$"))
+        expect(undo).to_have_attribute("data-left", re.compile(r"^[4-7] s left$"))
         undo.click()
         expect(monitor.locator("#strip")).to_contain_text("it was not a fall")
         assert [kind for kind, _ in noted(server, walk)][2:] == ["fall", "fall_withdrawn"]
@@ -275,7 +275,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             0
         )  # one way to her
         expect(patient.locator(".words")).to_have_text("Stay where you are.")
-        expect(patient.locator(".sub")).to_have_text("Help has been called.")
+        expect(patient.locator(".sub")).to_have_text("The team has been alerted.")
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")
         picture(patient, "fall-on-the-patients-page")
@@ -297,7 +297,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
         monitor.get_by_role("button", name="Resume").click()
         expect(patient.locator("body")).not_to_have_attribute("data-look", "fell")
     start.goto("/incidents/")
-    listed = start.get_by_role("listitem").filter(has_text="Iris fell.")
+    listed = start.get_by_role("row").filter(has_text="Iris fell.")
     expect(listed).to_contain_text("by walker")
     picture(start, "incidents")
 

@@ -32,7 +32,8 @@ RESUMES = {ChangeKind.START.value, ChangeKind.RESUME.value}
 class Entry:
     """One of them, as text; ``at`` by the clinic's clock.
 
-    ``hurt``: how badly, by a fall, or that nobody said. ``is_one``: nobody took it back.
+    ``hurt``: how badly, by a fall, or that nobody said. ``done``: who noted it and what was done.
+    ``is_one``: nobody took it back.
     """
 
     kind: str
@@ -48,11 +49,6 @@ class Entry:
     def icon(self) -> str:
         """The name of its drawing."""
         return DRAWN[self.kind]
-
-    @property
-    def outcome(self) -> str:
-        """How badly somebody was hurt, and what was done, as far as it is known."""
-        return capfirst(" · ".join(filter(None, (self.hurt, "" if self.is_open else self.done))))
 
     @property
     def is_counted(self) -> bool:
@@ -88,7 +84,7 @@ def _from_incident(user: User, incident: Incident) -> Entry:
         if is_fall
         else gettext("The robot of %(name)s stopped by itself.")
     )
-    hurt = gettext("not said whether hurt") if is_fall and incident.was_one else ""
+    hurt = gettext("not said") if is_fall and incident.was_one else ""
     done = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
     if not incident.was_one:
         done = gettext("it was not a fall")
@@ -99,13 +95,15 @@ def _from_incident(user: User, incident: Incident) -> Entry:
             "who": ended.by or "–",
         }
         done = gettext("seen %(time)s, after %(wait)s, by %(who)s") % seen
+    if is_fall and ended is not None:
+        done = _with_who_noted(raised, done)
     return Entry(
         kind=raised.kind,
         session=raised.session,
         at=clinic_time(raised.at, clinic),
         what=what % {"name": raised.session.patient.nickname},
-        done=done,
-        hurt=hurt if incident.severity is None else str(incident.severity.label),
+        done=capfirst(done),
+        hurt=capfirst(hurt if incident.severity is None else str(incident.severity.label)),
         is_open=ended is None,
         is_one=incident.was_one,
     )
@@ -132,7 +130,7 @@ def _list_remarks(user: User, since: datetime) -> list[Entry]:
             session=one.event.session,
             at=clinic_time(one.at, clinic),
             what=f"{one.event.session.patient.nickname}: {one.words}",
-            done=_find_answer(one.event, of_session[one.event.session_id], user),
+            done=capfirst(_find_answer(one.event, of_session[one.event.session_id], user)),
         )
         for one in noted
         if one.is_adverse
@@ -140,7 +138,7 @@ def _list_remarks(user: User, since: datetime) -> list[Entry]:
 
 
 def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: User) -> str:
-    """Return what became of the walk after a remark, and who noted that."""
+    """Return who noted a remark, and what became of the walk after it."""
     clinic = clinic_of(user)
     before = [one for one in course if one.pk < remark.pk and one.kind in PAUSES | RESUMES]
     after = [
@@ -155,6 +153,10 @@ def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: Use
         done = gettext("then: %(what)s, %(time)s") % {"what": what, "time": f"{at:%H:%M}"}
     else:
         done = gettext("walked on")
-    if remark.by is None:
+    return _with_who_noted(remark, done)
+
+
+def _with_who_noted(event: SessionEvent, done: str) -> str:
+    if event.by is None:
         return done
-    return f"{gettext('noted by %(who)s') % {'who': remark.by}} · {done}"
+    return f"{gettext('noted by %(who)s') % {'who': event.by}} · {done}"

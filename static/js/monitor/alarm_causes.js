@@ -3,7 +3,7 @@
 //
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
 //   asks                      the template of a question that its banner asks
-//   action, undo              functions (session, page) that return what is offered: [label, act, seconds left]
+//   action, undo              functions (session, page) that return what is offered: [label, act, how long]
 //   isRed                     somebody has to acknowledge it; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
 
@@ -66,7 +66,8 @@ function describeFall(session, { robot, state }) {
 function offerUndo(_session, { state }) {
   const left_s = TAKEN_BACK_WITHIN_S - state.sinceFell_s;
   if (left_s <= 0) return null;
-  return [_("It was not a fall"), ({ remark }) => remark("fall_withdrawn"), Math.ceil(left_s)];
+  const left = fill(_("%(time)s left"), { time: `${Math.ceil(left_s)} s` });
+  return [_("It was not a fall"), ({ remark }) => remark("fall_withdrawn"), left];
 }
 
 const isSeen = (session) => Boolean(session?.fall_seen && session.state !== "running");

@@ -49,9 +49,9 @@ export function createAlarms(page) {
       button = banner.appendChild(document.createElement("button"));
       button.className = look;
     }
-    const [label, act, left_s] = action;
+    const [label, act, left] = action;
     if (button.textContent !== label) button.textContent = label;
-    if (left_s) button.dataset.left = left_s; // drawn by CSS: screen readers are not told each second
+    if (left) button.dataset.left = left; // drawn by CSS: screen readers are not told each second
     button.onclick = () => act(page);
   }
 

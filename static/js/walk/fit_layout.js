@@ -28,7 +28,7 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_BESIDE = 28; // more than AIR, above and below the goal, where its sign is there
+const SIGN_BESIDE = 36; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -91,13 +91,14 @@ export function createFitting(body, scene) {
     // Badge and total, one below the other; the total below the thermometer.
     const isStacked = isHalf || !landscape.matches;
     const isExplicit = theme === "explicit";
-    const isBelow = !landscape.matches && (isExplicit || isLargest || column);
+    const isAbove = !landscape.matches && isExplicit; // the value, right below the goal that the words name
+    const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
     if (isBeside) sign = isHalf || isLargest ? "beside" : "behind";
     const air = AIR + (sign === "beside" ? SIGN_BESIDE : 0);
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
-    const [sky, bottom] = [main.offsetTop / u + high / u + air, height - EDGE];
+    const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + air, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? 0 : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
@@ -107,11 +108,11 @@ export function createFitting(body, scene) {
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + air;
-    const beside = isBelow ? 0 : total;
+    const beside = isBelow || isAbove ? 0 : total;
     const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
-    const above = goal + under - main.offsetTop / u;
+    const above = isAbove ? high / u : goal + under - main.offsetTop / u;
     return { width, height, sign, inset, top, zero, goal, reach, above, high };
   }
 

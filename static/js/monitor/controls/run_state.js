@@ -1,4 +1,4 @@
-// Start, pause, go on (until it may, the controls are held), end (which is asked twice), and the clock.
+// Start, pause, go on (until it may, the panels are held), end (which is asked twice), and the clock.
 
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
@@ -16,7 +16,7 @@ const MAIN = {
 export function createRunState({ state, show, onPress, change }) {
   const main = document.querySelector("[data-main]");
   const end = document.querySelector("[data-end]");
-  const controls = document.querySelector(".controls");
+  const panels = document.querySelector(".panels");
   const confirmEnd = document.getElementById("sure");
 
   onPress("[data-main]", ({ value }) => change(value));
@@ -38,7 +38,7 @@ export function createRunState({ state, show, onPress, change }) {
   function drawButtons(session) {
     const [kind, label, iconId] = MAIN[session.state] ?? [""];
     const held = ["start", "resume"].includes(kind) ? whyHeld(session) : "";
-    controls.inert = Boolean(held);
+    panels.inert = Boolean(held);
     end.disabled = !kind;
     main.disabled = Boolean(!kind || held);
     const drawn = `${kind} ${held}`;
