@@ -52,7 +52,7 @@ def test_phases_move_are_added_and_are_drawn_as_they_will_be_walked(page, protoc
     page.goto(url)
     drawing = page.locator(".protocol-drawing")
     expect(drawing.locator("text.length")).to_have_text(["66 s", "until you move on"])
-    expect(drawing.locator("text.gain")).to_have_text("×0.85")
+    expect(drawing.locator("text.gain")).to_have_text("85 %")
     page.get_by_role("button", name="Move down").first.click()
     expect(drawn_names(page)).to_have_text(["Push", "Look"])
     page.locator("#phases-group .add-row a").click()
