@@ -87,7 +87,7 @@ class StationAdmin(ScopedAdmin):
         ]
         if self.has_change_permission(request, row):
             url = reverse("admin:rehab_device_add")
-            links.append((f"{url}?station={row.pk}", _("Add a source or robot")))
+            links.append((f"{url}?station={row.pk}", _("Add a sensor or robot")))
         return links
 
     @admin.display(description=_("tablet"))
@@ -95,7 +95,7 @@ class StationAdmin(ScopedAdmin):
         """Return the tablets with their states."""
         return self._format_devices(station, Device.Kind.TABLET)
 
-    @admin.display(description=_("source of steps"))
+    @admin.display(description=_("sensor"))
     def sources(self, station: Station) -> str:
         """Return the sources with their states."""
         return self._format_devices(station, Device.Kind.SOURCE)
@@ -145,7 +145,7 @@ class DeviceAdmin(TokenAdmin):
     readonly_fields = ("state", *TokenAdmin.readonly_fields, *approval)
     radio_fields = {"kind": admin.HORIZONTAL}
     row_words = TokenAdmin.row_words | {
-        "revoke_tokens": _("Disconnect this device until it has a new token")
+        "revoke_tokens": _("Disconnect this device until it has a new key")
     }
 
     def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:

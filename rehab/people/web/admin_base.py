@@ -109,11 +109,12 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return rows.order_by(*ordering) if ordering else rows
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Return the fields without those that are left out."""
+        """Return the fields without those that are left out, and without empty groups."""
         omitted = self.get_omitted_fields(request, obj)
         return [
-            (title, {**options, "fields": omit_fields(options["fields"], omitted)})
+            (title, {**options, "fields": fields})
             for title, options in super().get_fieldsets(request, obj)
+            if (fields := omit_fields(options["fields"], omitted))
         ]
 
     def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
