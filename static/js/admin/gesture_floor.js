@@ -113,18 +113,17 @@ export function setUpFloor(place) {
 
   function drawHandles() {
     const poses = posesOf(rows.read());
-    const spots = spotsOf(poses);
     const way = [HOME, ...poses].map(({ x, y }) => `${-y} ${-x}`).join("L");
-    const drawn = poses
-      .map(({ x, y, heading, isDrive }, index) => {
-        const [kx, ky] = [x + KNOB_M * Math.cos(heading), y + KNOB_M * Math.sin(heading)];
-        const [left, up] = [-spots[index].y, -spots[index].x];
-        return `<g class="place" data-step="${index}"><path d="M${-y} ${-x}L${-ky} ${-kx}" />
-          ${knobAt(isDrive, kx, ky)}<circle class="spot" cx="${left}" cy="${up}"
-          r=".032" /><text x="${left}" y="${up}" dy=".014">${index + 1}</text></g>`;
-      })
-      .join("");
-    handles.innerHTML = `<path class="planned" d="M${way}" />${drawn}`;
+    const ways = poses.map(({ x, y, heading, isDrive }, index) => {
+      const [kx, ky] = [x + KNOB_M * Math.cos(heading), y + KNOB_M * Math.sin(heading)];
+      return `<g class="place" data-step="${index}"><path d="M${-y} ${-x}L${-ky} ${-kx}" />
+        ${knobAt(isDrive, kx, ky)}</g>`;
+    });
+    const numbers = spotsOf(poses).map(
+      ({ x, y }, index) => `<g class="place" data-step="${index}"><circle class="spot" cx="${-y}" cy="${-x}"
+        r=".032" /><text x="${-y}" y="${-x}" dy=".014">${index + 1}</text></g>`,
+    );
+    handles.innerHTML = `<path class="planned" d="M${way}" />${ways.join("")}${numbers.join("")}`;
   }
 
   // Lead each step to where it is to end. Steps that only turn keep their heading.
