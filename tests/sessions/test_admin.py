@@ -368,6 +368,26 @@ def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     assert 'name="kind"' not in told  # it stays what it is
 
 
+def test_devices_that_are_away_come_first_and_simulated_patients_last(world):
+    station, lead = world.rows[Station], client_of(world, Role.LEAD)
+    for name, state in (
+        ("Gone", {"revoked_at": NOW}),
+        ("Here", {"last_seen_at": NOW}),
+        ("Away", {"last_seen_at": NOW - timedelta(days=2)}),
+        ("New", {}),
+    ):
+        Device.everywhere.create(
+            clinic=world.clinic, station=station, kind="source", name=name, token_hash=name, **state
+        )
+    page = lead.get("/admin/rehab/device/").content.decode()
+    assert re.findall(r">(Gone|Here|Away|New)</a>", page) == ["New", "Away", "Here", "Gone"]
+    make_patient(world.clinic, "Zoe")
+    demo = make_patient(world.clinic, "Anna")
+    Patient.everywhere.filter(pk=demo.pk).update(simulated=True)
+    page = lead.get("/admin/rehab/patient/").content.decode()
+    assert page.index(">Zoe<") < page.index(">Anna<")
+
+
 def test_a_stations_page_shows_its_devices_and_their_state(world):
     Device.everywhere.filter(pk=world.device.pk).update(revoked_at=NOW)
     station = world.rows[Station]
