@@ -32,7 +32,7 @@ class Participants(TextChoices):
 class CountedTypes(TextChoices):
     """Which feedback types count on a board."""
 
-    SAME = "same", _("Same as this session")
+    SAME = "same", _("The type just walked")
     CHOSEN = "chosen", _("Chosen types")
     ALL = "all", _("All types")
 

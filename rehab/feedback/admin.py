@@ -74,7 +74,10 @@ class FeedbackTypeAdmin(PreviewAdmin):
         if db_field.name in ("cue_above", "cue_below"):
             choices = [("", gettext_lazy("Nothing")), *gesture_choices(user_of(request))]
             label = db_field.verbose_name.capitalize()
-            return forms.ChoiceField(label=label, choices=choices, required=False)
+            words = _("Their mean reached the percent of the goal from which the robot acts.")
+            if db_field.name == "cue_below":
+                words = _("Their mean stayed below that percent.")
+            return forms.ChoiceField(label=label, choices=choices, required=False, help_text=words)
         return super().formfield_for_dbfield(db_field, request, **kwargs)
 
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:

@@ -1310,7 +1310,7 @@ class Migration(migrations.Migration):
                     "types",
                     models.CharField(
                         choices=[
-                            ("same", "Same as this session"),
+                            ("same", "The type just walked"),
                             ("chosen", "Chosen types"),
                             ("all", "All types"),
                         ],

@@ -6,7 +6,8 @@ from typing import Any
 
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
-from django.db.models import Prefetch, QuerySet
+from django.db.models import F, Prefetch, QuerySet
+from django.db.models.functions import TruncHour
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
@@ -68,6 +69,11 @@ class StationAdmin(ScopedAdmin):
     actions = None  # few rows, each with a page of its own
     inlines = (DeviceInline,)
 
+    def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
+        """Return as well the box that removes a PIN where none is set."""
+        unset = set() if obj and obj.pin_hash else {"no_pin"}
+        return super().get_omitted_fields(request, obj) | unset
+
     def get_queryset(self, request: HttpRequest) -> QuerySet[Station]:
         """Return the visible stations with their devices."""
         devices = with_trust(Device.objects.visible_to(request.user)).order_by("name")
@@ -81,7 +87,7 @@ class StationAdmin(ScopedAdmin):
         ]
         if self.has_change_permission(request, row):
             url = reverse("admin:rehab_device_add")
-            links.append((f"{url}?station={row.pk}", _("Add a source or robot")))
+            links.append((f"{url}?station={row.pk}", _("Add a sensor or robot")))
         return links
 
     @admin.display(description=_("tablet"))
@@ -89,7 +95,7 @@ class StationAdmin(ScopedAdmin):
         """Return the tablets with their states."""
         return self._format_devices(station, Device.Kind.TABLET)
 
-    @admin.display(description=_("source of steps"))
+    @admin.display(description=_("sensor"))
     def sources(self, station: Station) -> str:
         """Return the sources with their states."""
         return self._format_devices(station, Device.Kind.SOURCE)
@@ -116,7 +122,7 @@ class StationAdmin(ScopedAdmin):
 class DeviceAdmin(TokenAdmin):
     """Devices of the clinic. A token is shown once, when it is issued."""
 
-    list_display = ("name", "kind", "station", "state", "last_seen_at", "created_at")
+    list_display = ("name", "kind", "station", "state")
     list_filter = (
         "kind",
         ("station", RelatedOnlyFieldListFilter),
@@ -125,6 +131,12 @@ class DeviceAdmin(TokenAdmin):
     )
     list_select_related = ("station",)
     search_fields = ("name", "station__name")
+    # Those that were away longest come first, revoked ones last.
+    ordering = (
+        F("revoked_at").asc(nulls_first=True),
+        TruncHour("last_seen_at").asc(nulls_first=True),
+        "name",
+    )
     approval = ("approver", "approved_at", "network", "browser")
     fields = (
         *("station", "kind", "name", "state", "created_at", "last_seen_at", "revoked_at"),
@@ -132,6 +144,14 @@ class DeviceAdmin(TokenAdmin):
     )
     readonly_fields = ("state", *TokenAdmin.readonly_fields, *approval)
     radio_fields = {"kind": admin.HORIZONTAL}
+    row_words = TokenAdmin.row_words | {
+        "revoke_tokens": _("Disconnect this device until it has a new key")
+    }
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return as well the kind of a device that exists: it stays what it is."""
+        fixed = ("kind",) if obj else ()
+        return (*fixed, *super().get_readonly_fields(request, obj))
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Device]:
         """Return the visible devices, with what their state follows from."""

@@ -21,19 +21,24 @@ class PinForm(forms.ModelForm):
     instance: Station
 
     pin = forms.CharField(
-        label=_("New PIN to leave the patient’s page"),
+        label=_("PIN to leave the patient’s page"),
         required=False,
         max_length=MAX_LENGTH,
         widget=forms.PasswordInput(attrs={"inputmode": "numeric", "autocomplete": "new-password"}),
-        help_text=_(
-            "Four to eight digits, asked for at this station’s tablet. Leave empty to keep it."
-        ),
     )
-    no_pin = forms.BooleanField(label=_("No PIN (leaving takes one extra tap)"), required=False)
+    no_pin = forms.BooleanField(
+        label=_("Remove the PIN (leaving then takes one extra tap)"), required=False
+    )
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._before = read_values(self.instance)
+        if self.instance.pin_hash:
+            now = _("A PIN is set. Leave this empty to keep it, or give another of 4 to 8 digits.")
+        else:
+            del self.fields["no_pin"]
+            now = _("No PIN is set: leaving takes one extra tap. To set one, give 4 to 8 digits.")
+        self.fields["pin"].help_text = now
 
     def save(self, commit: bool = True) -> Station:
         """Save a new station; of another one what was changed: its robot may be stopped now."""
@@ -67,8 +72,6 @@ class StationForm(PinForm):
         super().__init__(*args, **options)
         self.instance.clinic = clinic_of(by)
         self._by = by
-        if not self.instance.pin_hash:
-            del self.fields["no_pin"]
 
     def clean_name(self) -> str:
         """Return the name. Refuses one that another station of the clinic has."""

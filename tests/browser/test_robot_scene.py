@@ -165,11 +165,14 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, visit):
 
     def place(ahead_m: float, left_m: float) -> tuple[float, float]:
         scene.scroll_into_view_if_needed()
-        box = scene.bounding_box()
-        assert box is not None
-        side = min(box["width"], box["height"])  # of a drawing of one meter
-        middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-        return middle[0] - left_m * side, middle[1] - ahead_m * side
+        x, y = scene.evaluate(
+            """(svg, [x, y]) => {
+                const at = new DOMPoint(x, y).matrixTransform(svg.getScreenCTM());
+                return [at.x, at.y];
+            }""",
+            [-left_m, -ahead_m],
+        )
+        return x, y
 
     def step(index: int) -> tuple[float, float]:
         fields = (
@@ -183,6 +186,10 @@ def test_a_composed_gesture_is_played_with_lights_and_sound(server, visit):
     expect(page.locator(".gesture-floor .words")).to_contain_text("up to 0.10 m from home")
     assert step(0) == pytest.approx((0, 0.1), abs=0.004)
     assert step(1) == pytest.approx((0, -0.1), abs=0.004)  # straight back
+    page.get_by_role("button", name="Add a turn").click()
+    spots = [spot.bounding_box() for spot in scene.locator(".spot").all()]  # two of them at home
+    assert spots[1]["y"] + spots[1]["height"] <= spots[2]["y"]
+    page.fill("#id_steps-2-turn_deg", "0")  # then it is no step
     page.mouse.move(*place(0.1, 0.0))
     page.mouse.down()
     page.mouse.move(*place(0.1, 0.1), steps=3)

@@ -11,6 +11,7 @@ from django.test import Client
 from django.urls import get_resolver, reverse
 from django.utils import timezone
 
+from rehab.people.admin.audit import PAGES, name_of_page
 from rehab.people.audit import access_log, audit_log
 from rehab.people.audit.audit_log import (
     SIGN_IN_ACTS,
@@ -257,6 +258,32 @@ def test_it_calls_pages_by_their_names(world):
     world.lead.get(path)
     log = world.lead.get(reverse("admin:rehab_auditentry_changelist")).content.decode()
     assert f'<span title="{path}">Consent and data</span>' in log
+
+
+@pytest.mark.parametrize(
+    ("about", "name"),
+    [
+        ("/ws/session/15/monitor/", "Therapist’s page"),
+        ("/ws/session/15/patient/", "Patient’s page"),
+        ("/patients/<int:patient_id>/records/", "Consent and data"),
+        ("/admin/", "Admin"),
+        ("/admin/rehab/patient/3/change/", "Patients"),
+        ("/api/v1/sessions", "/api/v1/sessions"),
+        ("device: Kobuki", "device: Kobuki"),
+    ],
+)
+def test_it_names_sockets_refused_pages_and_lists_of_the_admin(about, name):
+    assert name_of_page(about) == name
+
+
+def test_each_page_that_it_speaks_of_has_a_name():
+    names = {
+        name
+        for name, _route, pattern in walk_patterns(get_resolver())
+        if getattr(pattern.callback, "access", None) and getattr(pattern.callback, "patients", True)
+    }
+    assert "correct" in names
+    assert not names - PAGES.keys()
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,7 @@ def test_a_lead_writes_the_words_and_others_do_not(world, pt):
     url = reverse("consent-text")
     assert pt.get(url).status_code == 403
     lead = world.lead
+    assert "“Care:” “Research:”" in lead.get(url).content.decode()  # how paragraphs begin
     assert lead.post(url, {"text": "First line\r\nsecond"}).status_code == 302
     assert current_text(world.clinic).text == "First line\nsecond"
     assert lead.post(url, {"text": " "}).status_code == 200  # refused

@@ -363,7 +363,29 @@ def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     told = client_of(world, Role.LEAD).get(page).content.decode()
     assert "revoked" in told
     seen_by_pt = client_of(world).get(page).content.decode()
-    assert "Revoke tokens" not in seen_by_pt
+    assert "Disconnect this device" in told
+    assert "Disconnect this device" not in seen_by_pt
+    assert 'name="kind"' not in told  # it stays what it is
+
+
+def test_devices_that_are_away_come_first_and_simulated_patients_last(world):
+    station, lead = world.rows[Station], client_of(world, Role.LEAD)
+    for name, state in (
+        ("Gone", {"revoked_at": NOW}),
+        ("Here", {"last_seen_at": NOW}),
+        ("Away", {"last_seen_at": NOW - timedelta(days=2)}),
+        ("New", {}),
+    ):
+        Device.everywhere.create(
+            clinic=world.clinic, station=station, kind="source", name=name, token_hash=name, **state
+        )
+    page = lead.get("/admin/rehab/device/").content.decode()
+    assert re.findall(r">(Gone|Here|Away|New)</a>", page) == ["New", "Away", "Here", "Gone"]
+    make_patient(world.clinic, "Zoe")
+    demo = make_patient(world.clinic, "Anna")
+    Patient.everywhere.filter(pk=demo.pk).update(simulated=True)
+    page = lead.get("/admin/rehab/patient/").content.decode()
+    assert page.index(">Zoe<") < page.index(">Anna<")
 
 
 def test_a_stations_page_shows_its_devices_and_their_state(world):
@@ -382,7 +404,7 @@ def test_a_stations_page_shows_its_devices_and_their_state(world):
 def test_deleting_says_what_goes_and_what_stays_behind(world):
     protocol, preset = world.rows[Protocol], world.rows[Preset]
     page = client_of(world).get(f"/admin/rehab/protocol/{protocol.pk}/delete/").content.decode()
-    assert preset.name in page
+    assert f"1 preset that uses it is deleted, too: {preset.name}." in " ".join(page.split())
     assert world.rows[ProtocolPhase].name in page
     assert "Stays, without its protocol: sessions (1)" in page
     station = world.rows[Station]

@@ -17,6 +17,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.formatting import format_duration
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.day import dashboard
@@ -153,14 +154,15 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
     page = front(pt)
     assert "running open" in page
     assert "missing" not in page  # nobody here knows who is connected there
-    fold = SimpleNamespace(feedback=Tally(judged=4, hits=3))
+    fold = SimpleNamespace(feedback=Tally(judged=4, hits=3), active_s=125.0)
     running = SimpleNamespace(
         aggregate=SimpleNamespace(fold=fold),
         presence=lambda _now: {"source": True, "tablets": 0, "robot": False},
     )
     live = SimpleNamespace(sessions={session.pk: running})
     monkeypatch.setattr(runtime, "peek", lambda: live)
-    assert sessions_today(pt, world.clinic, NOW)[0].hit_rate == "75\N{NO-BREAK SPACE}%"
+    here = sessions_today(pt, world.clinic, NOW)[0]
+    assert (here.duration, here.hit_rate) == (format_duration(125), "75\N{NO-BREAK SPACE}%")
     page = front(pt)
     assert (
         "75\N{NO-BREAK SPACE}%"

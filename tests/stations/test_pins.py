@@ -139,7 +139,9 @@ def test_a_lead_sets_and_removes_the_pin_in_the_admin(world, station):
     lead = world.lead
     url, kept = f"/admin/rehab/station/{station.pk}/change/", station.pin_hash
     given = {"name": "Bay 5", "devices-TOTAL_FORMS": 0, "devices-INITIAL_FORMS": 0}
-    assert kept not in lead.get(url).content.decode()
+    page = lead.get(url).content.decode()
+    assert kept not in page
+    assert "A PIN is set." in page
     assert "four to eight digits" in lead.post(url, given | {"pin": "12"}).content.decode()
     lead.post(url, given | {"pin": ""})
     station.refresh_from_db()
@@ -150,3 +152,6 @@ def test_a_lead_sets_and_removes_the_pin_in_the_admin(world, station):
     lead.post(url, given | {"no_pin": "on"})
     station.refresh_from_db()
     assert station.pin_hash == ""
+    page = lead.get(url).content.decode()
+    assert "No PIN is set" in page
+    assert 'name="no_pin"' not in page

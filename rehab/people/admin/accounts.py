@@ -189,4 +189,9 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         """Offer the roles that this person may assign: only a host creates hosts."""
         if db_field.name == "role" and user_of(request).role != Role.HOST:
             kwargs["choices"] = [choice for choice in Role.choices if choice[0] != Role.HOST]
+        if db_field.name == "role":
+            kwargs["help_text"] = _(
+                "A lead runs the clinic: accounts, stations, consent. A physical therapist trains "
+                "patients. A researcher sees sessions without names. A sponsor sees studies alone."
+            )
         return super().formfield_for_choice_field(db_field, request, **kwargs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
 from typing import Any, ClassVar
 
 from django.apps import apps
@@ -10,7 +12,8 @@ from django.contrib.admin import RelatedOnlyFieldListFilter
 from django.http import HttpRequest
 from django.urls import Resolver404, resolve
 from django.utils.html import format_html
-from django.utils.translation import gettext_lazy
+from django.utils.text import capfirst
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
@@ -18,24 +21,62 @@ from rehab.people.audit.row_history import describe_actor
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, rights_for
 
-# What pages are called that are looked at often; others by their address.
-PAGES = {
-    "assessments": gettext_lazy("Standard tests"),
-    "caseload": gettext_lazy("Caseload"),
-    "consent": gettext_lazy("Consent"),
-    "family-links": gettext_lazy("Family view"),
-    "history": gettext_lazy("Past sessions"),
-    "incidents": gettext_lazy("Incidents"),
-    "insight": gettext_lazy("Hit rates compared"),
-    "monitor": gettext_lazy("Therapist’s page"),
-    "patient": gettext_lazy("Patient"),
-    "records": gettext_lazy("Consent and data"),
-    "replay": gettext_lazy("Replay"),
-    "report": gettext_lazy("Report"),
-    "session": gettext_lazy("Session"),
-    "take-home": gettext_lazy("For the patient"),
-    "walk": gettext_lazy("Patient’s page"),
-}
+# What pages are called of which the log speaks, with the names of their addresses.
+NAMES = (
+    (_("Admin"), "admin:index"),
+    (_("All sessions as a file"), "export export-sessions"),
+    (_("Alarms"), "alarms acknowledge-alarms"),
+    (_("Caseload"), "caseload"),
+    (_("Consent"), "consent"),
+    (_("Consent and data"), "records erase patient-data"),
+    (_("Correct a session"), "correct"),
+    (_("Enroll a patient"), "enroll"),
+    (_("Family view"), "family family-links end-family-link"),
+    (_("For the patient"), "take-home"),
+    (_("Hit rates compared"), "insight insight-file"),
+    (_("Incidents"), "incidents incident incident-file"),
+    (_("Leaderboards"), "scores leave-boards waiting-board"),
+    (_("Move or remove"), "move-clinic clinic-file"),
+    (_("New patient"), "new-patient demo"),
+    (_("New session"), "setup"),
+    (_("Participant"), "participant start-visit leave-study note-guess agree-again reveal"),
+    (_("Past sessions"), "history"),
+    (_("Patient"), "patient edit-patient end-program reopen"),
+    (_("Patient’s page"), "walk ending leave own-language"),
+    (_("Questions after a session"), "questions add-questionnaire"),
+    (_("Replay"), "replay"),
+    (_("Report"), "report"),
+    (_("Results"), "study-results study-results-file"),
+    (_("Screen"), "screen check-screen"),
+    (_("Session"), "session"),
+    (_("Standard tests"), "assessments assess strike-out"),
+    (_("Start"), "start"),
+    (_("Stations"), "stations stop-robot"),
+    (_("Studies"), "studies study"),
+    (_("Therapist’s page"), "monitor write-note"),
+    (_("Try a phone"), "try-phone open-trial-phone"),
+    (_("Two sessions"), "side-by-side"),
+    (_("Visits"), "visits"),
+    (_("Words of this session"), "words"),
+)
+PAGES = {name: words for words, names in NAMES for name in names.split()}
+SOCKET = re.compile(r"/ws/session/\d+/(patient|monitor)/")
+PARAMETER = re.compile(r"<(\w+):\w+>")
+
+
+def name_of_page(about: str) -> str:
+    """Return what a page, list or form is called, by its address or route; else that itself."""
+    address = PARAMETER.sub(lambda part: "1" if part[1] == "int" else "x", about)
+    if socket := SOCKET.match(address):
+        return str(PAGES["walk" if socket[1] == "patient" else "monitor"])
+    try:
+        name = resolve(address).view_name
+    except Resolver404:
+        return about
+    with suppress(LookupError, ValueError):
+        app, model = name.removeprefix("admin:").split("_")[:2]
+        return str(capfirst(apps.get_model(app, model)._meta.verbose_name_plural))
+    return str(PAGES.get(name, about))
 
 
 class LogAdmin(ReadOnlyAdmin):
@@ -56,7 +97,7 @@ class LogAdmin(ReadOnlyAdmin):
     def _leads(request: HttpRequest) -> bool:
         return getattr(request.user, "role", "") == Role.LEAD
 
-    @admin.display(description=gettext_lazy("who"), ordering="by")
+    @admin.display(description=_("who"), ordering="by")
     def who(self, entry: Any) -> str:
         """Return the person, and the program or device used."""
         return describe_actor(entry)
@@ -66,7 +107,7 @@ class LogAdmin(ReadOnlyAdmin):
 class AuditAdmin(LogAdmin):
     """Who looked at or exported patients' data, or commanded a robot."""
 
-    list_display = ("at", "who", "act", "times", "patient", "page", "address")
+    list_display = ("at", "who", "done", "patient", "page", "address")
     list_filter: ClassVar[Any] = (
         "act",
         ("by", RelatedOnlyFieldListFilter),
@@ -75,19 +116,17 @@ class AuditAdmin(LogAdmin):
     search_fields = ("patient__nickname", "patient__code", "by__username", "about")
     list_select_related = ("by", "patient")
 
-    @admin.display(description=gettext_lazy("times"), ordering="count")
-    def times(self, entry: AuditEntry) -> str:
-        """Return how often it was done; "" for once."""
-        return f"{entry.count} ×" if entry.count > 1 else ""
+    @admin.display(description=_("what"), ordering="act")
+    def done(self, entry: AuditEntry) -> str:
+        """Return what was done, and how often if more than once."""
+        times = f" ({entry.count} ×)" if entry.count > 1 else ""
+        return f"{entry.get_act_display()}{times}"
 
-    @admin.display(description=gettext_lazy("where in GARRY"), ordering="about")
+    @admin.display(description=_("where in GARRY"), ordering="about")
     def page(self, entry: AuditEntry) -> str:
-        """Return the name of the page, else its address or what was asked for."""
-        try:
-            name = resolve(entry.about).view_name
-        except Resolver404:
-            name = ""
-        return format_html('<span title="{}">{}</span>', entry.about, PAGES.get(name, entry.about))
+        """Return the name of the page, with its address to hover over."""
+        name = name_of_page(entry.about)
+        return format_html('<span title="{}">{}</span>', entry.about, name)
 
 
 @admin.register(HistoryEntry)
@@ -98,7 +137,7 @@ class HistoryAdmin(LogAdmin):
     list_filter: ClassVar[Any] = ("kind", "model_name", ("by", RelatedOnlyFieldListFilter))
     list_select_related = ("by",)
 
-    @admin.display(description=gettext_lazy("fields"))
+    @admin.display(description=_("fields"))
     def fields_changed(self, entry: HistoryEntry) -> str:
         """Return the names of the fields."""
         fields = apps.get_model("rehab", entry.model_name)._meta.get_fields()

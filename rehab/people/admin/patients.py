@@ -21,6 +21,8 @@ from rehab.people.models.hidden_patients import is_in_running_study
 from rehab.people.web.admin_base import ScopedAdmin
 from rehab.people.web.row_forms import MonthField
 
+NAMED = ("nickname", "code", "language")
+
 
 @admin.register(Patient)
 class PatientAdmin(ScopedAdmin):
@@ -37,18 +39,19 @@ class PatientAdmin(ScopedAdmin):
     )
     list_filter = ("paretic_side", "boards", "blinded", "simulated", "language", "created_at")
     list_select_related = ("clinic",)
-    ordering = ("nickname", "code")  # rows with aggregates lose the model's ordering
+    ordering = ("simulated", "nickname", "code")  # rows with aggregates lose the model's ordering
     search_fields = ("nickname", "code")
-    fields = (
-        *details(Patient),
-        "language",
-        "boards_agreed",
-        "animal_name",
-        "blinded",
-        "pseudonym",
-        "created_at",
-        "ended_at",
-        "erased_at",
+    fieldsets = (
+        (None, {"fields": NAMED}),
+        (
+            _("Clinical data"),
+            {"fields": tuple(name for name in details(Patient) if name not in NAMED)},
+        ),
+        (
+            _("Leaderboards and studies"),
+            {"fields": ("boards_agreed", "animal_name", "blinded", "pseudonym")},
+        ),
+        (_("Dates"), {"fields": ("created_at", "ended_at", "erased_at")}),
     )
     readonly_fields = (
         *("boards_agreed", "animal_name", "pseudonym"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from django.contrib import messages
@@ -26,7 +27,7 @@ from rehab.people.consent.services import (
     record_consent,
     record_refusal,
 )
-from rehab.people.models import BoardsConsent, Patient
+from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.roles import Role
 
 MEANINGS = {
@@ -82,8 +83,7 @@ def split_words(text: str, patient: Patient) -> tuple[str, dict[Purpose, str], s
     A purpose's own paragraph begins with its name in the clinic's language and a colon; what
     follows it up to the next purpose's belongs to it.
     """
-    with override(patient.clinic.language):
-        names = {str(purpose.label): purpose for purpose in _listed_purposes(patient)}
+    names = _names_of(_listed_purposes(patient), patient.clinic)
     before: list[str] = []
     after: list[str] = []
     words: dict[Purpose, str] = {}
@@ -97,6 +97,12 @@ def split_words(text: str, patient: Patient) -> tuple[str, dict[Purpose, str], s
         else:
             (after if words else before).append(paragraph)
     return "\n\n".join(before), words, "\n\n".join(after)
+
+
+def _names_of(purposes: Iterable[Purpose], clinic: Clinic) -> dict[str, Purpose]:
+    """Return purposes by their names in the clinic's language."""
+    with override(clinic.language):
+        return {str(purpose.label): purpose for purpose in purposes}
 
 
 def list_choices(patient: Patient) -> list[dict[str, Any]]:
@@ -148,7 +154,12 @@ def edit_consent_text(request: HttpRequest) -> HttpResponse:
     user = user_of(request)
     clinic = clinic_of(user)
     text = current_text(clinic)
-    form = ConsentTextForm(request.POST or None, initial={"text": text.text}, label_suffix="")
+    form = ConsentTextForm(
+        request.POST or None,
+        initial={"text": text.text},
+        label_suffix="",
+        purposes=_names_of(offered_purposes(clinic), clinic),
+    )
     if request.method == "POST" and form.is_valid():
         new = publish_text(clinic, form.cleaned_data["text"], user, timezone.now())
         message = _("Version %(version)d is in force. Ask patients again when they come.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from django.contrib import admin
 from django.contrib.admin.exceptions import DisallowedModelAdminLookup
@@ -109,11 +109,12 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return rows.order_by(*ordering) if ordering else rows
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Return the fields without those that are left out."""
+        """Return the fields without those that are left out, and without empty groups."""
         omitted = self.get_omitted_fields(request, obj)
         return [
-            (title, {**options, "fields": omit_fields(options["fields"], omitted)})
+            (title, {**options, "fields": fields})
             for title, options in super().get_fieldsets(request, obj)
+            if (fields := omit_fields(options["fields"], omitted))
         ]
 
     def get_omitted_fields(self, request: HttpRequest, obj: Any) -> set[str]:
@@ -211,6 +212,7 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
     show_facets = admin.ShowFacets.NEVER
     row_actions: tuple[str, ...] = ()  # actions that the row's own page offers as well
     viewer_actions: tuple[str, ...] = ()  # those of them that change nothing of the row
+    row_words: ClassVar[dict[str, Any]] = {}  # what the row's own page calls them, if not as a list
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Return whether the model is on the front page."""
@@ -256,7 +258,7 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
                 actions = {name: actions[name] for name in actions if name in self.viewer_actions}
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
-                (name, found[2], name not in self.viewer_actions)
+                (name, self.row_words.get(name, found[2]), name not in self.viewer_actions)
                 for name in self.row_actions
                 if (found := actions.get(name))
             ]

@@ -41,6 +41,7 @@ class TokenAdmin(ScopedAdmin):
 
     readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
+    row_words: ClassVar[dict[str, Any]] = {"renew_tokens": _("New key: the old one stops at once")}
 
     @asks_who_it_is
     def add_view(

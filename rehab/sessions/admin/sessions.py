@@ -121,7 +121,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         if not may_see_names(user_of(request).role):
             return links
         if State(row.state) in OPEN_STATES:
-            links.append((reverse("monitor", args=[row.pk]), _("Monitor")))
+            links.append((reverse("monitor", args=[row.pk]), _("Therapist’s page")))
         if can_correct(row):
             links.append((reverse("correct", args=[row.pk]), _("Correct")))
         return links
@@ -225,10 +225,10 @@ class TrainingSessionAdmin(ScopedAdmin):
             gettext("hits"),
         )
 
-    @admin.display(description=_("counts"), ordering="excluded", boolean=True)
-    def counts(self, session: TrainingSession) -> bool:
+    @admin.display(description=_("counts"), ordering="excluded")
+    def counts(self, session: TrainingSession) -> str:
         """Whether it is in figures, boards and trends."""
-        return not session.excluded
+        return gettext("no") if session.excluded else gettext("yes")
 
     @admin.display(description=_("log"))
     def log(self, session: TrainingSession) -> str:

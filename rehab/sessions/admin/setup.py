@@ -11,7 +11,7 @@ from django.contrib.admin.widgets import AdminTextareaWidget
 from django.core.exceptions import ValidationError
 from django.db import models, transaction
 from django.db.models import F, QuerySet
-from django.http import HttpRequest, HttpResponseBase
+from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
@@ -20,6 +20,7 @@ from rehab.people.access import user_of
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
 from rehab.sessions.questionnaires import questionnaire_choices
+from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocol_models import (
     MeasureDefinition,
     Protocol,
@@ -146,6 +147,7 @@ class ProtocolAdmin(SharedAdmin):
 
     form = ProtocolForm
     change_form_template = "sessions/protocol_form.html"
+    delete_confirmation_template = "sessions/protocol_delete.html"
     list_display = ("named", "phase_count", "length", "whose", "about")
     search_fields = ("name", "description", "phases__name")
     formfield_overrides: ClassVar[Any] = {
@@ -203,6 +205,13 @@ class ProtocolAdmin(SharedAdmin):
         phases = row.to_rules() if row else ()
         context["phases"] = [asdict(phase) | {"name": gettext(phase.name)} for phase in phases]
         return super().render_change_form(request, context, *args, **kwargs)
+
+    def render_delete_form(self, request: HttpRequest, context: dict[str, Any]) -> HttpResponse:
+        """Show first which presets are deleted as well."""
+        protocol: Protocol = context["object"]
+        presets = Preset.objects.visible_to(request.user).filter(protocol=protocol)
+        context["presets"] = list(presets.values_list("name", flat=True))
+        return super().render_delete_form(request, context)
 
     @transaction.atomic
     def save_formset(self, request: HttpRequest, form: Any, formset: Any, change: bool) -> None:

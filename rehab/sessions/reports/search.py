@@ -37,8 +37,8 @@ DAYS = [MinValueValidator(FIRST_DAY, NO_DAY), MaxValueValidator(LAST_DAY, NO_DAY
 class SessionSearchForm(forms.Form):
     """What sessions are searched by. Everything may be left empty."""
 
-    first = forms.DateField(required=False, validators=DAYS, label=_("From"))
-    last = forms.DateField(required=False, validators=DAYS, label=_("To"))
+    first = forms.DateField(required=False, validators=DAYS, label=_("First day"))
+    last = forms.DateField(required=False, validators=DAYS, label=_("Last day"))
     place: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
         queryset=None, required=False, label=_("Station"), empty_label=_("Any station")
     )
@@ -54,9 +54,6 @@ class SessionSearchForm(forms.Form):
         fields: dict[str, Any] = self.fields
         for name in ("first", "last"):
             fields[name].widget = forms.DateInput(attrs={"type": "date"}, format="%Y-%m-%d")
-        for name in RANGES:
-            fields[f"{name}_min"].widget.attrs["placeholder"] = _("from")
-            fields[f"{name}_max"].widget.attrs["placeholder"] = _("to")
         fields["place"].queryset = Station.objects.visible_to(by)
         if not may_see_names(by.role):
             del fields["place"]

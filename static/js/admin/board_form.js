@@ -79,6 +79,7 @@ function start() {
   });
   updateVisibility();
   showPreview(form, preview, (drawn) => {
-    facts.textContent = drawn.body?.dataset.facts ?? "";
+    const told = drawn.body?.dataset.facts?.trim() ?? "";
+    facts.textContent = drawn.body?.textContent.includes(told) ? "" : told; // a board without rows says it itself
   });
 }

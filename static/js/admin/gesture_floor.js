@@ -9,6 +9,7 @@ import { WalkerView } from "garry/shared/walker_view";
 const PAUSE_MS = 250; // after the last change, before the server is asked
 const STRAIGHT_RAD = 0.02; // what still counts as straight back
 const KNOB_M = 0.09; // from a place to the knob that turns it
+const APART_M = 0.07; // between two numbers
 const NAMES = ["turn_deg", "forward_m", "hold_s", "pace", "within_s"];
 const TRACKS = ["lights", "notes"]; // fields beside the steps
 const HOME = { x: 0, y: 0, heading: 0 };
@@ -42,6 +43,17 @@ const rounded = (turn, way) => ({
   turn_deg: Math.round(10 * degrees(turn)) / 10,
   forward_m: Math.round(1000 * way) / 1000,
 });
+
+// Return where the numbers of poses are drawn: at their places, or behind one that stands there already.
+export function spotsOf(poses) {
+  const spots = [];
+  for (const { x, y } of poses) {
+    const spot = { x, y };
+    while (spots.some((one) => Math.hypot(one.x - spot.x, one.y - spot.y) < APART_M - 1e-6)) spot.x -= APART_M;
+    spots.push(spot);
+  }
+  return spots;
+}
 
 // The rows of Django's table that hold a step.
 class Rows {
@@ -94,6 +106,7 @@ export function setUpFloor(place) {
   const walker = new WalkerView(film);
   const handles = append(svg, "g");
   const reach = Number(place.dataset.reach);
+  svg.setAttribute("viewBox", "-.5 -.4 1 .9"); // without the empty floor ahead
   let preview, timer, dragged, audio;
 
   const knobAt = (isDrive, x, y) => (isDrive ? "" : `<circle class="knob" cx="${-y}" cy="${-x}" r=".02" data-knob />`);
@@ -101,15 +114,16 @@ export function setUpFloor(place) {
   function drawHandles() {
     const poses = posesOf(rows.read());
     const way = [HOME, ...poses].map(({ x, y }) => `${-y} ${-x}`).join("L");
-    const drawn = poses
-      .map(({ x, y, heading, isDrive }, index) => {
-        const [kx, ky] = [x + KNOB_M * Math.cos(heading), y + KNOB_M * Math.sin(heading)];
-        return `<g class="place" data-step="${index}"><path d="M${-y} ${-x}L${-ky} ${-kx}" />
-          ${knobAt(isDrive, kx, ky)}<circle class="spot" cx="${-y}" cy="${-x}"
-          r=".032" /><text x="${-y}" y="${-x}" dy=".014">${index + 1}</text></g>`;
-      })
-      .join("");
-    handles.innerHTML = `<path class="planned" d="M${way}" />${drawn}`;
+    const ways = poses.map(({ x, y, heading, isDrive }, index) => {
+      const [kx, ky] = [x + KNOB_M * Math.cos(heading), y + KNOB_M * Math.sin(heading)];
+      return `<g class="place" data-step="${index}"><path d="M${-y} ${-x}L${-ky} ${-kx}" />
+        ${knobAt(isDrive, kx, ky)}</g>`;
+    });
+    const numbers = spotsOf(poses).map(
+      ({ x, y }, index) => `<g class="place" data-step="${index}"><circle class="spot" cx="${-y}" cy="${-x}"
+        r=".032" /><text x="${-y}" y="${-x}" dy=".014">${index + 1}</text></g>`,
+    );
+    handles.innerHTML = `<path class="planned" d="M${way}" />${ways.join("")}${numbers.join("")}`;
   }
 
   // Lead each step to where it is to end. Steps that only turn keep their heading.
@@ -154,7 +168,10 @@ export function setUpFloor(place) {
   svg.addEventListener("pointerdown", (event) => {
     const target = event.target.closest("[data-step]");
     if (target) {
-      dragged = { index: Number(target.dataset.step), turns: event.target.hasAttribute("data-knob") };
+      const index = Number(target.dataset.step);
+      const [own, at] = [posesOf(rows.read())[index], pointOf(event)];
+      const turns = event.target.hasAttribute("data-knob");
+      dragged = { index, turns, ahead: own.x - at.x, left: own.y - at.y }; // its number may stand beside its place
       svg.setPointerCapture(event.pointerId);
     } else if (rows.used.length < Number(place.dataset.most)) {
       rows.add(moveTo(posesOf(rows.read()).at(-1) ?? HOME, pointOf(event)));
@@ -169,7 +186,7 @@ export function setUpFloor(place) {
     const own = poses[dragged.index];
     // A drive ends with the heading that it has; only a step that turns on the spot can be turned.
     if (!own.isDrive) own.heading = Math.atan2(at.y - own.y, at.x - own.x);
-    else if (!dragged.turns) Object.assign(own, at);
+    else if (!dragged.turns) Object.assign(own, { x: at.x + dragged.ahead, y: at.y + dragged.left });
     lead(poses);
     changed();
   });

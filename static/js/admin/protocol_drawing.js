@@ -29,7 +29,7 @@ function lengthOf({ strides, seconds }, stride_s) {
   return limits.length ? Math.min(...limits) : null;
 }
 
-// `labels`: how an open end and minutes are written; `stride_s`: how long a stride takes.
+// `labels`: how an open phase, an open end and minutes are written; `stride_s`: how long a stride takes.
 export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   const lengths = phases.map((phase) => lengthOf(phase, stride_s));
 
@@ -54,13 +54,12 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
       title(phase.name) +
         shape("rect", { class: kind, ...block }) +
         text(fitText(phase.name, letters), { class: "name", x: left + 6, y: 20 }) +
-        (phase.feedback && phase.gain !== 1 ? text(`×${phase.gain}`, gain) : "") +
+        (phase.feedback && phase.gain !== 1 ? text(`${Math.round(100 * phase.gain)} %`, gain) : "") +
         text(isOpen && length.length > letters ? "…" : length, { class: "length", x: left + 6, y: 150 }),
     );
   }
 
-  // Widths grow with the square root, so that a block of ten minutes leaves room for one of 13 s.
-  const weights = lengths.map((seconds) => Math.sqrt(seconds ?? OPEN_PHASE_S));
+  const weights = lengths.map((seconds) => seconds ?? OPEN_PHASE_S);
   const least = phases.map(({ name }) => Math.max(NARROWEST, Math.min(name.length, LETTERS_MAX) * LETTER + 8));
   const widths = divide(room, weights, least);
   const width = widths.reduce((all, one) => all + one, 0);
@@ -75,5 +74,5 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   svg.innerHTML = drawn.join("") + shape("path", { class: "ground", d: `M0 ${GROUND + 1}H${width}` });
 
   const known_s = lengths.reduce((all, one) => all + (one ?? 0), 0);
-  return known_s ? `${formatLength(known_s)}${lengths.includes(null) ? " +" : ""}` : "";
+  return known_s ? `${formatLength(known_s)}${lengths.includes(null) ? `, ${labels.end}` : ""}` : "";
 }

@@ -34,13 +34,13 @@ function start() {
   }
 
   function draw() {
-    const { stride, open, minutes } = place.dataset;
+    const { stride, open, end, minutes } = place.dataset;
     const phases = readPhases();
     place.querySelector(".about-gain").hidden = !phases.some(({ feedback, gain }) => feedback && gain !== 1);
     place.querySelector(".total").textContent = drawProtocol(place.querySelector("svg"), phases, {
       width: Math.max(place.clientWidth - 42, 200),
       stride_s: Number(stride),
-      labels: { open, minutes },
+      labels: { open, end, minutes },
     });
   }
 

@@ -94,6 +94,7 @@ def sessions_today(
     listed = [*rows.filter(IS_OPEN), *walked[:MAX_ENDED]]
     listed.sort(key=lambda row: (row.pk not in fallen, STATE_ORDER.index(State(row.state))))
     by_name = may_see_names(user.role)
+    live = {row.pk: _live_figures(row) for row in listed}
     return [
         SessionRow(
             session=row,
@@ -102,20 +103,22 @@ def sessions_today(
             state=row.get_state_display(),
             is_open=State(row.state) in OPEN_STATES,
             has_fallen=row.pk in fallen,
-            duration=format_duration(row.active_s),
-            hit_rate=_format_hit_rate(row),
+            duration=format_duration(live[row.pk][0]),
+            hit_rate=live[row.pk][1],
         )
         for row in listed
     ]
 
 
-def _format_hit_rate(row: Any) -> str:
-    """Return the hit rate; of an open session the current one, where this process runs it."""
+def _live_figures(row: Any) -> tuple[float, str]:
+    """Return time walked [s] and hit rate; of an open session now, where this process runs it."""
     if State(row.state) not in OPEN_STATES:
-        return format_rate(row.metric_hit_rate)
-    live = find_live_session(row)
-    rate = live.aggregate.fold.feedback.hit_rate if live else None
-    return "" if rate is None else format_rate(rate)
+        return row.active_s, format_rate(row.metric_hit_rate)
+    if (live := find_live_session(row)) is None:
+        return row.active_s, ""
+    fold = live.aggregate.fold
+    rate = fold.feedback.hit_rate
+    return fold.active_s, "" if rate is None else format_rate(rate)
 
 
 def _format_time(moment: datetime, midnight: datetime) -> str:
