@@ -8,8 +8,8 @@ from typing import Any
 from django.db import transaction
 from django.db.models import Q
 from django.dispatch import Signal
+from django.utils.translation import gettext, override
 from django.utils.translation import gettext_lazy as _
-from django.utils.translation import override
 
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
@@ -48,6 +48,13 @@ DEFAULT_TEXT = (
         "depend on research, boards or family view."
     ),
 )
+
+LEVELS = {
+    BoardsConsent.CLINIC: _("Yes, in this clinic"),
+    BoardsConsent.ACROSS: _("Yes, in all clinics"),
+    BoardsConsent.TOTAL: _("Yes, in totals only"),
+    BoardsConsent.OWN: _("No"),
+}
 
 
 def _is_included(clinic: Clinic, paragraph: Any) -> bool:
@@ -167,6 +174,29 @@ def record_refusal(patient: Patient, purpose: Purpose, by: User | None, now: dat
                 withdrawn_at=now,
                 withdrawn_by=by,
             )
+
+
+def list_answers(purpose: Purpose, is_across: bool) -> list[tuple[str, str]]:
+    """Return the answers to a purpose, each a value and its label; ``is_across``: all clinics'."""
+    if purpose != Purpose.BOARDS:
+        return [("yes", gettext("Yes")), ("no", gettext("No"))]
+    return [
+        (level.value, str(label))
+        for level, label in LEVELS.items()
+        if is_across or level != BoardsConsent.ACROSS
+    ]
+
+
+def record_answer(
+    patient: Patient, purpose: Purpose, answer: str, by: User | None, now: datetime
+) -> None:
+    """Record one of the answers to a purpose."""
+    if purpose == Purpose.BOARDS:
+        record_boards_consent(patient, BoardsConsent(answer), by, now)
+    elif answer == "yes":
+        record_consent(patient, purpose, by, now)
+    else:
+        record_refusal(patient, purpose, by, now)
 
 
 def record_boards_consent(
