@@ -17,6 +17,7 @@ from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
+from rehab.sessions.formatting import format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.stations.tablets import SCORES_STAY_S
 from rehab.training.changes import OPEN_STATES, State
@@ -40,8 +41,11 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     if not session.patient.blinded:
         now = timezone.now()
         boards = [*make_session_panels(session, now), make_own_panel(session, now)]
+    steps = session.steps.filter(valid=True, side=session.trained_side)
     context = {
         "session": session,
+        "walked": format_duration(session.active_s),
+        "steps": format_number(steps.count(), 0),
         "boards": boards,
         "tablet": not request.user.is_authenticated,
         "stays_s": SCORES_STAY_S,

@@ -40,8 +40,9 @@ DEFAULT_TEXT = (
     ),
     REMOTE_VIEW_TEXT,
     _(
-        "Family view: people whom you choose see on a page of their own when you walked, how many "
-        "steps reached your goal, and your next visit, until the link ends."
+        "Family view: people whom you choose see on a page of their own, until the link ends, on "
+        "which days you walked and for how many minutes, how many steps reached your goal, your "
+        "points, how your last sessions compare with those before, and your next visit."
     ),
     _(
         "You may say no to any of these, and change your mind at any time. Your care does not "
@@ -99,6 +100,12 @@ def answered_purposes(patient: Patient) -> set[str]:
 def offered_purposes(clinic: Clinic) -> list[Purpose]:
     """Return what a clinic asks for: remote view only where it has named its own networks."""
     return [purpose for purpose in Purpose if clinic.networks or purpose is not Purpose.REMOTE]
+
+
+def unasked_purposes(patient: Patient) -> list[Purpose]:
+    """Return what a clinic asks for and a patient has answered neither way."""
+    answered = answered_purposes(patient)
+    return [purpose for purpose in offered_purposes(patient.clinic) if purpose not in answered]
 
 
 def is_remote_view_allowed(patient: Patient, address: str) -> bool:

@@ -1,6 +1,6 @@
 // The session's phases on top of the page, each as wide as it is long and filled as far as it is walked.
 
-import { _, fill } from "garry/shared/language";
+import { _, fill, n_ } from "garry/shared/language";
 import { clock } from "garry/shared/format";
 import { phaseName } from "garry/shared/labels";
 import { hasFallen } from "garry/monitor/alarm_causes";
@@ -21,7 +21,8 @@ function lengths({ phases, target }) {
 // Return how far the phase at hand has come, 0 to 1, and what is left of it.
 function progress({ phase: { seconds, strides }, phase_s, phase_strides }, length) {
   if (seconds) return [phase_s / seconds, clock(Math.max(0, seconds - phase_s))];
-  if (strides) return [phase_strides / strides, String(Math.max(0, strides - phase_strides))];
+  const count = Math.max(0, strides - phase_strides);
+  if (strides) return [phase_strides / strides, n_("%(count)s stride", "%(count)s strides", count)];
   return [phase_s / length, ""];
 }
 
