@@ -41,17 +41,18 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     if not session.patient.blinded:
         now = timezone.now()
         boards = [*make_session_panels(session, now), make_own_panel(session, now)]
-    steps = session.steps.filter(valid=True, side=session.trained_side)
     context = {
         "session": session,
-        "walked": format_duration(session.active_s),
-        "steps": format_number(steps.count(), 0),
         "boards": boards,
         "tablet": not request.user.is_authenticated,
         "stays_s": SCORES_STAY_S,
         "early": State(session.state) is State.ABORTED,
         "ranked": not boards or any(board.has_you for board in boards),
     }
+    if not context["ranked"]:
+        steps = session.steps.filter(valid=True, side=session.trained_side)
+        context["walked"] = format_duration(session.active_s)
+        context["steps"] = format_number(steps.count(), 0)
     return render(request, "boards/scores.html", context)
 
 

@@ -28,7 +28,7 @@ from rehab.sessions.forms.correction import CorrectionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.reports.answers import list_answers
-from rehab.sessions.reports.remarks import load_noted
+from rehab.sessions.reports.remarks import read_noted
 from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import (
     format_incidents,
@@ -65,7 +65,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     by_name = may_see_names(user.role)
     start = clinic_time(session.began_at, session.clinic)
     now = clinic_time(timezone.now(), session.clinic)
-    noted = load_noted(user, [session.pk]).get(session.pk, [])
+    noted = read_noted(review.rows)
     context = {
         "session": session,
         "noted": dict.fromkeys(one.words for one in noted if one.is_adverse),
