@@ -410,4 +410,7 @@ def test_it_says_what_ends_a_walk(pt, patient):
 
 def test_one_open_session_alone_is_shown_on_its_own_page(pt, patient):
     session = make_session(patient)
-    assert pt.get(f"/sessions/two/?of={session.pk}").headers["Location"] == f"/sessions/{session.pk}/monitor/"
+    assert (
+        pt.get(f"/sessions/two/?of={session.pk}").headers["Location"]
+        == f"/sessions/{session.pk}/monitor/"
+    )
