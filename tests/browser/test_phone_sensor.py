@@ -193,5 +193,5 @@ def test_a_therapist_is_led_to_https_before_a_phone_is_paired(visit: Visit):
     page.click("text=Pair a phone")
     expect(page.locator("main")).to_contain_text("without https")
     expect(page.locator("[name=side]")).to_have_count(0)
-    page.click("text=Set up https")
+    page.click("a:text-is('Set up https')")
     expect(page.locator("h1")).to_contain_text("by https")
