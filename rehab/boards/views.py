@@ -17,6 +17,7 @@ from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
+from rehab.sessions.formatting import format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.stations.tablets import SCORES_STAY_S
 from rehab.training.changes import OPEN_STATES, State
@@ -48,6 +49,10 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
         "early": State(session.state) is State.ABORTED,
         "ranked": not boards or any(board.has_you for board in boards),
     }
+    if not context["ranked"]:
+        steps = session.steps.filter(valid=True, side=session.trained_side)
+        context["walked"] = format_duration(session.active_s)
+        context["steps"] = format_number(steps.count(), 0)
     return render(request, "boards/scores.html", context)
 
 

@@ -12,9 +12,9 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
 from rehab.people.consent.models import Purpose
-from rehab.people.consent.services import offered_purposes, record_boards_consent, record_consent
+from rehab.people.consent.services import list_answers, offered_purposes, record_answer
 from rehab.people.field_policy import details
-from rehab.people.models import SIDES, BoardsConsent, EndReason, ErasureReason, Patient, User
+from rehab.people.models import SIDES, EndReason, ErasureReason, Patient, User
 from rehab.people.ranges import say_ranges
 from rehab.people.web.row_forms import MonthField
 
@@ -68,6 +68,7 @@ class _SpokenForm(_PatientFieldsForm):
 
 
 FIRST = ("nickname", "code", "paretic_side", "body_mass_kg")  # the others can wait
+CONSENT = "consent_"  # before a purpose: the name of its field
 
 
 class PatientForm(_SpokenForm):
@@ -93,15 +94,15 @@ class PatientForm(_SpokenForm):
         side.required, side.choices = True, SIDES
         self.fields["nickname"].widget.attrs["autofocus"] = True
         if self.instance.is_new:
-            self.fields["agrees"] = forms.MultipleChoiceField(
-                label=_("Consent"),
-                choices=[(p.value, p.label) for p in offered_purposes(self.instance.clinic)],
-                required=False,
-                widget=forms.CheckboxSelectMultiple,
-                help_text=_(
-                    "Ask now, or later on the patient’s page. Nothing ticked means: not asked yet."
-                ),
-            )
+            clinic = self.instance.clinic
+            for purpose in offered_purposes(clinic):
+                answers = list_answers(purpose, clinic.boards_across)
+                self.fields[f"{CONSENT}{purpose}"] = forms.ChoiceField(
+                    label=purpose.label,
+                    choices=[("", _("not asked yet")), *answers],
+                    required=False,
+                    widget=forms.RadioSelect,
+                )
 
     @property
     def first(self) -> list[forms.BoundField]:
@@ -111,7 +112,12 @@ class PatientForm(_SpokenForm):
     @property
     def more(self) -> list[forms.BoundField]:
         """The fields that can wait."""
-        return [field for field in self if field.name not in {*FIRST, "agrees"}]
+        return [field for field in self if field not in [*self.first, *self.consents]]
+
+    @property
+    def consents(self) -> list[forms.BoundField]:
+        """The questions to a new patient, one per purpose."""
+        return [field for field in self if field.name.startswith(CONSENT)]
 
     def clean(self) -> dict[str, Any]:
         """Return the cleaned data. Refuses a birth or a stroke that is still to come."""
@@ -138,11 +144,10 @@ class PatientForm(_SpokenForm):
         """Store the patient, and a new one's consents."""
         with transaction.atomic():
             patient = super().save(commit)
-            for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
-                if purpose is Purpose.BOARDS:
-                    record_boards_consent(patient, BoardsConsent.CLINIC, self._by, self._now)
-                else:
-                    record_consent(patient, purpose, self._by, self._now)
+            for field in self.consents:
+                if answer := self.cleaned_data[field.name]:
+                    purpose = Purpose(field.name.removeprefix(CONSENT))
+                    record_answer(patient, purpose, answer, self._by, self._now)
         return patient
 
 
@@ -166,8 +171,8 @@ class ScreenForm(_SpokenForm):
         help_texts: ClassVar = {
             "screen_side": _(
                 "If the left side is missed, choose the right; if the right side is missed, "
-                "choose the left. In one half alone, words are largest on a tablet that lies on "
-                "its side."
+                "choose the left. In one half alone, Pause and Stop are there as well, and words "
+                "are largest on a tablet that lies on its side."
             )
         }
 

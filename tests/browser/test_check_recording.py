@@ -41,7 +41,7 @@ def page(server: Server, visit: Visit) -> Page:
 def upload(page: Page, *paths) -> None:
     page.set_input_files("#file", paths)
     page.fill("#mass", str(MASS_KG))
-    page.click("text=Check the file")
+    page.click("text=Check the files")
 
 
 def test_a_c3d_file_is_checked_and_then_walked_with(page, server, walk, tmp_path):
@@ -107,7 +107,7 @@ def test_step_5_of_a_labs_first_day(page, server, browser, file):
     if file.endswith(".c3d"):
         pytest.importorskip("ezc3d")
     page.set_input_files("#file", signals(folder) / file)
-    page.get_by_role("button", name="Check the file").click()
+    page.get_by_role("button", name="Check the files").click()
     right = page.get_by_role("button", name="That is right")
     expect(right).to_be_visible(timeout=CHECKED_MS)
     expect(page.locator("main")).to_contain_text(re.compile(r"Left: A2 \d\.\d\d W/kg"))

@@ -84,7 +84,7 @@ def test_sessions_are_compared_and_taken_along(visit: Visit, sessions: dict[str,
     assert set(rows(page)) == {"Omar (O-2)", "Rosa (R-1)"}
     assert rows(page)["Rosa (R-1)"][2].startswith("60 % (")
     assert page.locator("svg.interval rect").count() == 1  # none of fewer than three sessions
-    page.click("text=Period and goal")
+    page.click("summary:has-text('Filter')")
     page.click(".chips >> text=All time")
     page.click("text=Feedback types")
     assert "Explicit" in rows(page)

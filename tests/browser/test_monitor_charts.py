@@ -36,6 +36,24 @@ MEANS = """async () =>
   (await import("garry/monitor/strip")).runningMeans([2, 4, null, 6]).map((one) => one &&
     [one.mean, one.sd])"""
 
+# Whether the line about the goal is hidden: at a suggestion, once it is declined, at another one.
+KEPT = """async () => {
+  const { createGoalCoach } = await import("garry/monitor/controls/goal_coach");
+  const session = {
+    goal: 3.9, unit: "W/kg", wanted_hit_rate: 0.6, goal_adaptation: "suggest", phase: {},
+  };
+  let press;
+  const onPress = (selector, act) => selector === "[data-keep]" && (press = act);
+  const coach = createGoalCoach({ show() {}, change() {}, onPress });
+  const draw = (suggested_goal) => {
+    coach.draw({ ...session, suggested_goal });
+    return document.querySelector(".coach").hidden;
+  };
+  const first = draw(3.7);
+  press(null, { ...session, suggested_goal: 3.7 });
+  return [first, draw(3.7), draw(3.8)];
+}"""
+
 
 @pytest.fixture
 def walking(server: Server, visit: Visit) -> Iterator[tuple[Page, Feet]]:
@@ -66,6 +84,7 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     expect(strip).to_contain_text("W/kg")
     page.reload()  # what was walked before is plotted as well
     expect(strip.locator("circle.calm")).to_have_count(4)
+    assert page.evaluate(KEPT) == [False, True, False]
     assert page.evaluate(MEANS) == [
         None,
         [3, pytest.approx(2**0.5)],

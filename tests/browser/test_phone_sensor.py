@@ -187,14 +187,11 @@ def test_it_says_why_it_cannot_measure(server: Server, browser: Browser):
 
 
 @pytest.mark.essential
-def test_a_therapist_shows_the_square_once(visit: Visit):
+def test_a_therapist_is_led_to_https_before_a_phone_is_paired(visit: Visit):
     page = visit("/stations/", size="laptop")
     page.eval_on_selector("details:has-text('Add a device')", "one => (one.open = true)")
     page.click("text=Pair a phone")
-    page.check("[name=side][value=right]")
-    page.click("text=Show the QR code")
-    expect(page.locator(".qr svg")).to_be_visible()
-    expect(page.locator("main")).to_contain_text("Phone, right shin")
     expect(page.locator("main")).to_contain_text("without https")
-    page.goto("/stations/")
-    expect(page.locator("main")).to_contain_text("Phone, right shin")
+    expect(page.locator("[name=side]")).to_have_count(0)
+    page.click("a:text-is('Set up https')")
+    expect(page.locator("h1")).to_contain_text("by https")

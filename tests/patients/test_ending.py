@@ -58,7 +58,7 @@ def test_today_stands_beside_last_time(world, patient):
     assert "You walked" in words
     assert "Today 7 of 10 Last time 4 of 10" in words
     assert "Last time 4 of 10 More often at the goal than last time." in words
-    assert "At the goal 5 steps in a row" in words
+    assert "Longest row at the goal 5 steps in a row" in words
     assert f"{day:%A} {day.day} {day:%B}, 14:15" in words
     assert "More often at the goal than last time." in words
 
@@ -148,7 +148,7 @@ def test_a_value_that_nothing_compares_with_has_no_bar(world, patient):
 def test_the_explicit_type_shows_values_and_no_verdict(world, patient):
     walk(patient, "explicit", [MISS] * 4, days_ago=7)
     words = read(world, walk(patient, "explicit", [HIT] * 4))
-    assert "Your push, on average Today 2.50 W/kg Last time 1.50 W/kg" in words
+    assert "pushed off, over all steps of this walk. Today 2.50 W/kg Last time 1.50 W/kg" in words
     assert "goal" not in words
     assert "of 10" not in words
 

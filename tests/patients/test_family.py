@@ -20,7 +20,7 @@ from rehab.patients.family import FamilyLink, FamilyLinkRefused, find_link, give
 from rehab.patients.pages import family as page
 from rehab.patients.visits import next_visit, plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
-from rehab.people.consent.models import Purpose
+from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
@@ -50,6 +50,15 @@ def agreed(world):
 
 def links_page(world):
     return reverse("family-links", kwargs={"patient_id": world.patient.pk})
+
+
+def test_who_was_not_asked_is_asked_from_the_patients_records(world):
+    asked = f'href="/patients/{world.patient.pk}/consent/">Ask now'
+    page = reverse("records", args=[world.patient.pk])
+    Consent.everywhere.filter(purpose=Purpose.FAMILY).delete()
+    assert asked in world.pt.get(page).content.decode()
+    record_consent(world.patient, Purpose.FAMILY, None, NOW)
+    assert asked not in world.pt.get(page).content.decode()
 
 
 def give(world, weeks=4, name="yes"):

@@ -12,7 +12,7 @@ from rehab.stations.models import Device, Station
 pytestmark = pytest.mark.django_db
 
 SENSOR = "/first-steps/?step=sensor"
-LINE = "Show the start command"
+LINE = "Make a new start command"
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.django_db
 def test_the_words_are_shown_before_they_are_agreed_to(world):
     page = client_of(world).get("/patients/new/").content.decode()
     words = current_text(world.clinic).text.split("\n")[0]
-    assert page.index(words[:40]) < page.index('name="agrees"')
+    assert page.index(words[:40]) < page.index('name="consent_care"')
 
 
 def test_the_paretic_side_is_chosen_and_never_proposed(world):

@@ -39,9 +39,15 @@ def test_who_is_late_is_not_proposed(pt, world, patient):
     page = pt.get("/start/")
     assert "late" in page.content.decode()
     assert "next" not in page.context
+    assert [row.patient for row in page.context["late"]] == [patient]
     later = make_patient(world.clinic, "Omar", code="K7-300")
     plan_visit(later, HERE.date(), (HERE + timedelta(hours=1)).time())
     assert pt.get("/start/").context["next"].patient == later
+
+
+def test_simulated_patients_are_last(pt, world, patient):
+    walk(make_patient(world.clinic, "Demo", code="demo", simulated=True), "positive", [HIT])
+    assert pt.get("/start/").context["patients"][-1].nickname == "Demo"
 
 
 def test_the_last_sessions_are_listed_with_their_hits(pt, patient):

@@ -12,6 +12,7 @@ from rehab.boards.models import Leaderboard
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.consent.services import (
     active_consents,
+    answered_purposes,
     current_text,
     offered_purposes,
     publish_text,
@@ -158,7 +159,7 @@ def test_a_patient_whom_two_take_in_at_once_is_told_by_the_form(world, pt, monke
         Patient.everywhere.create(clinic=world.clinic, code="R1", nickname="Rosa")
 
     monkeypatch.setattr(Patient, "full_clean", be_slower)
-    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care"]}
+    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left"}
     page = pt.post(reverse("new-patient"), given)
     assert page.status_code == 200
     assert "Code R1 already exists: it is Rosa" in page.content.decode()
@@ -175,16 +176,16 @@ def test_the_demo_patient_is_one_and_takes_nobodys_code(world, pt):
     assert Patient.everywhere.filter(code="demo").count() == 1
 
 
-def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
-    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care", "boards"]}
-    assert pt.post(reverse("new-patient"), given).status_code == 302
+def test_the_new_patient_form_notes_each_answer_and_what_was_not_asked(world, pt):
+    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left"}
+    answers = {"consent_care": "yes", "consent_research": "no", "consent_boards": "total"}
+    assert pt.post(reverse("new-patient"), given | answers).status_code == 302
     rosa = Patient.everywhere.get(code="R1")
     assert set(active_consents(rosa)) == {"care", "boards"}
-    assert rosa.boards == BoardsConsent.CLINIC
-    given |= {"code": "R2"}
-    del given["agrees"]
-    pt.post(reverse("new-patient"), given)
-    assert not active_consents(Patient.everywhere.get(code="R2"))
+    assert answered_purposes(rosa) == {"care", "boards", "research"}
+    assert rosa.boards == BoardsConsent.TOTAL
+    pt.post(reverse("new-patient"), given | {"code": "R2"})
+    assert not answered_purposes(Patient.everywhere.get(code="R2"))
 
 
 # --- boards ---------------------------------------------------------------------------------------

@@ -152,6 +152,7 @@ def test_what_is_left_out_is_in_no_board_trend_week_or_paper_and_comes_back(worl
     assert "1 session left out of these figures by a correction." in page
     own = client_of(world).get(reverse("scores", args=[good.pk])).content.decode()
     assert "100\N{NO-BREAK SPACE}%" not in own
+    assert "not computed" in client_of(world).get(f"/sessions/{bad.pk}/details/").content.decode()
     correct(world, bad, counts="yes")
     assert figures() == before
     assert log_of(bad) == log

@@ -93,6 +93,7 @@ def test_pain_and_what_else_happened_is_pointed_out(client, patient):
     assert [(mark["after"], mark["kind"]) for mark in marks] == [(2, "pain"), (3, "rest")]
     played = words(client.get(reverse("replay", args=[session.pk])).content.decode())
     assert "Pain 3 of 10" in marks[0]["words"]
+    assert 'class="badge warn">Pain 3 of 10' in detail(client, session)
     assert played.index("Started") < played.index(marks[0]["words"]) < played.index("Finished")
 
 

@@ -398,3 +398,19 @@ def test_a_taken_station_leads_to_its_session(pt, patient, station):
     page = pt.post(f"/patients/{patient.pk}/new/", choices(station)).content.decode()
     problem = re.search(r'<div class="wrong\b.*?</div>', page, re.DOTALL)[0]
     assert f'href="/sessions/{newest().pk}/monitor/"' in problem
+
+
+def test_it_says_what_ends_a_walk(pt, patient):
+    page = pt.get(f"/patients/{patient.pk}/new/")
+    ends = {str(row): page.context["ends"][row.pk] for row in Protocol.everywhere.all()}
+    assert ends["Training only"] == "You end the walk; the minutes are your plan."
+    told = "The protocol ends the walk: 10 min of training, 13 min in all."
+    assert ends["Baseline, training, washout"].replace("\N{NO-BREAK SPACE}", " ") == told
+
+
+def test_one_open_session_alone_is_shown_on_its_own_page(pt, patient):
+    session = make_session(patient)
+    assert (
+        pt.get(f"/sessions/two/?of={session.pk}").headers["Location"]
+        == f"/sessions/{session.pk}/monitor/"
+    )

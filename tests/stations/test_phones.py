@@ -27,7 +27,10 @@ pytestmark = pytest.mark.django_db
 
 def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     station = world.add_station()
-    assert "Show the QR code" in pt.get("/phones/pair/").content.decode()
+    assert "Show the QR code" in pt.get("/phones/pair/", secure=True).content.decode()
+    refused = pt.get("/phones/pair/").content.decode()
+    assert "Show the QR code" not in refused
+    assert 'href="/https/"' in refused
     wish = {"station": station.pk, "side": "left"}
     answer = pt.post("/phones/pair/", wish)
     assert "no-store" in answer.headers["Cache-Control"]

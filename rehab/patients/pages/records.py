@@ -13,11 +13,11 @@ from django.views.decorators.http import require_POST, require_safe
 
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase
-from rehab.patients.family import open_links, refusal_reason
+from rehab.patients.family import NOT_AGREED, open_links, refusal_reason
 from rehab.patients.forms import EndProgramForm, ErasureForm
 from rehab.people.access import for_roles, get_patient, user_of
 from rehab.people.consent.models import Purpose
-from rehab.people.consent.services import active_consents, answered_purposes, offered_purposes
+from rehab.people.consent.services import active_consents, answered_purposes, unasked_purposes
 from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
@@ -41,10 +41,9 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
         "patient": patient,
         "consents": [each.label for each in Purpose if each in given],
         "refused": [each.label for each in Purpose if each in answered - given.keys()],
-        "unasked": []
-        if patient.erased_at
-        else [each.label for each in offered_purposes(patient.clinic) if each not in answered],
+        "unasked": [] if patient.erased_at else [each.label for each in unasked_purposes(patient)],
         "family_refusal": refusal_reason(patient),
+        "may_ask_family": refusal_reason(patient) == str(NOT_AGREED),
         "family_links": open_links(patient, timezone.now()).count(),
         "count": sessions.count(),
         "may_erase": user.role == Role.LEAD,

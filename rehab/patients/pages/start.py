@@ -19,7 +19,7 @@ from rehab.patients.pages.first_steps import list_first_steps
 from rehab.patients.screen_check import LETTERS, propose
 from rehab.patients.visits import QUICK_VISIT_DAYS, Progress, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
-from rehab.people.consent.services import current_text
+from rehab.people.consent.services import current_text, unasked_purposes
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.people.simulated import counted
@@ -38,6 +38,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
 from rehab.sessions.reports.day.today import IS_OPEN
 from rehab.sessions.reports.remarks import load_noted
+from rehab.sessions.reports.summary import load_point
 from rehab.sessions.reports.trend import load_trend, summarize_trend, with_metrics
 from rehab.sessions.spark import draw_spark
 from rehab.stations.builtin import first_station
@@ -51,11 +52,11 @@ DEMO_CODE = "demo"
 
 
 def patients_by_last_visit(user: User) -> QuerySet[Patient]:
-    """Return the patients of a user's clinic, the most recent session first."""
+    """Return a clinic's patients, the most recent session first, simulated ones last."""
     return (
         Patient.objects.visible_to(user)
         .annotate(last_here=Max("sessions__created_at"), count=Count("sessions"))
-        .order_by("-last_here", "-created_at")
+        .order_by("simulated", "-last_here", "-created_at")
     )
 
 
@@ -98,8 +99,18 @@ def begin_context(user: User, patient: Patient) -> dict[str, Any]:
         "last": initial,
         "is_repeated": last is not None,
         "last_goal": format_quantity(last.goal, last.measure.unit) if last and last.goal else "",
+        "first_goal": _first_goal(user, last, initial),
         "has_tablet": has_tablet(initial["station"], timezone.now()),
     }
+
+
+def _first_goal(user: User, last: TrainingSession | None, initial: dict[str, Any]) -> str:
+    """Return what the proposed share of the baseline was in the last session; "" if unknown."""
+    point = load_point(user, last) if last else None
+    percent = initial["goal_percent"]
+    if last is None or point is None or point.baseline is None or not percent:
+        return ""
+    return format_quantity(point.baseline.mean * float(percent) / 100, last.measure.unit)
 
 
 def load_progress(user: User, patient: Patient, now: datetime) -> dict[str, Any] | None:
@@ -164,8 +175,9 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     context["lately"] = load_last_walked(user, context["now"])
     coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
     context["is_over"] = context["today"] and all(row.is_missed for row in coming)
+    context["late"] = [row for row in coming if row.is_late and not row.is_missed]
     following = next((row for row in coming if not row.is_late), None)
-    if following is not None:  # who is late may not come: one tap in the list, when they do
+    if following is not None:  # who is late may not come: two taps, when they do
         context |= {"next": following} | begin_context(user, following.patient)
     return render(request, "patients/start.html", context)
 
@@ -201,6 +213,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
             if days or row is None
         ],
         "at": suggested_time(user, patient, lists["now"]),
+        "not_asked": [] if patient.simulated else unasked_purposes(patient),
     }
     return render(request, "patients/start.html", context)
 

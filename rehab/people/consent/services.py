@@ -8,8 +8,8 @@ from typing import Any
 from django.db import transaction
 from django.db.models import Q
 from django.dispatch import Signal
+from django.utils.translation import gettext, override
 from django.utils.translation import gettext_lazy as _
-from django.utils.translation import override
 
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
@@ -40,14 +40,22 @@ DEFAULT_TEXT = (
     ),
     REMOTE_VIEW_TEXT,
     _(
-        "Family view: people whom you choose see on a page of their own when you walked, how many "
-        "steps reached your goal, and your next visit, until the link ends."
+        "Family view: people whom you choose see on a page of their own, until the link ends, on "
+        "which days you walked and for how many minutes, how many steps reached your goal, your "
+        "points, how your last sessions compare with those before, and your next visit."
     ),
     _(
         "You may say no to any of these, and change your mind at any time. Your care does not "
         "depend on research, boards or family view."
     ),
 )
+
+LEVELS = {
+    BoardsConsent.CLINIC: _("Yes, in this clinic"),
+    BoardsConsent.ACROSS: _("Yes, in all clinics"),
+    BoardsConsent.TOTAL: _("Yes, in totals only"),
+    BoardsConsent.OWN: _("No"),
+}
 
 
 def _is_included(clinic: Clinic, paragraph: Any) -> bool:
@@ -92,6 +100,12 @@ def answered_purposes(patient: Patient) -> set[str]:
 def offered_purposes(clinic: Clinic) -> list[Purpose]:
     """Return what a clinic asks for: remote view only where it has named its own networks."""
     return [purpose for purpose in Purpose if clinic.networks or purpose is not Purpose.REMOTE]
+
+
+def unasked_purposes(patient: Patient) -> list[Purpose]:
+    """Return what a clinic asks for and a patient has answered neither way."""
+    answered = answered_purposes(patient)
+    return [purpose for purpose in offered_purposes(patient.clinic) if purpose not in answered]
 
 
 def is_remote_view_allowed(patient: Patient, address: str) -> bool:
@@ -167,6 +181,29 @@ def record_refusal(patient: Patient, purpose: Purpose, by: User | None, now: dat
                 withdrawn_at=now,
                 withdrawn_by=by,
             )
+
+
+def list_answers(purpose: Purpose, is_across: bool) -> list[tuple[str, str]]:
+    """Return the answers to a purpose, each a value and its label; ``is_across``: all clinics'."""
+    if purpose != Purpose.BOARDS:
+        return [("yes", gettext("Yes")), ("no", gettext("No"))]
+    return [
+        (level.value, str(label))
+        for level, label in LEVELS.items()
+        if is_across or level != BoardsConsent.ACROSS
+    ]
+
+
+def record_answer(
+    patient: Patient, purpose: Purpose, answer: str, by: User | None, now: datetime
+) -> None:
+    """Record one of the answers to a purpose."""
+    if purpose == Purpose.BOARDS:
+        record_boards_consent(patient, BoardsConsent(answer), by, now)
+    elif answer == "yes":
+        record_consent(patient, purpose, by, now)
+    else:
+        record_refusal(patient, purpose, by, now)
 
 
 def record_boards_consent(

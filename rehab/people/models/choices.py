@@ -16,8 +16,8 @@ class ScreenSide(models.TextChoices):
     RIGHT = "right", _("on the right (usual)")
     LEFT = "left", _("on the left")
     CENTER = "center", _("everything in the middle")
-    IN_RIGHT = "in_right", _("everything in the right half, Pause and Stop as well")
-    IN_LEFT = "in_left", _("everything in the left half, Pause and Stop as well")
+    IN_RIGHT = "in_right", _("everything in the right half")
+    IN_LEFT = "in_left", _("everything in the left half")
 
 
 class ScreenText(models.TextChoices):

@@ -21,11 +21,10 @@ from rehab.people.consent.services import (
     answered_purposes,
     current_text,
     is_care_allowed,
+    list_answers,
     offered_purposes,
     publish_text,
-    record_boards_consent,
-    record_consent,
-    record_refusal,
+    record_answer,
 )
 from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.roles import Role
@@ -39,12 +38,6 @@ MEANINGS = {
     Purpose.REMOTE: gettext_lazy("A therapist may watch a session from another place."),
     Purpose.FAMILY: gettext_lazy("People whom the patient chooses see how the training is going."),
 }
-LEVELS = {
-    BoardsConsent.CLINIC: gettext_lazy("Yes, in this clinic"),
-    BoardsConsent.ACROSS: gettext_lazy("Yes, in all clinics"),
-    BoardsConsent.TOTAL: gettext_lazy("Yes, in totals only"),
-    BoardsConsent.OWN: gettext_lazy("No"),
-}
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -55,11 +48,9 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     patient = get_patient(user, patient_id)
     if request.method == "POST" and patient.erased_at is None:
         purpose, answer = request.POST.get("purpose"), request.POST.get("answer", "")
-        if purpose == Purpose.BOARDS and answer in BoardsConsent.values:
-            record_boards_consent(patient, BoardsConsent(answer), user, timezone.now())
-        elif answer in ("yes", "no") and purpose in _listed_purposes(patient):
-            change = record_consent if answer == "yes" else record_refusal
-            change(patient, Purpose(purpose), user, timezone.now())
+        answers = BoardsConsent.values if purpose == Purpose.BOARDS else ("yes", "no")
+        if answer in answers and purpose in _listed_purposes(patient):
+            record_answer(patient, Purpose(purpose), answer, user, timezone.now())
         else:
             messages.error(request, _("That cannot be chosen. Tap one of the answers."))
         return redirect("consent", patient_id=patient.pk)
@@ -119,13 +110,13 @@ def list_choices(patient: Patient) -> list[dict[str, Any]]:
         if purpose == Purpose.BOARDS:
             now = patient.boards if consent else BoardsConsent.OWN
             across = patient.clinic.boards_across or now == BoardsConsent.ACROSS
-            options = [
-                (level.value, str(label), level == now and (consent is not None or is_refused))
-                for level, label in LEVELS.items()
-                if across or level != BoardsConsent.ACROSS
-            ]
         else:
-            options = [("yes", _("Yes"), consent is not None), ("no", _("No"), is_refused)]
+            now, across = "yes" if consent else "no", False
+        is_answered = consent is not None or is_refused
+        options = [
+            (value, label, value == now and is_answered)
+            for value, label in list_answers(purpose, across)
+        ]
         choices.append(
             {
                 "purpose": purpose,

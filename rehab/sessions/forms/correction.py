@@ -105,7 +105,7 @@ class CorrectionForm(forms.Form):
         """The fields as the page has them; they are cleaned with the patient first, whose name the
         others refuse.
         """
-        return [self[name] for name in ("counts", "patient", "note", "reason")]
+        return [self[name] for name in ("counts", "reason", "patient", "note")]
 
     @property
     def counts_initial(self) -> str:

@@ -53,6 +53,7 @@ class AssessmentForm(forms.Form):
             label=_("Walking aid, orthosis, help (if any)"),
             required=False,
             max_length=MAX_DEVICE_LETTERS,
+            widget=forms.TextInput(attrs={"form": "result"}),  # over the timer, before Go
         )
 
     def clean(self) -> dict[str, Any]:
@@ -182,6 +183,7 @@ def assess(request: HttpRequest, patient_id: int, slug: str) -> HttpResponse:
         "test": test,
         "course": course,
         "form": form,
+        "asked": [field for field in form if field.name != "device" or test.way in SCORED],
         "warning": STOP_AT_ONCE if STOP_AT_ONCE in test.steps else "",
         "steps": [step for step in test.steps if step != STOP_AT_ONCE],
         "has_timer": test.way not in SCORED,

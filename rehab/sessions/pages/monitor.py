@@ -104,7 +104,8 @@ def write_note(request: HttpRequest, session_id: int) -> JsonResponse:
 def show_side_by_side(request: HttpRequest) -> HttpResponse:
     """Show the pages of two open sessions at once, each with its own Stop.
 
-    ``of``: their keys; else the two that were set up last, at two stations.
+    ``of``: their keys; else the two that were set up last, at two stations. One alone is shown on
+    its own page.
     """
     states = [state.value for state in OPEN_STATES]
     rows = TrainingSession.objects.visible_to(user_of(request)).filter(state__in=states)
@@ -116,6 +117,8 @@ def show_side_by_side(request: HttpRequest) -> HttpResponse:
     for session in rows:
         shown.setdefault(session.station_id, session)
     two = sorted(list(shown.values())[:2], key=lambda session: str(session.station))
+    if len(two) == 1:
+        return redirect("monitor", session_id=two[0].pk)
     shown_here = "?" + "&".join(f"but={session.pk}" for session in two)
     context = {"sessions": two, "alarms_elsewhere": shown_here if two else ""}
     return render(request, "sessions/side_by_side.html", context)

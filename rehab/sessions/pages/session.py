@@ -28,6 +28,7 @@ from rehab.sessions.forms.correction import CorrectionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.reports.answers import list_answers
+from rehab.sessions.reports.remarks import read_noted
 from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import (
     format_incidents,
@@ -64,8 +65,10 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     by_name = may_see_names(user.role)
     start = clinic_time(session.began_at, session.clinic)
     now = clinic_time(timezone.now(), session.clinic)
+    noted = read_noted(review.rows)
     context = {
         "session": session,
+        "noted": dict.fromkeys(one.words for one in noted if one.is_adverse),
         "by_name": by_name,
         "who": session.patient.nickname if by_name else session.patient.pseudonym,
         "day": capfirst(format_day(start.date(), now.date())),
@@ -79,7 +82,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "text": write_text_note(user, session, review, note) if by_name else "",
         "review": review,
         "incidents": _list_incidents(user, session) if by_name else [],
-        "figures": [summary.hit_rate, *([mean] if mean.value != MISSING else [])],
+        "figures": [summary.hit_rate, *([mean] if mean.value != MISSING or mean.note else [])],
         "facts": [
             (summary.goal, " "),
             (summary.duration, ", "),

@@ -25,7 +25,11 @@ from rehab.sessions.setup.option import Group
 from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
-from rehab.sessions.setup.protocol_outline import outline_protocol, protocol_minutes
+from rehab.sessions.setup.protocol_outline import (
+    describe_end,
+    outline_protocol,
+    protocol_minutes,
+)
 from rehab.sessions.setup.sources import SIMULATED
 from rehab.stations.builtin import first_station
 from rehab.stations.tablets import has_tablet
@@ -81,6 +85,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         for row in protocols
     }
     outlines = {row.pk: outline_protocol(row) for row in protocols}
+    ends = {row.pk: describe_end(row) for row in protocols}
     sources, tried = _part_sources(form)
     last = last_session(patient, user)
     same = last if last and last.measure.slug == measure.slug else None  # by the same measure
@@ -102,6 +107,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         "form": form,
         "valences": valences_of(patient.clinic_id).values(),
         "targets": targets,
+        "ends": ends,
         "measure": measure,
         "goal_format": f"{measure.goal_places}u",
         "measures": {

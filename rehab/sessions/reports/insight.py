@@ -194,8 +194,8 @@ KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked],
         lambda one: f"{one.session.patient.nickname} ({one.session.patient.code})",
     ),
     "speed": _by_band(_("Belt speed"), Remark.BELT_SPEED, 0.2, "m/s"),
-    "support": _by_band(_("Support"), Remark.WEIGHT_SUPPORT, 10, "%"),
-    "help": (_("Assistance"), _name_help, _name_help),
+    "support": _by_band(_("Body-weight support"), Remark.WEIGHT_SUPPORT, 10, "%"),
+    "help": (_("Help by hand or aid"), _name_help, _name_help),
 }
 
 

@@ -76,7 +76,15 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
         is_push = plan.measure.slug == A2.slug
         title = _("Your push, on average") if is_push else _("Your value, on average")
         bars = draw_means(labeled, plan.measure.unit)
-        return {"title": title, "bars": bars, "facts": [], "sentence": "", "earned": earned}
+        meaning = _("How strongly your foot pushed off, over all steps of this walk.")
+        return {
+            "title": title,
+            "meaning": meaning if is_push else "",
+            "bars": bars,
+            "facts": [],
+            "sentence": "",
+            "earned": earned,
+        }
     return {
         "title": _("Steps at the goal"),
         "bars": [
@@ -127,7 +135,7 @@ def _find_facts(
     if rewards and row and row > 1:
         earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
         words = ngettext("%(count)s step in a row", "%(count)s steps in a row", round(row))
-        label = _("Longest so far") if earlier and row > earlier else _("At the goal")
+        label = _("Longest so far") if earlier and row > earlier else _("Longest row at the goal")
         facts.append((label, words % {"count": format_number(row, 0)}))
     count = before.count() + 1
     if is_milestone(count):

@@ -93,7 +93,8 @@ def load_point(user: User, session: TrainingSession) -> TrendPoint | None:
 def format_mean(session: TrainingSession, point: TrendPoint | None) -> Figure:
     """Return the mean of the phases with feedback, beside its baseline."""
     if point is None or point.with_feedback is None:
-        return Figure(_("Mean with feedback"), MISSING, "")
+        why = _("not computed: this session is left out") if session.excluded else ""
+        return Figure(_("Mean with feedback"), MISSING, why)
     change = _("no baseline")
     if point.baseline:
         values = {

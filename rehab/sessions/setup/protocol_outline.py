@@ -55,6 +55,18 @@ def protocol_minutes(protocol: Protocol | None) -> int | None:
     return math.ceil(sum(known) / 60) or None if len(known) == len(lengths) else None
 
 
+def describe_end(protocol: Protocol) -> str:
+    """Return what ends a walk by a protocol, in the active language."""
+    minutes = protocol_minutes(protocol)
+    if minutes is None:
+        return gettext("You end the walk; the minutes are your plan.")
+    trained = sum(phase_length_s(one) or 0 for one in protocol.to_rules() if one.kind == "training")
+    return gettext("The protocol ends the walk: %(trained)s of training, %(all)s in all.") % {
+        "trained": format_duration(trained),
+        "all": format_duration(60 * minutes),
+    }
+
+
 def outline_protocol(protocol: Protocol) -> Outline:
     """Return what a protocol's choice shows, in the active language."""
     phases = protocol.to_rules()

@@ -103,6 +103,15 @@ export class Marks {
     return this.ctx.measureText(content).width;
   }
 
+  // Draw text from above to below.
+  upright(content, x, y) {
+    this.ctx.save();
+    this.ctx.translate(x, y);
+    this.ctx.rotate(Math.PI / 2);
+    this.text(content, 4 * this.unit, 0, { size: 13, align: "left" });
+    this.ctx.restore();
+  }
+
   widthOf(content, size = 14) {
     this.ctx.font = `700 ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
     return this.ctx.measureText(content).width;

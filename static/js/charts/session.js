@@ -56,7 +56,7 @@ function drawPhases(marks) {
       const fill = color("text");
       const from = { align: "left", weight: 700, fill };
       marks.text(phase.name, left + 7 * marks.unit, 26 * marks.unit, from);
-    }
+    } else if (right - left > 18 * marks.unit) marks.upright(phase.name, left + 5 * marks.unit, box.top);
   }
 }
 

@@ -12,9 +12,9 @@ function days(labels, element) {
     xAxis: {
       space: narrow ? 62 : 76,
       incrs: [1, 2, 5, 10],
-      // Counted from the last session, which always has its day.
+      // Counted from the last session, which always has its day, as the first one has.
       splits: (_, axis, low, high, step) =>
-        [...labels.keys()].filter((index) => (labels.length - 1 - index) % step === 0),
+        [...labels.keys()].filter((index) => !index || (index >= step && (labels.length - 1 - index) % step === 0)),
       values: (_, ticks) => ticks.map((tick) => labels[tick] ?? ""),
     },
     padding: [18, narrow ? 4 : 30, 0, 0],

@@ -18,10 +18,11 @@ function lengths({ phases, target }) {
   return known.map((length) => length ?? Math.max(OPEN_S, rest / open));
 }
 
-// Return how far the phase at hand has come, 0 to 1, and what is left of it.
+// Return how far the phase at hand has come, 0 to 1, and what is left of it in words.
 function progress({ phase: { seconds, strides }, phase_s, phase_strides }, length) {
-  if (seconds) return [phase_s / seconds, clock(Math.max(0, seconds - phase_s))];
-  if (strides) return [phase_strides / strides, String(Math.max(0, strides - phase_strides))];
+  if (seconds) return [phase_s / seconds, fill(_("%(left)s left"), { left: clock(Math.max(0, seconds - phase_s)) })];
+  const count = Math.max(0, strides - phase_strides);
+  if (strides) return [phase_strides / strides, fill(_("strides left: %(count)s"), { count })];
   return [phase_s / length, ""];
 }
 
@@ -46,7 +47,7 @@ export function createPhaseBar(list) {
     }
     [...list.children].forEach((item, index) => {
       const isNow = index === phase.index;
-      const text = isNow && left ? fill(_("%(phase)s · %(left)s left"), { phase: phaseName(phase.name), left }) : "";
+      const text = isNow && left ? `${phaseName(phase.name)} · ${left}` : "";
       const isHeld = isNow && session.state === "paused" && (session.fall_seen || hasFallen(session));
       const label = isHeld ? _("Paused") : text || phaseName(phases[index].name);
       if (item.textContent !== label) item.textContent = label;

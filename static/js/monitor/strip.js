@@ -11,7 +11,8 @@ const SPACING = 4; // pixels between strides, at least
 const FEWEST = 30; // strides that the width is made for
 const LETTER = 8; // pixels
 const AXIS = 18; // pixels, for the minutes
-const HEAD = 30; // pixels above the scale, for flags and names of phases
+const HEAD = 30; // pixels above the scale, for flags
+const NAMES = 16; // pixels more, for names of phases
 const LANE = 20; // pixels below the scale, for strides that were not measured
 const MINUTE_S = 60;
 
@@ -74,7 +75,7 @@ export function drawStrip(svg, strides, annotations, session) {
   const starts = [...shown.keys()].filter(
     (index) => index && shown[index].phase !== undefined && shown[index].phase !== shown[index - 1].phase,
   );
-  const top = annotations.length || starts.length ? HEAD : 10;
+  const top = starts.length ? HEAD + NAMES : annotations.length ? HEAD : 10;
   const floor = height - AXIS;
   const { range, isJudged, valueOf, lines } = scaleOf(shown, strides, session);
   const x = (index) => 56 + index * dx;

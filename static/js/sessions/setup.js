@@ -48,8 +48,12 @@ document.querySelector("select[name=measure]")?.addEventListener("change", ({ ta
 
 // A protocol whose phases all have an end sets the minutes, and one that asks for a share of hits that share.
 const targets = JSON.parse(document.getElementById("targets").textContent);
+const ends = JSON.parse(document.getElementById("ends").textContent);
 for (const choice of document.querySelectorAll("input[name=protocol]")) {
+  const showEnd = () => (document.querySelector("[data-ends]").textContent = ends[choice.value]);
+  if (choice.checked) showEnd();
   choice.addEventListener("change", () => {
+    showEnd();
     for (const [name, value] of Object.entries(targets[choice.value])) {
       if (value) document.querySelector(`input[name=${name}]`).value = value;
     }

@@ -9,11 +9,16 @@ const FIELDS = ["suggested_goal", "wanted_hit_rate", "is_strained", "baseline"];
 
 export function createGoalCoach({ show, onPress, change }) {
   const line = document.querySelector(".coach");
-  const button = line.querySelector("button");
+  const [button, keep] = line.querySelectorAll("button");
+  let declined = ""; // a suggestion that the therapist does not want, to that goal
   const mode = document.querySelector("[data-adaptation]");
 
   mode.addEventListener("change", () => change("goal_adaptation", mode.value));
   onPress("[data-coach]", (_button, session) => change("goal", session.suggested_goal));
+  onPress("[data-keep]", (_button, session) => {
+    declined = `${session.goal} ${session.suggested_goal}`;
+    line.hidden = true;
+  });
 
   function describeBaseline({ baseline: { mean, sd, count, needed, goal, asks }, unit }) {
     if (mean === null) return "";
@@ -35,7 +40,7 @@ export function createGoalCoach({ show, onPress, change }) {
     goal: now,
   }) {
     if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
-    if (goal === null || now === null || goal === now) return "";
+    if (goal === null || now === null || goal === now || declined === `${now} ${goal}`) return "";
     const text =
       goal < now
         ? _("Lower the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.")
@@ -52,7 +57,10 @@ export function createGoalCoach({ show, onPress, change }) {
       line.hidden = !(text || suggestion);
       show("coach", text || suggestion);
       button.hidden = !suggestion || Boolean(text) || session.suggested_goal === null;
-      button.textContent = !button.hidden ? fill(_("Set %(goal)s"), { goal: number(session.suggested_goal, 2) }) : "";
+      keep.hidden = button.hidden;
+      if (button.hidden) return;
+      button.textContent = fill(_("Set %(goal)s"), { goal: number(session.suggested_goal, 2) });
+      keep.textContent = fill(_("Keep %(goal)s"), { goal: number(session.goal, 2) });
     },
     events: {
       step: (session, event) => update(session, event, FIELDS),
