@@ -32,7 +32,7 @@ NAMES = (
     (_("Correct a session"), "correct"),
     (_("Enroll a patient"), "enroll"),
     (_("Family view"), "family family-links end-family-link"),
-    (_("For the patient"), "take-home"),
+    (_("Take-home page"), "take-home"),
     (_("Hit rates compared"), "insight insight-file"),
     (_("Incidents"), "incidents incident incident-file"),
     (_("Leaderboards"), "scores leave-boards waiting-board"),
