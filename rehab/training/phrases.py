@@ -95,7 +95,7 @@ REACHED = join(
 )
 
 STRONG = join(
-    gettext_noop("Above the goal!"),
+    gettext_noop("Above goal!"),
     gettext_noop("What a step!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
@@ -140,7 +140,7 @@ FAR_BELOW = join(
 )
 
 BELOW = join(
-    gettext_noop("Below the goal."),
+    gettext_noop("Below goal."),
     gettext_noop("Under the goal."),
     gettext_noop("Just below."),
     gettext_noop("A little below."),

@@ -161,8 +161,8 @@ def test_a_session_from_start_to_scores(server, browser):
         with feet_of(server, walk) as feet:
             looks(page, "begin", "Start walking.")
             feet.walk(1.0, 1.1)
-            looks(page, "feedback", "Above the goal!")
-            assert page.locator(".said").text_content() == "Above the goal. Plus 1. 2 points."
+            looks(page, "feedback", "Above goal!")
+            assert page.locator(".said").text_content() == "Above goal. Plus 1. 2 points."
             page.click("button.pause")
             looks(page, "paused", "Pause.")
             assert page.evaluate(TOO_SMALL) == []
@@ -173,7 +173,7 @@ def test_a_session_from_start_to_scores(server, browser):
             page.click("text=No, go back")
             looks(page, "paused")
             page.click("text=Resume")
-            looks(page, "feedback", "Above the goal!")
+            looks(page, "feedback", "Above goal!")
             feet.walk(1.2, 1.0, 1.0)
             looks(page, "calm", "Just walk as you usually do.")
             assert page.evaluate(TOO_SMALL) == []

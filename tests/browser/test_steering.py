@@ -148,7 +148,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
         feet.hear("start")
         feet.walk(1.15)
         at_step(tablet, 1)
-        expect(tablet.locator(".words")).to_have_text("Above the goal!")
+        expect(tablet.locator(".words")).to_have_text("Above goal!")
 
         expect(admin.locator(".feedback-types tbody tr")).to_have_count(4)
         admin.get_by_role("link", name="Edit Positive").click()
@@ -177,7 +177,7 @@ def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, 
         expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("default")
         feet.walk(1.15)
         at_step(tablet, 3)
-        expect(tablet.locator(".words")).to_have_text("Above the goal!")
+        expect(tablet.locator(".words")).to_have_text("Above goal!")
 
 
 def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):

@@ -96,13 +96,13 @@ def test_back_to_the_defaults_brings_the_usual_words_back(world, pt):
     row = FeedbackType.everywhere.get(slug="positive")
     answer = pt.post(reverse("admin:rehab_feedbacktype_delete", args=[row.pk]), {"post": "yes"})
     assert answer.status_code == 302
-    assert words_now(session) == "Above the goal!"
+    assert words_now(session) == "Above goal!"
 
 
 def test_another_clinic_keeps_its_words(world, pt):
     theirs = begin(build_world("birch"))
     pt.post(f"{ADD}?slug=positive", form())
-    assert words_now(theirs) == "Above the goal!"
+    assert words_now(theirs) == "Above goal!"
 
 
 def test_a_session_of_another_process_keeps_its_words_and_the_admin_says_so(world, pt):

@@ -20,7 +20,7 @@ const TWO = 2.02; // lines, with what is lost by rounding
 const EDGE = 24; // of the screen
 const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
-const BADGE_LEAST = 170;
+const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 260; // of the thermometer
@@ -28,7 +28,7 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_BESIDE = 36; // more than AIR, above and below the goal, where its sign is there
+const SIGN_BESIDE = 40; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -109,7 +109,9 @@ export function createFitting(body, scene) {
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + air;
     const beside = isBelow || isAbove ? 0 : total;
-    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    // The badge is above the total, behind the goal's sign and the total's name.
+    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + key.offsetHeight / u);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;

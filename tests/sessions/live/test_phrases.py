@@ -35,4 +35,4 @@ async def test_a_plan_may_fix_the_phrase_of_a_band(place, sourced):
     await source.walk(3.4, 3.4, 3.4)
     await tablet.until_step(3)
     said = {event["words"] for event in tablet.events if event["kind"] == "step"}
-    assert said == {"Above the goal!"}
+    assert said == {"Above goal!"}
