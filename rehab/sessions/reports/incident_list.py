@@ -32,16 +32,19 @@ RESUMES = {ChangeKind.START.value, ChangeKind.RESUME.value}
 class Entry:
     """One of them, as text; ``at`` by the clinic's clock.
 
-    ``hurt``: how badly, by a fall, or that nobody said. ``done``: who noted it and what was done.
-    ``is_one``: nobody took it back.
+    ``hurt``: how badly, by a fall. ``waited`` and ``seen_by``: how long it took until whom saw it;
+    else ``then`` says what followed. ``is_one``: nobody took it back.
     """
 
     kind: str
     session: TrainingSession
     at: datetime
     what: str
-    done: str
-    hurt: str = ""
+    hurt: str
+    noted_by: str
+    then: str = ""
+    waited: str = ""
+    seen_by: str = ""
     is_open: bool = False
     is_one: bool = True
 
@@ -85,25 +88,26 @@ def _from_incident(user: User, incident: Incident) -> Entry:
         else gettext("The robot of %(name)s stopped by itself.")
     )
     hurt = gettext("not said") if is_fall and incident.was_one else ""
-    done = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
+    if incident.severity is not None:
+        hurt = str(incident.severity.label)
+    then = waited = seen_by = ""
     if not incident.was_one:
-        done = gettext("it was not a fall")
-    elif ended is not None:
-        seen = {
-            "time": f"{clinic_time(ended.at, clinic):%H:%M}",
-            "wait": format_duration(max((ended.at - raised.at).total_seconds(), 0.0)),
-            "who": ended.by or "–",
-        }
-        done = gettext("seen %(time)s, after %(wait)s, by %(who)s") % seen
-    if is_fall and ended is not None:
-        done = _with_who_noted(raised, done)
+        then = gettext("it was not a fall")
+    elif ended is None:
+        then = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
+    else:
+        waited = format_duration(max((ended.at - raised.at).total_seconds(), 0.0))
+        seen_by = str(ended.by or "–")
     return Entry(
         kind=raised.kind,
         session=raised.session,
         at=clinic_time(raised.at, clinic),
         what=what % {"name": raised.session.patient.nickname},
-        done=capfirst(done),
-        hurt=capfirst(hurt if incident.severity is None else str(incident.severity.label)),
+        hurt=capfirst(hurt),
+        noted_by=str(raised.by or "–") if is_fall else "–",
+        then=capfirst(then),
+        waited=waited,
+        seen_by=seen_by,
         is_open=ended is None,
         is_one=incident.was_one,
     )
@@ -130,7 +134,9 @@ def _list_remarks(user: User, since: datetime) -> list[Entry]:
             session=one.event.session,
             at=clinic_time(one.at, clinic),
             what=f"{one.event.session.patient.nickname}: {one.words}",
-            done=capfirst(_find_answer(one.event, of_session[one.event.session_id], user)),
+            hurt="",
+            noted_by=str(one.event.by or "–"),
+            then=capfirst(_find_answer(one.event, of_session[one.event.session_id], user)),
         )
         for one in noted
         if one.is_adverse
@@ -138,7 +144,7 @@ def _list_remarks(user: User, since: datetime) -> list[Entry]:
 
 
 def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: User) -> str:
-    """Return who noted a remark, and what became of the walk after it."""
+    """Return what became of the walk after a remark."""
     clinic = clinic_of(user)
     before = [one for one in course if one.pk < remark.pk and one.kind in PAUSES | RESUMES]
     after = [
@@ -147,16 +153,8 @@ def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: Use
         if one.pk > remark.pk and one.kind in ANSWERS and one.at - remark.at <= ANSWERED_WITHIN
     ]
     if before and before[-1].kind in PAUSES:
-        done = gettext("during a pause")
-    elif after:
+        return gettext("during a pause")
+    if after:
         what, at = EVENTS[after[0].kind], clinic_time(after[0].at, clinic)
-        done = gettext("then: %(what)s, %(time)s") % {"what": what, "time": f"{at:%H:%M}"}
-    else:
-        done = gettext("walked on")
-    return _with_who_noted(remark, done)
-
-
-def _with_who_noted(event: SessionEvent, done: str) -> str:
-    if event.by is None:
-        return done
-    return f"{gettext('noted by %(who)s') % {'who': event.by}} · {done}"
+        return gettext("then: %(what)s, %(time)s") % {"what": what, "time": f"{at:%H:%M}"}
+    return gettext("walked on")
