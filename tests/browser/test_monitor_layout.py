@@ -115,12 +115,8 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
         nothing_overlaps_below_three_alarms(monitor)
     monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
     safety_is_within_reach(monitor)
-    for question in ("[data-end]", "[data-remark=borg]", "[data-fall]"):
+    for question in ("[data-end]", "[data-remark=borg]"):
         monitor.click(question)
-        if question == "[data-fall]":
-            safety_is_within_reach(monitor)
-            assert cut(monitor, "[data-alarm=fall], [data-alarm=fall] *") == []
-            monitor.click("[data-alarm=fall] .seen")
         expect(monitor.locator("dialog[open]")).to_be_visible()
         safety_is_within_reach(monitor)
         assert complaints(monitor, "dialog[open] button", 44) == []
@@ -128,8 +124,25 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
         monitor.keyboard.press("Escape")
         expect(monitor.locator("dialog[open]")).to_have_count(0)
     assert boxes(monitor, SAFETY) == places
+    monitor.click("[data-fall]")
+    safety_is_within_reach(monitor)
+    assert cut(monitor, "[data-alarm=fall], [data-alarm=fall] *") == []
+    monitor.click("[data-alarm=fall] .seen")
+    answer = monitor.locator("[data-severity] button").first
+    expect(answer).to_be_visible()
+    safety_is_within_reach(monitor)
+    assert complaints(monitor, "[data-severity] button", 44) == []
+    assert cut(monitor, "[data-alarm=seen] :is(li, b, button)") == []
+    answer.click()
+    expect(monitor.locator(".panels")).not_to_have_attribute("inert", "")
+    assert cut(monitor, "[data-alarm=seen], [data-alarm=seen] *") == []
+    assert boxes(monitor, SAFETY) == places
 
-    monitor.locator("[data-alarm=robot] button").click()
+    # The walk goes on, and what was asked is gone.
+    for then in ("pause", "resume"):
+        monitor.click("[data-main]")
+        expect(monitor.locator("[data-main]")).to_have_attribute("value", then)
+    monitor.click("[data-robot=arm]")
     monitor.evaluate("document.querySelector('.said').textContent = ''")
     expect(monitor.locator("[data-alarm]:not([data-alarm=why], [data-alarm=seen])")).to_have_count(
         0
