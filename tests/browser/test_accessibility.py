@@ -150,6 +150,7 @@ Patient.everywhere.update(language="{0}")
 
 
 @pytest.mark.long
+@pytest.mark.timeout(600)  # some seventy pages
 @pytest.mark.parametrize("language", ["de", "es", "fr", "en"])
 def test_every_page_in_each_language_at_twice_its_size(
     context: BrowserContext, server: Server, places: dict[str, str], language: str
