@@ -72,8 +72,8 @@ def test_today_stands_beside_last_time(world, patient):
         # What was lost is no number to take home.
         ("binary", [], [HIT] * 2 + [MISS] * 8, "2 steps at the goal Next mark: 10."),
         ("negative", [], [HIT] * 6 + [MISS] * 4, "6 steps at the goal Next mark: 10."),
-        ("negative", [], [MISS] * 10, "10 steps walked You walked"),
-        ("explicit", [], [HIT] * 6 + [MISS] * 4, "10 steps walked You walked"),
+        ("negative", [], [MISS] * 10, "10 steps with your left leg You walked"),
+        ("explicit", [], [HIT] * 6 + [MISS] * 4, "10 steps with your left leg You walked"),
     ],
 )
 def test_the_one_number_is_earned_and_shames_nobody(world, patient, valence, before, walked, said):

@@ -81,7 +81,9 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
             "title": title,
             "meaning": meaning if is_push else "",
             "bars": bars,
-            "facts": [],
+            "facts": [(_("Goal"), format_quantity(session.goal, plan.measure.unit))]
+            if session.goal is not None
+            else [],
             "sentence": "",
             "earned": earned,
         }
@@ -201,18 +203,26 @@ def describe_weeks(results: Sequence[Result]) -> str:
     early = _average(results[-2 * FAMILY_COMPARED : -FAMILY_COMPARED])
     match late.compare_goal(early), late.compare_hits(early):
         case Change.MORE, _hits:
-            return _("In the last three sessions the goal was higher than in those before.")
+            return _(
+                "On average the goal of the last three sessions was higher than that of the three "
+                "before."
+            )
         case Change.LESS, _hits:
-            return _("In the last three sessions the goal was lower than in those before.")
+            return _(
+                "On average the goal of the last three sessions was lower than that of the three "
+                "before."
+            )
         case _goal, Change.SAME:
             return _(
-                "In the last three sessions as many steps reached the goal as in those before."
+                "In the last three sessions as many steps reached the goal as in the three before."
             )
         case _goal, Change.MORE:
-            return _("In the last three sessions more steps reached the goal than in those before.")
+            return _(
+                "In the last three sessions more steps reached the goal than in the three before."
+            )
         case _:
             return _(
-                "In the last three sessions fewer steps reached the goal than in those before."
+                "In the last three sessions fewer steps reached the goal than in the three before."
             )
 
 
