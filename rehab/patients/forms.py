@@ -180,9 +180,8 @@ class ScreenForm(_SpokenForm):
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
         help_texts: ClassVar = {
             "screen_side": _(
-                "If the left side is missed, choose the right; if the right side is missed, "
-                "choose the left. In one half alone, Pause and Stop are there as well, and words "
-                "are largest on a tablet that lies on its side."
+                "In one half alone, Pause and Stop are there as well, and words are largest on a "
+                "tablet that lies on its side."
             )
         }
 

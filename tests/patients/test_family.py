@@ -53,7 +53,7 @@ def links_page(world):
 
 
 def test_who_was_not_asked_is_asked_from_the_patients_records(world):
-    asked = f'href="/patients/{world.patient.pk}/consent/">Ask now'
+    asked = f'href="/patients/{world.patient.pk}/consent/">Ask about it'
     page = reverse("records", args=[world.patient.pk])
     Consent.everywhere.filter(purpose=Purpose.FAMILY).delete()
     assert asked in world.pt.get(page).content.decode()

@@ -140,7 +140,7 @@ function drawStrides(element) {
   const isDense = element.clientWidth / strides.number.length < DENSE_PX;
   const [size, width] = isDense ? (narrow ? [4, 1] : [5, 1.5]) : [8, 2];
   const groups = groupChanges(narrow);
-  if (narrow && groups.length) element.after(listChanges(groups));
+  if (narrow && groups.length) element.before(listChanges(groups));
   draw(element, {
     data: [
       strides.number,
