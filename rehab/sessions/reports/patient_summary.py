@@ -76,14 +76,14 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
         is_push = plan.measure.slug == A2.slug
         title = _("Your push, on average") if is_push else _("Your value, on average")
         bars = draw_means(labeled, plan.measure.unit)
+        if bars and session.goal is not None:
+            bars.append(Bar(_("Goal"), format_quantity(session.goal, plan.measure.unit), None))
         meaning = _("How strongly your foot pushed off, over all steps of this walk.")
         return {
             "title": title,
             "meaning": meaning if is_push else "",
             "bars": bars,
-            "facts": [(_("Goal"), format_quantity(session.goal, plan.measure.unit))]
-            if session.goal is not None
-            else [],
+            "facts": [],
             "sentence": "",
             "earned": earned,
         }
