@@ -12,7 +12,13 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
 from rehab.people.consent.models import Purpose
-from rehab.people.consent.services import list_answers, offered_purposes, record_answer
+from rehab.people.consent.services import (
+    MEANINGS,
+    TOTALS_ONLY,
+    list_answers,
+    offered_purposes,
+    record_answer,
+)
 from rehab.people.field_policy import details
 from rehab.people.models import SIDES, EndReason, ErasureReason, Patient, User
 from rehab.people.ranges import say_ranges
@@ -97,8 +103,12 @@ class PatientForm(_SpokenForm):
             clinic = self.instance.clinic
             for purpose in offered_purposes(clinic):
                 answers = list_answers(purpose, clinic.boards_across)
+                meaning = str(MEANINGS[purpose])
+                if purpose == Purpose.BOARDS:
+                    meaning += f" {TOTALS_ONLY}"
                 self.fields[f"{CONSENT}{purpose}"] = forms.ChoiceField(
                     label=purpose.label,
+                    help_text=meaning,
                     choices=[("", _("not asked yet")), *answers],
                     required=False,
                     widget=forms.RadioSelect,
@@ -170,9 +180,8 @@ class ScreenForm(_SpokenForm):
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
         help_texts: ClassVar = {
             "screen_side": _(
-                "If the left side is missed, choose the right; if the right side is missed, "
-                "choose the left. In one half alone, Pause and Stop are there as well, and words "
-                "are largest on a tablet that lies on its side."
+                "In one half alone, Pause and Stop are there as well, and words are largest on a "
+                "tablet that lies on its side."
             )
         }
 

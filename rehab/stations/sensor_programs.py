@@ -8,6 +8,11 @@ from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
 
+def write_command(source: str, server: str, token: str) -> str:
+    """Return the line that starts a sensor's program with a source and its options."""
+    return f"python -m rehab.sources {source} --stay --server {server} --token {token}"
+
+
 @dataclass(frozen=True, slots=True)
 class SensorProgram:
     """What reads a kind of sensor: the kind in words, and a source with its usual options."""
@@ -17,7 +22,7 @@ class SensorProgram:
 
     def command(self, server: str, token: str) -> str:
         """Return the line that starts it at the sensor's computer."""
-        return f"python -m rehab.sources {self.source} --stay --server {server} --token {token}"
+        return write_command(self.source, server, token)
 
 
 # Which options there are besides: docs/sources.md.

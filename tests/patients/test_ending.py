@@ -72,8 +72,8 @@ def test_today_stands_beside_last_time(world, patient):
         # What was lost is no number to take home.
         ("binary", [], [HIT] * 2 + [MISS] * 8, "2 steps at the goal Next mark: 10."),
         ("negative", [], [HIT] * 6 + [MISS] * 4, "6 steps at the goal Next mark: 10."),
-        ("negative", [], [MISS] * 10, "10 steps walked You walked"),
-        ("explicit", [], [HIT] * 6 + [MISS] * 4, "10 steps walked You walked"),
+        ("negative", [], [MISS] * 10, "10 steps with your left leg You walked"),
+        ("explicit", [], [HIT] * 6 + [MISS] * 4, "10 steps with your left leg You walked"),
     ],
 )
 def test_the_one_number_is_earned_and_shames_nobody(world, patient, valence, before, walked, said):
@@ -148,7 +148,8 @@ def test_a_value_that_nothing_compares_with_has_no_bar(world, patient):
 def test_the_explicit_type_shows_values_and_no_verdict(world, patient):
     walk(patient, "explicit", [MISS] * 4, days_ago=7)
     words = read(world, walk(patient, "explicit", [HIT] * 4))
-    assert "pushed off, over all steps of this walk. Today 2.50 W/kg Last time 1.50 W/kg" in words
+    values = "Today 2.50 W/kg Last time 1.50 W/kg Goal 2.00 W/kg"
+    assert f"pushed off, over all steps of this walk. {values}" in words
     assert "goal" not in words
     assert "of 10" not in words
 

@@ -28,6 +28,8 @@ def device(world):
 def test_a_lead_is_shown_the_line_of_a_sensor_that_is_not_connected(world, device):
     page = world.lead.get(SENSOR).content.decode()
     assert "Not connected now: Plates" in page
+    assert "python -m rehab.sources … --stay --server http://testserver --token …" in page
+    assert page.index("--token …") < page.index("Command lost?") < page.index(LINE)
     [form] = re.findall(r'action="([^"]+)">(?:(?!</form>).)*' + LINE, page, re.DOTALL)
     answer = world.lead.post(form, {"renew": ""}).content.decode()
     before = device.token_hash

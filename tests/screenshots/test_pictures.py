@@ -197,6 +197,15 @@ for name, code, side, at in (
     plan_visit(who, today, at)
 """
 
+# A second walk, which is set up while the first one is walked.
+SECOND = """
+from rehab.people.models import Patient
+from rehab.stations.models import Station
+from tests.support.walks import make_session
+joon = Patient.everywhere.get(code="K7-211")
+make_session(joon, station=Station.everywhere.get(name="Treadmill 2"))
+"""
+
 
 @pytest.fixture(scope="module")
 def signed_in(tmp_path_factory):
@@ -220,6 +229,7 @@ def signed_in(tmp_path_factory):
         page.click(".huge")
         page.click("[data-change=start]")
         page.wait_for_selector("body[data-step]")
+        server.run_shell(SECOND)
         FOLDER.mkdir(exist_ok=True)
         yield context
 

@@ -44,7 +44,7 @@ def test_a_sentence_compares_the_last_sessions_that_compare(world, patient):
     for days_ago in range(1, 7):
         assert "last three sessions" not in words(world, patient)
         walk(patient, "positive", strides(days_ago, 6 - days_ago), days_ago=days_ago)
-    told = "In the last three sessions fewer steps reached the goal than in those before."
+    told = "In the last three sessions fewer steps reached the goal than in the three before."
     assert told in words(world, patient)
 
 

@@ -253,6 +253,7 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     assert "Like last time" in page.content.decode()
     offered = plain(pt.get(f"/patients/{patient.pk}/new/").content.decode())
     assert "Last time ended at 4.20 W/kg." in offered
+    assert "Begin with 4.20 W/kg" in offered
     chosen = {field.name: field.value() for field in page.context["form"]}
     hidden = {name: "" if value is None else value for name, value in chosen.items()}
     pt.post(f"/patients/{patient.pk}/new/", hidden)
@@ -410,7 +411,8 @@ def test_it_says_what_ends_a_walk(pt, patient):
 
 def test_one_open_session_alone_is_shown_on_its_own_page(pt, patient):
     session = make_session(patient)
-    assert (
-        pt.get(f"/sessions/two/?of={session.pk}").headers["Location"]
-        == f"/sessions/{session.pk}/monitor/"
-    )
+    page = pt.get(f"/sessions/two/?of={session.pk}", follow=True)
+    assert page.redirect_chain[0][0] == f"/sessions/{session.pk}/monitor/?second=none"
+    assert "No second walk" in page.content.decode()
+    alone = pt.get(f"/sessions/{session.pk}/monitor/").content.decode()
+    assert "No second walk" not in alone

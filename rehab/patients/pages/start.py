@@ -32,13 +32,12 @@ from rehab.sessions.formatting import (
     format_quantity,
     format_rate,
 )
-from rehab.sessions.forms.initial import initial_choices, last_session
+from rehab.sessions.forms.initial import format_first_goal, initial_choices, last_session
 from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
 from rehab.sessions.reports.day.today import IS_OPEN
 from rehab.sessions.reports.remarks import load_noted
-from rehab.sessions.reports.summary import load_point
 from rehab.sessions.reports.trend import load_trend, summarize_trend, with_metrics
 from rehab.sessions.spark import draw_spark
 from rehab.stations.builtin import first_station
@@ -99,18 +98,9 @@ def begin_context(user: User, patient: Patient) -> dict[str, Any]:
         "last": initial,
         "is_repeated": last is not None,
         "last_goal": format_quantity(last.goal, last.measure.unit) if last and last.goal else "",
-        "first_goal": _first_goal(user, last, initial),
+        "first_goal": format_first_goal(user, last, initial),
         "has_tablet": has_tablet(initial["station"], timezone.now()),
     }
-
-
-def _first_goal(user: User, last: TrainingSession | None, initial: dict[str, Any]) -> str:
-    """Return what the proposed share of the baseline was in the last session; "" if unknown."""
-    point = load_point(user, last) if last else None
-    percent = initial["goal_percent"]
-    if last is None or point is None or point.baseline is None or not percent:
-        return ""
-    return format_quantity(point.baseline.mean * float(percent) / 100, last.measure.unit)
 
 
 def load_progress(user: User, patient: Patient, now: datetime) -> dict[str, Any] | None:
@@ -175,9 +165,8 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     context["lately"] = load_last_walked(user, context["now"])
     coming = [row for row in context["today"] if row.progress is Progress.EXPECTED]
     context["is_over"] = context["today"] and all(row.is_missed for row in coming)
-    context["late"] = [row for row in coming if row.is_late and not row.is_missed]
     following = next((row for row in coming if not row.is_late), None)
-    if following is not None:  # who is late may not come: two taps, when they do
+    if following is not None:  # who is late may not come: from the list, when they do
         context |= {"next": following} | begin_context(user, following.patient)
     return render(request, "patients/start.html", context)
 

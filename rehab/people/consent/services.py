@@ -50,6 +50,15 @@ DEFAULT_TEXT = (
     ),
 )
 
+# What a purpose means, in a sentence to the therapist.
+MEANINGS = {
+    Purpose.CARE: _("Sessions are kept, and therapists plan the training with them."),
+    Purpose.RESEARCH: _("Researchers of the clinic see the sessions under a made-up name."),
+    Purpose.BOARDS: _("Results stand beside those of others, under an animal's name."),
+    Purpose.REMOTE: _("A therapist may watch a session from another place."),
+    Purpose.FAMILY: _("People whom the patient chooses see how the training is going."),
+}
+TOTALS_ONLY = _("In totals only: the results count in sums of all, but have no row of their own.")
 LEVELS = {
     BoardsConsent.CLINIC: _("Yes, in this clinic"),
     BoardsConsent.ACROSS: _("Yes, in all clinics"),

@@ -10,13 +10,15 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy, override
+from django.utils.translation import override
 from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import clinic_of, for_roles, get_patient, user_of
 from rehab.people.consent.forms import ConsentTextForm
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (
+    MEANINGS,
+    TOTALS_ONLY,
     active_consents,
     answered_purposes,
     current_text,
@@ -28,16 +30,6 @@ from rehab.people.consent.services import (
 )
 from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.roles import Role
-
-MEANINGS = {
-    Purpose.CARE: gettext_lazy("Sessions are kept, and therapists plan the training with them."),
-    Purpose.RESEARCH: gettext_lazy(
-        "Researchers of the clinic see the sessions under a made-up name."
-    ),
-    Purpose.BOARDS: gettext_lazy("Results stand beside those of others, under an animal's name."),
-    Purpose.REMOTE: gettext_lazy("A therapist may watch a session from another place."),
-    Purpose.FAMILY: gettext_lazy("People whom the patient chooses see how the training is going."),
-}
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -63,6 +55,7 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
         "before": before,
         "choices": [one | {"words": words.get(one["purpose"])} for one in list_choices(patient)],
         "after": after,
+        "totals_only": TOTALS_ONLY,
         "history": rows.select_related("text", "recorded_by", "withdrawn_by"),
     }
     return render(request, "people/consent.html", context)

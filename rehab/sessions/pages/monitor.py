@@ -7,6 +7,7 @@ from csp.decorators import csp_replace
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.utils.text import capfirst
 from django.utils.translation import gettext as _
@@ -105,7 +106,7 @@ def show_side_by_side(request: HttpRequest) -> HttpResponse:
     """Show the pages of two open sessions at once, each with its own Stop.
 
     ``of``: their keys; else the two that were set up last, at two stations. One alone is shown on
-    its own page.
+    its own page, which says that there is no second one.
     """
     states = [state.value for state in OPEN_STATES]
     rows = TrainingSession.objects.visible_to(user_of(request)).filter(state__in=states)
@@ -118,7 +119,7 @@ def show_side_by_side(request: HttpRequest) -> HttpResponse:
         shown.setdefault(session.station_id, session)
     two = sorted(list(shown.values())[:2], key=lambda session: str(session.station))
     if len(two) == 1:
-        return redirect("monitor", session_id=two[0].pk)
+        return redirect(reverse("monitor", args=[two[0].pk]) + "?second=none")
     shown_here = "?" + "&".join(f"but={session.pk}" for session in two)
     context = {"sessions": two, "alarms_elsewhere": shown_here if two else ""}
     return render(request, "sessions/side_by_side.html", context)

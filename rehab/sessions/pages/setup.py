@@ -17,7 +17,7 @@ from rehab.feedback.clinic_valences import valences_of
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.forms.initial import initial_choices, last_session
+from rehab.sessions.forms.initial import format_first_goal, initial_choices, last_session
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.reports.summary import load_point
@@ -90,9 +90,12 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     last = last_session(patient, user)
     same = last if last and last.measure.slug == measure.slug else None  # by the same measure
     point = load_point(user, same) if same else None
+    proposed = initial_choices(patient, user)
     context = {
         "patient": patient,
-        "last": initial_choices(patient, user),
+        "last": proposed,
+        "first_goal": format_first_goal(user, last, proposed),
+        "station": form.chosen_station,
         "has_tablet": has_tablet(form.chosen_station, timezone.now()),
         "is_repeated": last is not None,
         "last_goal": same and same.goal,

@@ -12,6 +12,7 @@ from django.utils.translation import ngettext
 from rehab.sessions.formatting import format_number
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
+from rehab.training.steps import Side
 from rehab.training.valences import Valence
 
 
@@ -30,8 +31,8 @@ def find_earned(
     """Return what a session came to, never as a loss; None where nothing was judged.
 
     Points where they were won; else the steps that reached the goal; under the explicit type, and
-    where no step did, the steps that were walked. A personal best is named, or the next mark above:
-    the best so far or a round number, whichever is nearer. Steps walked have none.
+    where no step did, the steps of the trained leg. A personal best is named, or the next mark
+    above: the best so far or a round number, whichever is nearer. These steps have none.
     """
     slugs = ("score", "hit_rate", "steps")
     rows = SessionMetric.everywhere.filter(slug__in=slugs)
@@ -41,7 +42,10 @@ def find_earned(
         return None
     hits = round(figures.get("hit_rate", 0) * steps)
     if not valence.has_points or not hits:
-        label = ngettext("step walked", "steps walked", steps)
+        if Side(session.trained_side) is Side.LEFT:
+            label = ngettext("step with your left leg", "steps with your left leg", steps)
+        else:
+            label = ngettext("step with your right leg", "steps with your right leg", steps)
         return Earned(format_number(steps, 0), label, "")
     earlier: dict[int, dict[str, float]] = defaultdict(dict)
     for key, slug, value in rows.filter(session__in=before.values("pk")).values_list(

@@ -76,6 +76,8 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
         is_push = plan.measure.slug == A2.slug
         title = _("Your push, on average") if is_push else _("Your value, on average")
         bars = draw_means(labeled, plan.measure.unit)
+        if bars and session.goal is not None:
+            bars.append(Bar(_("Goal"), format_quantity(session.goal, plan.measure.unit), None))
         meaning = _("How strongly your foot pushed off, over all steps of this walk.")
         return {
             "title": title,
@@ -201,18 +203,26 @@ def describe_weeks(results: Sequence[Result]) -> str:
     early = _average(results[-2 * FAMILY_COMPARED : -FAMILY_COMPARED])
     match late.compare_goal(early), late.compare_hits(early):
         case Change.MORE, _hits:
-            return _("In the last three sessions the goal was higher than in those before.")
+            return _(
+                "On average the goal of the last three sessions was higher than that of the three "
+                "before."
+            )
         case Change.LESS, _hits:
-            return _("In the last three sessions the goal was lower than in those before.")
+            return _(
+                "On average the goal of the last three sessions was lower than that of the three "
+                "before."
+            )
         case _goal, Change.SAME:
             return _(
-                "In the last three sessions as many steps reached the goal as in those before."
+                "In the last three sessions as many steps reached the goal as in the three before."
             )
         case _goal, Change.MORE:
-            return _("In the last three sessions more steps reached the goal than in those before.")
+            return _(
+                "In the last three sessions more steps reached the goal than in the three before."
+            )
         case _:
             return _(
-                "In the last three sessions fewer steps reached the goal than in those before."
+                "In the last three sessions fewer steps reached the goal than in the three before."
             )
 
 

@@ -43,20 +43,38 @@ function pointSeries(size, width, stroke, fill) {
   return { paths: () => null, points: { show: true, size, width, stroke: ring, fill: inside, space: 0 } };
 }
 
-function drawPhases(marks) {
-  const { ctx, box } = marks;
-  for (const phase of phases) {
+function placePhases(marks) {
+  const { box } = marks;
+  const placed = phases.map((phase) => {
     const left = Math.max(box.left, marks.x(phase.from - 0.5));
     const right = Math.min(box.left + box.width, marks.x(phase.to + 0.5));
-    if (right <= left) continue;
+    return { phase, left, right, isWide: marks.widthOf(phase.name) < right - left - 12 * marks.unit };
+  });
+  return placed.filter(({ left, right }) => right > left);
+}
+
+function drawPhases(marks) {
+  const { ctx, box } = marks;
+  for (const { phase, left, right, isWide } of placePhases(marks)) {
     ctx.fillStyle = color(phase.feedback ? "card" : "well");
     ctx.fillRect(left, box.top, right - left, box.height);
     marks.line(left, 12 * marks.unit, left, box.top + box.height, color("border"), 1);
-    if (marks.widthOf(phase.name) < right - left - 12 * marks.unit) {
+    if (isWide) {
       const fill = color("text");
       const from = { align: "left", weight: 700, fill };
       marks.text(phase.name, left + 7 * marks.unit, 26 * marks.unit, from);
-    } else if (right - left > 18 * marks.unit) marks.upright(phase.name, left + 5 * marks.unit, box.top);
+    }
+  }
+}
+
+// The names of narrow phases, clear of the lines that run through these.
+function drawUprightNames(marks) {
+  const { ctx, box, unit: pixel } = marks;
+  for (const { phase, left, right, isWide } of placePhases(marks)) {
+    if (isWide || right - left <= 18 * pixel) continue;
+    ctx.fillStyle = color(phase.feedback ? "card" : "well");
+    ctx.fillRect(left + 3 * pixel, box.top, 15 * pixel, marks.widthOf(phase.name) + 8 * pixel);
+    marks.upright(phase.name, left + 5 * pixel, box.top);
   }
 }
 
@@ -140,7 +158,7 @@ function drawStrides(element) {
   const isDense = element.clientWidth / strides.number.length < DENSE_PX;
   const [size, width] = isDense ? (narrow ? [4, 1] : [5, 1.5]) : [8, 2];
   const groups = groupChanges(narrow);
-  if (narrow && groups.length) element.after(listChanges(groups));
+  if (narrow && groups.length) element.before(listChanges(groups));
   draw(element, {
     data: [
       strides.number,
@@ -173,6 +191,7 @@ function drawStrides(element) {
       marks.text(_("Stride"), 0, marks.box.top + marks.box.height + 22 * marks.unit, { align: "left" });
       drawGaps(marks);
       drawChanges(marks, groups);
+      drawUprightNames(marks);
     },
     onCursor: showReadout,
     yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), space: 44 },

@@ -22,7 +22,7 @@ function lengths({ phases, target }) {
 function progress({ phase: { seconds, strides }, phase_s, phase_strides }, length) {
   if (seconds) return [phase_s / seconds, fill(_("%(left)s left"), { left: clock(Math.max(0, seconds - phase_s)) })];
   const count = Math.max(0, strides - phase_strides);
-  if (strides) return [phase_strides / strides, fill(_("strides left: %(count)s"), { count })];
+  if (strides) return [phase_strides / strides, fill(_("strides to go: %(count)s"), { count })];
   return [phase_s / length, ""];
 }
 

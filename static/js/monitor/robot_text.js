@@ -137,9 +137,8 @@ export function describeDecision(decision, breakReason) {
   const { mean, threshold, gesture, intensity, pool, reason } = decision;
   const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
   const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
-  return fill(_("Last five seconds: %(mean)s of the goal (celebrates from %(threshold)s). Answer: %(what)s."), {
+  return fill(_("Last five seconds: %(mean)s of the goal. Last answer: %(what)s."), {
     mean: percent(notReaching(mean, threshold)),
-    threshold: percent(threshold),
     what: gesture ? describeGesture(gesture) + (pool ? "" : size) + end : describeReason(reason),
   });
 }

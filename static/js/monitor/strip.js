@@ -87,7 +87,7 @@ export function drawStrip(svg, strides, annotations, session) {
   function drawScale() {
     const labels = lines.map(([value, label]) => text(label, { x: 0, y: y(value) + 4 }));
     if (!isJudged) return [...labels, ...drawMeans()];
-    const size = { x: 50, y: y(range[1]), width: width - 50, height: y(1) - y(range[1]) };
+    const size = { x: 50, y: y(range[1]), width: width - 50, height: Math.max(0, y(1) - y(range[1])) };
     return [shape("rect", { class: "above", ...size }), ...labels, path("goal", `M50 ${y(1)}H${width}`)];
   }
 

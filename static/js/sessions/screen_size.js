@@ -30,12 +30,15 @@ function show(pxPerMm) {
   width.value = pxPerMm;
   form.querySelector(".bank-card").style.setProperty("--px-per-mm", pxPerMm);
   const degree = pixelsOfDegree(pxPerMm, Number(distance.value));
+  let isShort = false;
   for (const row of form.querySelectorAll("[data-factor]")) {
     let percent = 100;
     while (percent > STEP && !isHeld((degree * Number(row.dataset.factor) * percent) / 100)) percent -= STEP;
     row.querySelector("output").value = percent < 100 ? `≈ ${percent} %` : "100 %";
     row.firstElementChild.classList.toggle("warn", percent < 100);
+    isShort ||= percent < 100;
   }
+  form.querySelector("[data-short]").hidden = !isShort;
 }
 
 function tellDiagonal(pxPerMm) {

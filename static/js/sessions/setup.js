@@ -34,6 +34,19 @@ function showGoal() {
 choices.forEach((choice) => choice.addEventListener("change", showGoal));
 showGoal();
 
+// The goal with which the last session ended, as a value.
+document.querySelector("[data-ended]")?.addEventListener("click", ({ currentTarget }) => {
+  document.querySelector("input[name=goal_value]").value = currentTarget.dataset.ended;
+  document.querySelector("input[name=goal_by][value=value]").click();
+});
+
+// Start says where.
+for (const choice of document.querySelectorAll("input[name=station]")) {
+  choice.addEventListener("change", () => {
+    document.querySelector("[data-station]").textContent = choice.closest("label").textContent.trim();
+  });
+}
+
 // Another measure brings its unit, its steps and its first goal.
 const measures = JSON.parse(document.getElementById("measures").textContent);
 document.querySelector("select[name=measure]")?.addEventListener("change", ({ target }) => {
