@@ -381,6 +381,8 @@ def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     assert "Disconnect this device" in told
     assert "Disconnect this device" not in seen_by_pt
     assert 'name="kind"' not in told  # it stays what it is
+    Device.everywhere.filter(pk=world.device.pk).update(builtin=True)  # keys from the server
+    assert "Disconnect this device" not in client_of(world, Role.LEAD).get(page).content.decode()
 
 
 def test_devices_that_are_away_come_first_and_simulated_patients_last(world):
@@ -396,6 +398,7 @@ def test_devices_that_are_away_come_first_and_simulated_patients_last(world):
         )
     page = lead.get("/admin/rehab/device/").content.decode()
     assert re.findall(r">(Gone|Here|Away|New)</a>", page) == ["New", "Away", "Here", "Gone"]
+    assert "sorted ascending" not in page  # by the name alone
     make_patient(world.clinic, "Zoe")
     demo = make_patient(world.clinic, "Anna")
     Patient.everywhere.filter(pk=demo.pk).update(simulated=True)

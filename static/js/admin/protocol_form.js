@@ -56,7 +56,7 @@ function start() {
   function createButton(label, sign, direction) {
     const button = document.createElement("button");
     button.type = "button";
-    button.className = "move";
+    button.className = "btn small move";
     button.textContent = sign;
     button.setAttribute("aria-label", label);
     button.dataset.way = direction;
