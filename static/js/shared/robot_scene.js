@@ -134,7 +134,7 @@ export class RobotScene {
 
   // Show a share of the floor around home, without the empty floor ahead; the tether only where it is in the drawing.
   zoom(svg, share) {
-    svg.setAttribute("viewBox", [-HALF_M, -0.8 * HALF_M, 2 * HALF_M, 1.8 * HALF_M].map((one) => one * share).join(" "));
+    svg.setAttribute("viewBox", [-HALF_M, -0.9 * HALF_M, 2 * HALF_M, 1.9 * HALF_M].map((one) => one * share).join(" "));
     svg.querySelector(".tether").style.display = share < 1 ? "none" : "";
     this.#drawCorners(share);
   }
