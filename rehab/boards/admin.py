@@ -16,6 +16,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.choices import Aggregation, Occasion, Participants
 from rehab.boards.models import Leaderboard
+from rehab.boards.panels.panel_rows import with_example
 from rehab.boards.panels.shared_panels import BoardViewer
 from rehab.people.access import user_of
 from rehab.people.models import BoardsConsent, Patient
@@ -155,7 +156,11 @@ class LeaderboardAdmin(PreviewAdmin):
         board = viewer.make_panel()
         if not (form.instance.is_own or board.shared) and (why := viewer.explain_nothing()):
             board = replace(board, summary=f"{board.summary} {why}", nothing=board.nothing or why)
-        return render(request, "boards/scores.html", {"boards": [board], "ranked": True})
+        return render(
+            request,
+            "boards/scores.html",
+            {"boards": [with_example(form.instance, board)], "ranked": True},
+        )
 
     def _viewer(self, request: HttpRequest, board: Leaderboard) -> BoardViewer:
         """Return the viewer of the preview: a patient after the newest session, or anybody."""

@@ -74,9 +74,9 @@ class FeedbackTypeAdmin(PreviewAdmin):
         if db_field.name in ("cue_above", "cue_below"):
             choices = [("", gettext_lazy("Nothing")), *gesture_choices(user_of(request))]
             label = db_field.verbose_name.capitalize()
-            words = _("Their mean reached the percent of the goal from which the robot acts.")
+            words = _("When the mean of five seconds reaches the robot’s threshold.")
             if db_field.name == "cue_below":
-                words = _("Their mean stayed below that percent.")
+                words = _("When the mean of five seconds stays below that threshold.")
             return forms.ChoiceField(label=label, choices=choices, required=False, help_text=words)
         return super().formfield_for_dbfield(db_field, request, **kwargs)
 

@@ -19,6 +19,9 @@ from rehab.training.phrases import LENGTHS
 from rehab.training.valences import VALENCES
 
 POOL_MAX = 40  # phrases of a band
+ABOUT_WORDS = _(
+    "One phrase a line; they take turns. If you leave it empty, the default words are shown."
+)
 
 
 def word_fields() -> dict[str, str]:
@@ -86,6 +89,7 @@ class BandForm(forms.ModelForm):
             if self.instance.pk is not None:  # the words where the clinic writes none
                 placeholder = self.instance.default_words(language)
                 self.fields[name].widget.attrs["placeholder"] = placeholder
+        self.fields[next(iter(word_fields()))].help_text = ABOUT_WORDS
 
     def clean(self) -> dict[str, Any]:
         """Collect the words of all languages."""

@@ -2260,7 +2260,10 @@ class Migration(migrations.Migration):
                     "about",
                     models.CharField(blank=True, max_length=200, verbose_name="where in GARRY"),
                 ),
-                ("address", models.CharField(blank=True, max_length=45, verbose_name="from")),
+                (
+                    "address",
+                    models.CharField(blank=True, max_length=45, verbose_name="network address"),
+                ),
                 ("count", models.PositiveIntegerField(default=1, verbose_name="times")),
                 (
                     "by",

@@ -45,6 +45,11 @@ def format_quantity(value: float | None, unit: str) -> str:
     return MISSING if value is None else f"{format_number(value)}{NBSP}{unit}"
 
 
+def yes_or_no(value: bool) -> str:
+    """Return yes or no in the active language."""
+    return gettext("yes") if value else gettext("no")
+
+
 def format_duration(seconds: float) -> str:
     """Return a time span, in seconds below a minute, else in minutes."""
     return f"{seconds:.0f}{NBSP}s" if seconds < 59.5 else f"{seconds / 60:.0f}{NBSP}min"

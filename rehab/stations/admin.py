@@ -7,7 +7,7 @@ from typing import Any
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
 from django.db.models import F, Prefetch, QuerySet
-from django.db.models.functions import TruncHour
+from django.db.models.functions import Lower, TruncHour
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
@@ -135,7 +135,7 @@ class DeviceAdmin(TokenAdmin):
     ordering = (
         F("revoked_at").asc(nulls_first=True),
         TruncHour("last_seen_at").asc(nulls_first=True),
-        "name",
+        Lower("name"),  # an expression, so that no column is marked as the sorted one
     )
     approval = ("approver", "approved_at", "network", "browser")
     fields = (
@@ -144,9 +144,17 @@ class DeviceAdmin(TokenAdmin):
     )
     readonly_fields = ("state", *TokenAdmin.readonly_fields, *approval)
     radio_fields = {"kind": admin.HORIZONTAL}
+    about_actions = _(
+        "A new key: when the device was lost, or somebody else may know its key; then enter the "
+        "new one on it. Disconnect: when it is not used for a while."
+    )
     row_words = TokenAdmin.row_words | {
         "revoke_tokens": _("Disconnect this device until it has a new key")
     }
+
+    def get_row_actions(self, row: Any) -> tuple[str, ...]:
+        """Return the row's actions; a built-in device gets its keys from the server."""
+        return () if row.builtin else super().get_row_actions(row)
 
     def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return as well the kind of a device that exists: it stays what it is."""

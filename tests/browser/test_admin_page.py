@@ -61,7 +61,7 @@ def test_phases_move_are_added_and_are_drawn_as_they_will_be_walked(page, protoc
     row.locator("[name$=-name]").fill("Cool")
     row.locator("[name$=-seconds]").fill("120")
     expect(drawn_names(page)).to_have_text(["Push", "Look", "Cool"])
-    expect(drawing.locator(".total")).to_have_text("3 min, open end")
+    expect(drawing.locator(".total")).to_have_text("3 min and the phases that you end")
     page.get_by_role("button", name="Save", exact=True).click()
     expect(page.locator(".messagelist .success")).to_be_visible()
     page.goto(url)

@@ -242,7 +242,7 @@ def rows(protocol: Protocol, *phases: dict[str, object]) -> dict[str, object]:
         "phases-MAX_NUM_FORMS": 1000,
     }
     for index, phase in enumerate(phases):
-        values = {"kind": "training", "feedback": "on", "gain": "1", **phase}
+        values = {"kind": "training", "feedback": "on", "gain": "90", **phase}
         form |= {f"phases-{index}-{name}": value for name, value in values.items()}
         form[f"phases-{index}-protocol"] = protocol.pk or ""
     return form
@@ -269,6 +269,7 @@ def test_phases_change_places_and_new_ones_come_between(world, protocol):
     )
     assert answer.status_code == 302, answer.content.decode()
     assert told(protocol) == [(1, "Block"), (2, "Catch"), (3, "Warm up"), (4, "Rest")]
+    assert set(protocol.phases.values_list("gain", flat=True)) == {0.9}  # the form's 90 %
     assert {warm.pk, block.pk, rest.pk} < set(protocol.phases.values_list("pk", flat=True))
 
 
@@ -289,7 +290,7 @@ def test_a_protocol_without_phases_and_a_phase_that_cannot_be_walked_are_refused
     phases = list(protocol.phases.order_by("position"))
     gone = [{"id": p.pk, "name": p.name, "position": p.position, "DELETE": "on"} for p in phases]
     assert "needs at least one phase" in save(world, protocol, *gone).content.decode()
-    kept = [{"id": p.pk, "name": p.name, "position": p.position, "gain": "3"} for p in phases]
+    kept = [{"id": p.pk, "name": p.name, "position": p.position, "gain": "160"} for p in phases]
     assert save(world, protocol, *kept).status_code == 200
     assert told(protocol) == [(1, "Warm up"), (2, "Block"), (3, "Rest")]
 
@@ -310,6 +311,20 @@ def test_what_is_drawn_is_what_is_stored(world, protocol):
         "robot": True,
         "rest_s": None,
     }
+
+
+def test_the_form_has_whole_numbers_and_the_gain_in_percent(world, protocol):
+    url = reverse("admin:rehab_protocol_change", args=[protocol.pk])
+    form = client_of(world).get(url).context["inline_admin_formsets"][0].formset.forms[0]
+    assert (form["gain"].value(), form["seconds"].value()) == (100, 60)
+
+
+def test_what_can_only_be_read_is_in_words(world):
+    shared = Protocol.everywhere.get(clinic=None, name="Baseline, training, washout")
+    page = client_of(world).get(f"/admin/rehab/protocol/{shared.pk}/change/").content.decode()
+    cells = re.findall(r"<td class=\"field-\w+\">\s*<p>(.*?)</p>", page)
+    assert cells[:4] == ["Baseline", "no", "100 %", "54 strides, about 1\xa0min"]
+    assert cells[4:7] == ["stays", "yes", "none"]
 
 
 def act(world: World, model: str, action: str, key: int, role: Role = Role.PT):
@@ -366,6 +381,8 @@ def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     assert "Disconnect this device" in told
     assert "Disconnect this device" not in seen_by_pt
     assert 'name="kind"' not in told  # it stays what it is
+    Device.everywhere.filter(pk=world.device.pk).update(builtin=True)  # keys from the server
+    assert "Disconnect this device" not in client_of(world, Role.LEAD).get(page).content.decode()
 
 
 def test_devices_that_are_away_come_first_and_simulated_patients_last(world):
@@ -381,6 +398,7 @@ def test_devices_that_are_away_come_first_and_simulated_patients_last(world):
         )
     page = lead.get("/admin/rehab/device/").content.decode()
     assert re.findall(r">(Gone|Here|Away|New)</a>", page) == ["New", "Away", "Here", "Gone"]
+    assert "sorted ascending" not in page  # by the name alone
     make_patient(world.clinic, "Zoe")
     demo = make_patient(world.clinic, "Anna")
     Patient.everywhere.filter(pk=demo.pk).update(simulated=True)

@@ -113,6 +113,27 @@ def format_rows(board: Leaderboard, visible: Sequence[VisibleRow]) -> list[Panel
     return rows
 
 
+def with_example(board: Leaderboard, panel: BoardPanel) -> BoardPanel:
+    """Return a panel; one that has nothing to show yet with rows as an example, and why."""
+    if panel.rows or panel.total:
+        return panel
+    shows_ranks = board.show_ranks and not panel.kept
+    rows = [
+        PanelRow(
+            value=format_figure(board.metric, figure),
+            bar=figure,
+            title=gettext("Example %(n)s") % {"n": n},
+            rank=n if shows_ranks else None,
+            points_at_stake="100" if panel.kept else "",
+            you=n == 2,
+        )
+        for n, figure in enumerate((90, 75, 60), 1)
+    ]
+    why = panel.nothing or panel.note or gettext("Walks with a goal appear here.")
+    note = gettext("An example, as there are no scores yet. %(why)s") % {"why": why}
+    return replace(panel, rows=rows, note=note)
+
+
 def shows_rank(board: Leaderboard, visible: VisibleRow) -> bool:
     """Return whether a row's rank is shown; it never is for points that can only be lost."""
     return board.show_ranks and visible.has_rank and visible.row.points_at_stake is None

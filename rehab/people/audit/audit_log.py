@@ -121,7 +121,7 @@ class AuditEntry(SealableModel):
         verbose_name=_("whose"),
     )
     about = models.CharField(_("where in GARRY"), max_length=200, blank=True)
-    address = models.CharField(_("from"), max_length=45, blank=True)
+    address = models.CharField(_("network address"), max_length=45, blank=True)
     count = models.PositiveIntegerField(_("times"), default=1)
 
     personal = personal_fields(

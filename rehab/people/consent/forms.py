@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import Any
 
 from django import forms
+from django.core.exceptions import ValidationError
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -19,11 +20,24 @@ class ConsentTextForm(forms.Form):
 
     def __init__(self, *args: Any, purposes: Collection[str], **options: Any) -> None:
         super().__init__(*args, **options)
+        self.purposes = purposes
         self.fields["text"].help_text = gettext(
-            "A paragraph that begins with one of these words stands beside that answer: %(words)s "
-            "The others are read out before and after."
+            "Keep these words at the beginning of their paragraphs, which stand beside that "
+            "answer: %(words)s The others are read out before and after."
         ) % {"words": " ".join(f"“{purpose}:”" for purpose in purposes)}
 
     def clean_text(self) -> str:
-        """Normalize line ends."""
-        return str(self.cleaned_data["text"]).replace("\r\n", "\n")
+        """Normalize line ends. Refuses the words in force, and those that lost a beginning."""
+        text = str(self.cleaned_data["text"]).replace("\r\n", "\n")
+        in_force = str(self.initial["text"])
+        if text.strip() == in_force.strip():
+            raise ValidationError(gettext("These words are in force already. Change them first."))
+        if lost := self._beginnings(in_force) - self._beginnings(text):
+            words = ", ".join(f"“{purpose}:”" for purpose in self.purposes if purpose in lost)
+            message = gettext("A paragraph that begins with %(words)s is missing: put it back.")
+            raise ValidationError(message % {"words": words})
+        return text
+
+    def _beginnings(self, text: str) -> set[str]:
+        begun = {paragraph.partition(":")[0].strip() for paragraph in text.split("\n\n")}
+        return begun & set(self.purposes)

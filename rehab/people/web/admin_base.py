@@ -212,6 +212,7 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
     show_facets = admin.ShowFacets.NEVER
     row_actions: tuple[str, ...] = ()  # actions that the row's own page offers as well
     viewer_actions: tuple[str, ...] = ()  # those of them that change nothing of the row
+    about_actions: Any = ""  # when to use them
     row_words: ClassVar[dict[str, Any]] = {}  # what the row's own page calls them, if not as a list
 
     def has_module_permission(self, request: HttpRequest) -> bool:
@@ -243,6 +244,10 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
         silent = {name for name in names if obj is None or getattr(obj, name) in (None, "", [])}
         return super().get_omitted_fields(request, obj) | silent
 
+    def get_row_actions(self, row: Any) -> tuple[str, ...]:
+        """Return the actions that a row's own page offers."""
+        return self.row_actions
+
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return URLs and labels of further pages about a row."""
         return []
@@ -256,10 +261,11 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
             actions = self.get_actions(request)
             if not self._may(request, Right.CHANGE, row):
                 actions = {name: actions[name] for name in actions if name in self.viewer_actions}
+            context["about_actions"] = self.about_actions
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
                 (name, self.row_words.get(name, found[2]), name not in self.viewer_actions)
-                for name in self.row_actions
+                for name in self.get_row_actions(row)
                 if (found := actions.get(name))
             ]
         return super().render_change_form(request, context, *args, **kwargs)

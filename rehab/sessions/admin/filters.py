@@ -52,7 +52,7 @@ class LeftOutFilter(BooleanFieldListFilter):
 
     def choices(self, changelist: Any) -> Iterator[Any]:
         """Return both, those left out, those that count."""
-        words = (_("Left out and counted"), _("Left out"), _("Counted"))
+        words = (_("All"), _("Left out"), _("Counted"))
         for choice, display in zip(super().choices(changelist), words, strict=True):
             yield {**choice, "display": display}
 

@@ -31,6 +31,7 @@ from rehab.sessions.formatting import (
     format_quantity,
     format_rate,
     format_state,
+    yes_or_no,
 )
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -80,7 +81,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         "protocol",
         "station",
         "source",
-        "simulated",
+        "made_up",
         "log",
         "corrections",
     )
@@ -117,7 +118,7 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to the session's own pages, and to the form that corrects it."""
-        links = [(reverse("session", args=[row.pk]), _("Every stride"))]
+        links = [(reverse("session", args=[row.pk]), _("Report"))]
         if not may_see_names(user_of(request).role):
             return links
         if State(row.state) in OPEN_STATES:
@@ -228,7 +229,12 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("counts"), ordering="excluded")
     def counts(self, session: TrainingSession) -> str:
         """Whether it is in figures, boards and trends."""
-        return gettext("no") if session.excluded else gettext("yes")
+        return yes_or_no(not session.excluded)
+
+    @admin.display(description=_("simulated"), ordering="simulated")
+    def made_up(self, session: TrainingSession) -> str:
+        """Whether nobody walked it."""
+        return yes_or_no(session.simulated)
 
     @admin.display(description=_("log"))
     def log(self, session: TrainingSession) -> str:

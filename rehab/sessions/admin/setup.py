@@ -17,8 +17,10 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
+from rehab.people.ranges import NumberField
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
+from rehab.sessions.formatting import format_duration, yes_or_no
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocol_models import (
@@ -27,7 +29,11 @@ from rehab.sessions.setup.protocol_models import (
     ProtocolPhase,
     display_name,
 )
-from rehab.sessions.setup.protocol_outline import STRIDE_S, protocol_minutes
+from rehab.sessions.setup.protocol_outline import (
+    STRIDE_S,
+    describe_phase_end,
+    protocol_minutes,
+)
 
 TEMPORARY_OFFSET = (
     10_000  # of positions while phases change places; no protocol has this many phases
@@ -56,13 +62,37 @@ class MeasureAdmin(SharedAdmin):
     search_fields = ("name", "slug")
 
 
+class PercentField(NumberField):
+    """A share, read and written in percent."""
+
+    def clean(self, value: Any) -> Any:
+        """Return the share."""
+        percent = super().clean(value)
+        return None if percent is None else percent / 100
+
+
 class PhaseForm(forms.ModelForm):
     """A phase as a row; its position is that of the row, which the page numbers."""
 
+    gain = PercentField(
+        label=_("gain, %"),
+        initial=100,
+        min_value=50,
+        max_value=150,
+        help_text=_("How much of the measured value is shown, 50 to 150 %."),
+    )
+
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self.fields["position"].required = False
-        self.fields["position"].widget.attrs["class"] = "vIntegerField"
+        if "gain" in self.initial:
+            self.initial["gain"] = round(100 * self.initial["gain"], 1)
+        for name, value in self.initial.items():
+            if isinstance(value, float) and value.is_integer():
+                self.initial[name] = int(value)  # 60 s, not 60.0 s
+        position = self.fields.get("position")
+        if position is not None:  # not in a page that can only be read
+            position.required = False
+            position.widget.attrs["class"] = "vIntegerField"
 
     def _get_validation_exclusions(self) -> set[str]:
         # Two rows may swap positions; `PhaseFormSet` numbers them without duplicates.
@@ -97,7 +127,7 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     form = PhaseForm
     formset = PhaseFormSet
     ordering = ("position",)
-    readonly_fields = ("named",)
+    readonly_fields = ("named", "with_feedback", "shown", "length", "goal", "with_robot", "rest")
     fields = (
         "position",
         "kind",
@@ -117,13 +147,42 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return the fields; names that can only be read are in the page's language."""
-        readable = {} if self.has_change_permission(request, obj) else {"name": "named"}
-        return [readable.get(field, field) for field in self.fields]
+        return self.fields if self.has_change_permission(request, obj) else self.readonly_fields
 
     @admin.display(description=_("name"))
     def named(self, phase: ProtocolPhase) -> str:
         """Its name."""
         return str(phase)
+
+    @admin.display(description=_("feedback"))
+    def with_feedback(self, phase: ProtocolPhase) -> str:
+        """Whether the patient gets feedback."""
+        return yes_or_no(phase.feedback)
+
+    @admin.display(description=_("gain"))
+    def shown(self, phase: ProtocolPhase) -> str:
+        """Its gain in percent."""
+        return f"{100 * phase.gain:g} %"
+
+    @admin.display(description=_("ends after"))
+    def length(self, phase: ProtocolPhase) -> str:
+        """What ends it."""
+        return describe_phase_end(phase.to_rule())
+
+    @admin.display(description=_("goal"))
+    def goal(self, phase: ProtocolPhase) -> str:
+        """The goal from here on, in percent of the baseline."""
+        return gettext("stays") if phase.goal_percent is None else f"{phase.goal_percent:g} %"
+
+    @admin.display(description=_("robot"))
+    def with_robot(self, phase: ProtocolPhase) -> str:
+        """Whether the robot answers."""
+        return yes_or_no(phase.robot)
+
+    @admin.display(description=_("rest"))
+    def rest(self, phase: ProtocolPhase) -> str:
+        """The pause after it."""
+        return format_duration(phase.rest_s) if phase.rest_s else gettext("none")
 
 
 class ProtocolForm(ClinicForm):
@@ -175,10 +234,14 @@ class ProtocolAdmin(SharedAdmin):
         return [readable.get(field, field) for field in fields]
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Return the name, which stands above the drawing, and the other fields."""
+        """Return the name, which stands above the drawing, and the other fields.
+
+        A protocol that can only be read has its name in the title.
+        """
         [(_title, options)] = super().get_fieldsets(request, obj)
         name, *others = options["fields"]
-        return [(None, {"fields": [name]}), (None, {"fields": others})]
+        may_change = obj is None or self.has_change_permission(request, obj)
+        return [(None, {"fields": [name] * may_change}), (None, {"fields": others})]
 
     @admin.display(description=_("description"))
     def about(self, protocol: Protocol) -> str:

@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 from django import forms
 from django.core.validators import BaseValidator
 from django.utils.functional import Promise
-from django.utils.translation import gettext
 
 from rehab.people.models import User
 from rehab.people.ranges import NumberField, WholeNumberField, between
-from rehab.sessions.formatting import MISSING
+from rehab.sessions.formatting import MISSING, yes_or_no
 from rehab.sessions.setup.walking_conditions import WalkingConditions
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
@@ -171,7 +170,7 @@ class Option:
     def describe(self, value: Any) -> str:
         """Return a value that people gave as text."""
         if isinstance(value, bool):
-            return gettext("yes") if value else gettext("no")
+            return yes_or_no(value)
         if value in (None, ""):
             return MISSING
         return str(dict(self.choices_for(None)).get(value, value))

@@ -48,6 +48,15 @@ def phase_length_s(phase: Phase) -> float | None:
     return min((limit for limit in limits if limit), default=None)
 
 
+def describe_phase_end(phase: Phase) -> str:
+    """Return what ends a phase, in the active language."""
+    if phase.strides is None:
+        return _describe_length(phase)
+    about_s = 5 * math.ceil((phase_length_s(phase) or 0) / 5)
+    values = {"count": phase.strides, "time": format_duration(about_s)}
+    return gettext("%(count)s strides, about %(time)s") % values
+
+
 def protocol_minutes(protocol: Protocol | None) -> int | None:
     """Return a protocol's duration; None where a phase lasts until the PT moves on."""
     lengths = [phase_length_s(phase) for phase in (protocol.to_rules() if protocol else ())]

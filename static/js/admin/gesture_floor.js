@@ -8,8 +8,11 @@ import { WalkerView } from "garry/shared/walker_view";
 
 const PAUSE_MS = 250; // after the last change, before the server is asked
 const STRAIGHT_RAD = 0.02; // what still counts as straight back
-const KNOB_M = 0.09; // from a place to the knob that turns it
-const APART_M = 0.07; // between two numbers
+const NEAR_M = 0.15; // a gesture that stays within it is drawn twice as large
+// Sizes in pixels of the screen
+const SPOT = 18; // of a number, from its middle
+const APART = 40; // between two numbers
+const KNOB = 48; // from a place to the knob that turns it
 const NAMES = ["turn_deg", "forward_m", "hold_s", "pace", "within_s"];
 const TRACKS = ["lights", "notes"]; // fields beside the steps
 const HOME = { x: 0, y: 0, heading: 0 };
@@ -45,11 +48,11 @@ const rounded = (turn, way) => ({
 });
 
 // Return where the numbers of poses are drawn: at their places, or behind one that stands there already.
-export function spotsOf(poses) {
+export function spotsOf(poses, apart_m) {
   const spots = [];
   for (const { x, y } of poses) {
     const spot = { x, y };
-    while (spots.some((one) => Math.hypot(one.x - spot.x, one.y - spot.y) < APART_M - 1e-6)) spot.x -= APART_M;
+    while (spots.some((one) => Math.hypot(one.x - spot.x, one.y - spot.y) < apart_m - 1e-6)) spot.x -= apart_m;
     spots.push(spot);
   }
   return spots;
@@ -106,22 +109,32 @@ export function setUpFloor(place) {
   const walker = new WalkerView(film);
   const handles = append(svg, "g");
   const reach = Number(place.dataset.reach);
-  svg.setAttribute("viewBox", "-.5 -.4 1 .9"); // without the empty floor ahead
   let preview, timer, dragged, audio;
 
-  const knobAt = (isDrive, x, y) => (isDrive ? "" : `<circle class="knob" cx="${-y}" cy="${-x}" r=".02" data-knob />`);
+  const knobAt = (isDrive, x, y, r) =>
+    isDrive ? "" : `<circle class="knob" cx="${-y}" cy="${-x}" r="${r}" data-knob />`;
+
+  // Return how long a pixel is on the floor [m]. The floor is not scaled while something is dragged.
+  function fit(poses) {
+    const isNear = poses.every(({ x, y }) => Math.max(Math.abs(x), Math.abs(y)) <= NEAR_M);
+    if (!dragged) scene.zoom(svg, isNear ? 0.5 : 1);
+    const pixel = 1 / (svg.getScreenCTM()?.a || 450);
+    svg.style.setProperty("--pixel", `${pixel}px`);
+    return pixel;
+  }
 
   function drawHandles() {
     const poses = posesOf(rows.read());
+    const pixel = fit(poses);
     const way = [HOME, ...poses].map(({ x, y }) => `${-y} ${-x}`).join("L");
     const ways = poses.map(({ x, y, heading, isDrive }, index) => {
-      const [kx, ky] = [x + KNOB_M * Math.cos(heading), y + KNOB_M * Math.sin(heading)];
+      const [kx, ky] = [x + KNOB * pixel * Math.cos(heading), y + KNOB * pixel * Math.sin(heading)];
       return `<g class="place" data-step="${index}"><path d="M${-y} ${-x}L${-ky} ${-kx}" />
-        ${knobAt(isDrive, kx, ky)}</g>`;
+        ${knobAt(isDrive, kx, ky, 12 * pixel)}</g>`;
     });
-    const numbers = spotsOf(poses).map(
+    const numbers = spotsOf(poses, APART * pixel).map(
       ({ x, y }, index) => `<g class="place" data-step="${index}"><circle class="spot" cx="${-y}" cy="${-x}"
-        r=".032" /><text x="${-y}" y="${-x}" dy=".014">${index + 1}</text></g>`,
+        r="${SPOT * pixel}" /><text x="${-y}" y="${-x}" dy=".35em">${index + 1}</text></g>`,
     );
     handles.innerHTML = `<path class="planned" d="M${way}" />${ways.join("")}${numbers.join("")}`;
   }
@@ -158,6 +171,11 @@ export function setUpFloor(place) {
     timer = setTimeout(ask, PAUSE_MS);
   }
 
+  function endDrag() {
+    dragged = undefined;
+    drawHandles();
+  }
+
   function pointOf(event) {
     const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
     const [ahead, left] = [-y, -x];
@@ -190,7 +208,7 @@ export function setUpFloor(place) {
     lead(poses);
     changed();
   });
-  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => (dragged = undefined));
+  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, endDrag);
 
   place.querySelector("[data-home]").addEventListener("click", () => {
     const last = () => posesOf(rows.read()).at(-1) ?? HOME;
@@ -211,5 +229,6 @@ export function setUpFloor(place) {
     play.disabled = false;
   });
   for (const kind of ["input", "formset:added", "formset:removed"]) form.addEventListener(kind, changed);
+  new ResizeObserver(drawHandles).observe(svg);
   changed();
 }

@@ -6,7 +6,7 @@ const NARROWEST = 52; // pixels of a phase
 const LETTER = 7; // pixels of a letter of its name
 const LETTERS_MAX = 20; // that no phase is widened for
 const OPEN_PHASE_S = 300; // a phase without an end is drawn as if it took this long
-const GROUND = 130;
+const GROUND = 92;
 const MINUTE_FROM_S = 90;
 const MINUTE_WITHIN_S = 5; // fifty strides count as a minute
 
@@ -29,7 +29,8 @@ function lengthOf({ strides, seconds }, stride_s) {
   return limits.length ? Math.min(...limits) : null;
 }
 
-// `labels`: how an open phase, an open end and minutes are written; `stride_s`: how long a stride takes.
+// `labels`: how an open phase, minutes, and all of it are written where it is open; `stride_s`: a stride's length.
+// Returns how long all of it takes.
 export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   const lengths = phases.map((phase) => lengthOf(phase, stride_s));
 
@@ -43,19 +44,19 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   function drawPhase(phase, index, left, width) {
     const letters = Math.floor((width - 8) / LETTER);
     const isOpen = lengths[index] === null;
-    const height = phase.feedback ? 76 : 22;
+    const height = phase.feedback ? 64 : 18;
     const kind = `${phase.feedback ? "on" : "off"}${isOpen ? " endless" : ""}`;
     const block = { x: left + 2, y: GROUND - height, width: width - 4, height, rx: 4 };
-    const gain = { class: "gain", x: left + width / 2, y: 148 - height };
+    const gain = { class: "gain", x: left + width / 2, y: GROUND + 18 - height };
     const length = formatLength(lengths[index]);
     return shape(
       "g",
       {},
       title(phase.name) +
         shape("rect", { class: kind, ...block }) +
-        text(fitText(phase.name, letters), { class: "name", x: left + 6, y: 20 }) +
+        text(fitText(phase.name, letters), { class: "name", x: left + 6, y: 16 }) +
         (phase.feedback && phase.gain !== 1 ? text(`${Math.round(100 * phase.gain)} %`, gain) : "") +
-        text(isOpen && length.length > letters ? "…" : length, { class: "length", x: left + 6, y: 150 }),
+        text(isOpen && length.length > letters ? "…" : length, { class: "length", x: left + 6, y: GROUND + 20 }),
     );
   }
 
@@ -69,10 +70,14 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
     left += widths[index];
     return block;
   });
-  svg.setAttribute("viewBox", `0 0 ${Math.max(width, 1)} 160`);
+  svg.setAttribute("viewBox", `0 0 ${Math.max(width, 1)} ${GROUND + 28}`);
   svg.setAttribute("width", Math.max(width, 1));
   svg.innerHTML = drawn.join("") + shape("path", { class: "ground", d: `M0 ${GROUND + 1}H${width}` });
 
   const known_s = lengths.reduce((all, one) => all + (one ?? 0), 0);
-  return known_s ? `${formatLength(known_s)}${lengths.includes(null) ? `, ${labels.end}` : ""}` : "";
+  const firstOpen = lengths.indexOf(null);
+  if (!known_s) return phases.length ? labels.end : "";
+  if (firstOpen < 0) return formatLength(known_s);
+  const words = firstOpen === lengths.length - 1 ? labels.then : labels.between;
+  return words.replace("{time}", formatLength(known_s));
 }

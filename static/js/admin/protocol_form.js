@@ -27,20 +27,21 @@ function start() {
       .map((row) => ({
         name: field(row, "name").value || field(row, "kind").selectedOptions[0].textContent,
         feedback: field(row, "feedback").checked,
-        gain: number(row, "gain") ?? 1,
+        gain: (number(row, "gain") ?? 100) / 100,
         strides: number(row, "strides"),
         seconds: number(row, "seconds"),
       }));
   }
 
   function draw() {
-    const { stride, open, end, minutes } = place.dataset;
+    const { stride } = place.dataset;
     const phases = readPhases();
+    place.querySelector(".about-open").hidden = phases.every(({ strides, seconds }) => strides || seconds);
     place.querySelector(".about-gain").hidden = !phases.some(({ feedback, gain }) => feedback && gain !== 1);
     place.querySelector(".total").textContent = drawProtocol(place.querySelector("svg"), phases, {
       width: Math.max(place.clientWidth - 42, 200),
       stride_s: Number(stride),
-      labels: { open, end, minutes },
+      labels: place.dataset,
     });
   }
 
@@ -55,7 +56,7 @@ function start() {
   function createButton(label, sign, direction) {
     const button = document.createElement("button");
     button.type = "button";
-    button.className = "move";
+    button.className = "btn small move";
     button.textContent = sign;
     button.setAttribute("aria-label", label);
     button.dataset.way = direction;
@@ -65,6 +66,7 @@ function start() {
   function addButtons(row) {
     const cell = row.querySelector(".field-position");
     if (!field(row, "position") || cell.querySelector(".move")) return;
+    field(row, "position").type = "hidden"; // the row's place says it
     cell.append(createButton(place.dataset.up, "↑", "up"), createButton(place.dataset.down, "↓", "down"));
   }
 

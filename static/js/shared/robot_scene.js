@@ -29,14 +29,14 @@ const FLOOR =
     "stroke-width": 0.006,
     "stroke-dasharray": ".025 .018",
     opacity: 0.6,
-  }) +
-  shape("path", { d: "M-.03 0h.06M0 -.03v.06", stroke: "currentColor", "stroke-width": 0.006, opacity: 0.6 }) +
-  shape("path", {
-    d: "M.26 .46h.2M.26 .44v.04M.46 .44v.04",
-    stroke: "currentColor",
-    "stroke-width": 0.006,
-    opacity: 0.6,
-  });
+  }) + shape("path", { d: "M-.03 0h.06M0 -.03v.06", stroke: "currentColor", "stroke-width": 0.006, opacity: 0.6 });
+
+const SCALE = shape("path", {
+  d: "M.26 .46h.2M.26 .44v.04M.46 .44v.04",
+  stroke: "currentColor",
+  "stroke-width": 0.006,
+  opacity: 0.6,
+});
 
 const label = (words, x, y) =>
   text(words, {
@@ -99,11 +99,14 @@ export class RobotScene {
   #way;
   #base;
   #lights;
+  #corners;
 
   // `isFollowed`: whether reports come now and then, so that it glides from one to the next.
   constructor(svg, { isFollowed = true } = {}) {
     svg.setAttribute("viewBox", `${-HALF_M} ${-HALF_M} ${2 * HALF_M} ${2 * HALF_M}`);
-    svg.innerHTML = FLOOR + treadmill() + label(`${number(0.2, 1)} m`, 0.36, 0.43);
+    svg.innerHTML = FLOOR;
+    this.#corners = append(svg, "g");
+    this.#drawCorners(1);
     this.#way = append(svg, "path");
     for (const [name, value] of Object.entries({
       class: "trail",
@@ -122,6 +125,18 @@ export class RobotScene {
     const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.#base.style.transition = isCalm || !isFollowed ? "none" : `transform ${MOVE_MS}ms linear`;
     this.draw({ poses: [] });
+  }
+
+  #drawCorners(share) {
+    this.#corners.innerHTML = SCALE + treadmill() + label(`${number(0.2 * share, 1)} m`, 0.36, 0.43);
+    this.#corners.setAttribute("transform", `scale(${share})`);
+  }
+
+  // Show a share of the floor around home, without the empty floor ahead; the tether only where it is in the drawing.
+  zoom(svg, share) {
+    svg.setAttribute("viewBox", [-HALF_M, -0.9 * HALF_M, 2 * HALF_M, 1.9 * HALF_M].map((one) => one * share).join(" "));
+    svg.querySelector(".tether").style.display = share < 1 ? "none" : "";
+    this.#drawCorners(share);
   }
 
   // `poses`: those that it had, oldest first; `lights`: two colors; `mood`: calm, glad or sad; `look`: which mouth, and
