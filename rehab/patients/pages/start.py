@@ -32,12 +32,13 @@ from rehab.sessions.formatting import (
     format_quantity,
     format_rate,
 )
-from rehab.sessions.forms.initial import format_first_goal, initial_choices, last_session
+from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.setup import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.screen_size import screen_of_browser
 from rehab.sessions.reports.day.today import IS_OPEN
 from rehab.sessions.reports.remarks import load_noted
+from rehab.sessions.reports.summary import format_first_goal
 from rehab.sessions.reports.trend import load_trend, summarize_trend, with_metrics
 from rehab.sessions.spark import draw_spark
 from rehab.stations.builtin import first_station

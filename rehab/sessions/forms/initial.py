@@ -8,10 +8,9 @@ from django.db.models import QuerySet
 from django.utils import timezone
 
 from rehab.people.models import Patient, User
-from rehab.sessions.formatting import format_quantity, format_source
+from rehab.sessions.formatting import format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.summary import load_point
 from rehab.sessions.setup.cue_gestures import choices_from_cue
 from rehab.sessions.setup.options import OPTIONS
 from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol
@@ -90,17 +89,6 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
         "robot_above": above,
         "robot_below": below,
     }
-
-
-def format_first_goal(by: User, last: TrainingSession | None, initial: dict[str, Any]) -> str:
-    """Return what the proposed share of the baseline was in the last session; "" if unknown."""
-    percent = initial["goal_percent"]
-    if last is None or initial["measure"] != last.measure or not percent:
-        return ""
-    point = load_point(by, last)
-    if point is None or point.baseline is None:
-        return ""
-    return format_quantity(point.baseline.mean * float(percent) / 100, last.measure.unit)
 
 
 def _read_last_changes(session: TrainingSession, by: User) -> dict[str, Any]:

@@ -17,10 +17,10 @@ from rehab.feedback.clinic_valences import valences_of
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.forms.initial import format_first_goal, initial_choices, last_session
+from rehab.sessions.forms.initial import initial_choices, last_session
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.setup import SessionForm
-from rehab.sessions.reports.summary import load_point
+from rehab.sessions.reports.summary import format_first_goal, load_point
 from rehab.sessions.setup.option import Group
 from rehab.sessions.setup.options import ANSWERS, options_of
 from rehab.sessions.setup.presets import Preset

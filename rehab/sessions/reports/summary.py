@@ -16,6 +16,7 @@ from rehab.sessions.formatting import (
     format_change,
     format_duration,
     format_number,
+    format_quantity,
     format_rate,
 )
 from rehab.sessions.models import TrainingSession
@@ -88,6 +89,17 @@ def load_point(user: User, session: TrainingSession) -> TrendPoint | None:
     """Return a session's point of the trend; None of one without figures."""
     points = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
     return points[0] if points else None
+
+
+def format_first_goal(user: User, last: TrainingSession | None, initial: dict[str, Any]) -> str:
+    """Return what the proposed share of the baseline was in the last session; "" if unknown."""
+    percent = initial["goal_percent"]
+    if last is None or initial["measure"] != last.measure or not percent:
+        return ""
+    point = load_point(user, last)
+    if point is None or point.baseline is None:
+        return ""
+    return format_quantity(point.baseline.mean * float(percent) / 100, last.measure.unit)
 
 
 def format_mean(session: TrainingSession, point: TrendPoint | None) -> Figure:
