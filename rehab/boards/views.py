@@ -19,6 +19,7 @@ from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import format_duration, format_number
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.earned_number import label_steps
 from rehab.stations.tablets import SCORES_STAY_S
 from rehab.training.changes import OPEN_STATES, State
 
@@ -50,9 +51,9 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
         "ranked": not boards or any(board.has_you for board in boards),
     }
     if not context["ranked"]:
-        steps = session.steps.filter(valid=True, side=session.trained_side)
+        steps = session.steps.filter(valid=True, side=session.trained_side).count()
         context["walked"] = format_duration(session.active_s)
-        context["steps"] = format_number(steps.count(), 0)
+        context["steps"] = steps and f"{format_number(steps, 0)} {label_steps(session, steps)}"
     return render(request, "boards/scores.html", context)
 
 

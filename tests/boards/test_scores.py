@@ -168,7 +168,11 @@ def test_a_session_without_a_score_says_so_and_shows_the_others(client, patient,
     told = " ".join(page.split())
     why = "It ended early." if end is ChangeKind.ABORT else "No step was scored."
     assert f"This walk has no score. {why}" in told
-    assert f"{len([one for one in walked if one is not None])} steps." in told
+    count = len([one for one in walked if one is not None])
+    assert ("steps with your" in told) == bool(count)
+    assert re.search(
+        rf"You walked [^.]+\. {f'<br>{count} steps with your' if count else '</p>'}", told
+    )
     rows = read(page, "same")
     assert [(row.session, row.you) for row in rows] == [(good.pk, False)]
 

@@ -134,7 +134,7 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     assert complaints(monitor, "[data-severity] button", 44) == []
     assert cut(monitor, "[data-alarm=seen] :is(li, b, button)") == []
     answer.click()
-    expect(monitor.locator(".panels")).not_to_have_attribute("inert", "")
+    expect(monitor.locator(".controls")).not_to_have_attribute("inert", "")
     assert cut(monitor, "[data-alarm=seen], [data-alarm=seen] *") == []
     assert boxes(monitor, SAFETY) == places
 

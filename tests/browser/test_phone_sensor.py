@@ -191,7 +191,7 @@ def test_a_therapist_is_led_to_https_before_a_phone_is_paired(visit: Visit):
     page = visit("/stations/", size="laptop")
     page.eval_on_selector("details:has-text('Add a device')", "one => (one.open = true)")
     page.click("text=Pair a phone")
-    expect(page.locator("main")).to_contain_text("without https")
+    expect(page.locator("main")).to_contain_text("secure address")
     expect(page.locator("[name=side]")).to_have_count(0)
     page.click("a:text-is('Set up https')")
     expect(page.locator("h1")).to_contain_text("by https")

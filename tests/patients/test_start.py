@@ -38,6 +38,7 @@ def test_who_is_late_is_not_proposed(pt, world, patient):
     plan_visit(patient, HERE.date(), (HERE - timedelta(hours=1)).time())
     page = pt.get("/start/")
     assert "late" in page.content.decode()
+    assert "next" not in page.context
     assert "Start training" not in page.content.decode()
     later = make_patient(world.clinic, "Omar", code="K7-300")
     plan_visit(later, HERE.date(), (HERE + timedelta(hours=1)).time())

@@ -413,6 +413,6 @@ def test_one_open_session_alone_is_shown_on_its_own_page(pt, patient):
     session = make_session(patient)
     page = pt.get(f"/sessions/two/?of={session.pk}", follow=True)
     assert page.redirect_chain[0][0] == f"/sessions/{session.pk}/monitor/?second=none"
-    assert "No second walk" in page.content.decode()
+    assert "Start a second walk" in page.content.decode()
     alone = pt.get(f"/sessions/{session.pk}/monitor/").content.decode()
-    assert "No second walk" not in alone
+    assert "Start a second walk" not in alone

@@ -183,5 +183,5 @@ def test_a_phones_square_leads_to_https(pt: Client, lead: Client, world: World, 
     assert 'href="/https/"' in pt.get("/phones/pair/").content.decode()
     lead.post("/https/")
     page = pt.post("/phones/pair/", wish).content.decode()
-    assert "without https" not in page
+    assert "secure address" not in page
     assert f"http://{secure_host()}/certificate/" in page

@@ -36,8 +36,8 @@ def test_a_therapist_pairs_a_phone_for_a_day(pt: Client, world: World):
     assert "no-store" in answer.headers["Cache-Control"]
     page = answer.content.decode()
     assert "<svg" in page
-    assert "without https" in page
-    assert "without https" not in pt.post("/phones/pair/", wish, secure=True).content.decode()
+    assert "secure address" in page
+    assert "secure address" not in pt.post("/phones/pair/", wish, secure=True).content.decode()
     device = Device.everywhere.filter(station=station).order_by("pk")[0]
     assert (device.kind, device.name) == ("source", "Phone, left shin")
     assert (device.place, device.side) == ("shank", "left")

@@ -130,7 +130,7 @@ def with_example(board: Leaderboard, panel: BoardPanel) -> BoardPanel:
         for n, figure in enumerate((90, 75, 60), 1)
     ]
     why = panel.nothing or panel.note or gettext("Walks with a goal appear here.")
-    note = gettext("An example, as there are no scores yet. %(why)s") % {"why": why}
+    note = gettext("An example. %(why)s") % {"why": why}
     return replace(panel, rows=rows, note=note)
 
 

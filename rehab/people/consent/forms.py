@@ -10,6 +10,8 @@ from django.core.exceptions import ValidationError
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.consent.services import split_paragraphs
+
 
 class ConsentTextForm(forms.Form):
     """The text that patients agree to; ``purposes``: how its paragraphs begin."""
@@ -21,10 +23,13 @@ class ConsentTextForm(forms.Form):
     def __init__(self, *args: Any, purposes: Collection[str], **options: Any) -> None:
         super().__init__(*args, **options)
         self.purposes = purposes
-        self.fields["text"].help_text = gettext(
-            "Keep these words at the beginning of their paragraphs, which stand beside that "
-            "answer: %(words)s The others are read out before and after."
-        ) % {"words": " ".join(f"“{purpose}:”" for purpose in purposes)}
+        begun = self._beginnings(str(self.initial["text"]))
+        kept = " ".join(f"“{purpose}:”" for purpose in purposes if purpose in begun)
+        if kept:
+            self.fields["text"].help_text = gettext(
+                "Keep these words at the beginning of their paragraphs, which stand beside that "
+                "answer: %(words)s The others are read out before and after."
+            ) % {"words": kept}
 
     def clean_text(self) -> str:
         """Normalize line ends. Refuses the words in force, and those that lost a beginning."""
@@ -39,5 +44,5 @@ class ConsentTextForm(forms.Form):
         return text
 
     def _beginnings(self, text: str) -> set[str]:
-        begun = {paragraph.partition(":")[0].strip() for paragraph in text.split("\n\n")}
+        begun = {paragraph.partition(":")[0].strip() for paragraph in split_paragraphs(text)}
         return begun & set(self.purposes)

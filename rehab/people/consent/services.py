@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime
 from typing import Any
 
@@ -17,6 +18,12 @@ from rehab.people.networks import is_outside
 
 # Sent in the transaction of a withdrawal, with patient, purpose, by and now.
 consent_withdrawn = Signal()
+
+
+def split_paragraphs(text: str) -> list[str]:
+    """Return a text's paragraphs, which lines without words part."""
+    return re.split(r"\n\s*\n", text)
+
 
 REMOTE_VIEW_TEXT = _(
     "Remote view: your therapist may watch a session from another place. Your care does not "

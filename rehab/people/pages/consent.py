@@ -27,6 +27,7 @@ from rehab.people.consent.services import (
     offered_purposes,
     publish_text,
     record_answer,
+    split_paragraphs,
 )
 from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.roles import Role
@@ -71,7 +72,7 @@ def split_words(text: str, patient: Patient) -> tuple[str, dict[Purpose, str], s
     before: list[str] = []
     after: list[str] = []
     words: dict[Purpose, str] = {}
-    for paragraph in text.split("\n\n"):
+    for paragraph in split_paragraphs(text):
         name, _colon, said = paragraph.partition(":")
         if purpose := names.pop(name.strip(), None):
             if after:  # the purpose before goes on in these

@@ -118,7 +118,7 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to the session's own pages, and to the form that corrects it."""
-        links = [(reverse("session", args=[row.pk]), _("Report"))]
+        links = [(reverse("session", args=[row.pk]), _("Session"))]
         if not may_see_names(user_of(request).role):
             return links
         if State(row.state) in OPEN_STATES:

@@ -20,7 +20,7 @@ from rehab.people.access import user_of
 from rehab.people.ranges import NumberField
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
-from rehab.sessions.formatting import format_duration, yes_or_no
+from rehab.sessions.formatting import format_duration, format_number, yes_or_no
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocol_models import (
@@ -77,15 +77,16 @@ class PhaseForm(forms.ModelForm):
     gain = PercentField(
         label=_("gain, %"),
         initial=100,
-        min_value=50,
-        max_value=150,
+        least=50,
+        most=150,
+        unit="%",
         help_text=_("How much of the measured value is shown, 50 to 150 %."),
     )
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         if "gain" in self.initial:
-            self.initial["gain"] = round(100 * self.initial["gain"], 1)
+            self.initial["gain"] = round(100 * self.initial["gain"], 4)
         for name, value in self.initial.items():
             if isinstance(value, float) and value.is_integer():
                 self.initial[name] = int(value)  # 60 s, not 60.0 s
@@ -162,7 +163,7 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     @admin.display(description=_("gain"))
     def shown(self, phase: ProtocolPhase) -> str:
         """Its gain in percent."""
-        return f"{100 * phase.gain:g} %"
+        return f"{format_number(100 * phase.gain, 0)} %"
 
     @admin.display(description=_("ends after"))
     def length(self, phase: ProtocolPhase) -> str:
@@ -172,7 +173,8 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     @admin.display(description=_("goal"))
     def goal(self, phase: ProtocolPhase) -> str:
         """The goal from here on, in percent of the baseline."""
-        return gettext("stays") if phase.goal_percent is None else f"{phase.goal_percent:g} %"
+        percent = phase.goal_percent
+        return gettext("stays") if percent is None else f"{format_number(percent, 0)} %"
 
     @admin.display(description=_("robot"))
     def with_robot(self, phase: ProtocolPhase) -> str:

@@ -114,9 +114,9 @@ def show_side_by_side(request: HttpRequest) -> HttpResponse:
     wanted = [key for text in request.GET.getlist("of") if (key := read_key(text))]
     if wanted:
         rows = rows.filter(pk__in=wanted)
-    shown: dict[int | None, TrainingSession] = {}
+    shown: dict[int, TrainingSession] = {}
     for session in rows:
-        shown.setdefault(session.station_id, session)
+        shown.setdefault(session.station_id or -session.pk, session)
     two = sorted(list(shown.values())[:2], key=lambda session: str(session.station))
     if len(two) == 1:
         return redirect(reverse("monitor", args=[two[0].pk]) + "?second=none")

@@ -42,11 +42,7 @@ def find_earned(
         return None
     hits = round(figures.get("hit_rate", 0) * steps)
     if not valence.has_points or not hits:
-        if Side(session.trained_side) is Side.LEFT:
-            label = ngettext("step with your left leg", "steps with your left leg", steps)
-        else:
-            label = ngettext("step with your right leg", "steps with your right leg", steps)
-        return Earned(format_number(steps, 0), label, "")
+        return Earned(format_number(steps, 0), label_steps(session, steps), "")
     earlier: dict[int, dict[str, float]] = defaultdict(dict)
     for key, slug, value in rows.filter(session__in=before.values("pk")).values_list(
         "session", "slug", "value"
@@ -64,6 +60,13 @@ def find_earned(
     else:
         mark = _("Next mark: %(count)s.") % {"count": format_number(next_mark(number, best), 0)}
     return Earned(format_number(number, 0), label, mark)
+
+
+def label_steps(session: TrainingSession, steps: int) -> str:
+    """Return what so many steps are: of the trained leg, in the active language."""
+    if Side(session.trained_side) is Side.LEFT:
+        return ngettext("step with your left leg", "steps with your left leg", steps)
+    return ngettext("step with your right leg", "steps with your right leg", steps)
 
 
 def next_mark(number: int, best: int) -> int:

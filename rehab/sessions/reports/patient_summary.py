@@ -78,7 +78,7 @@ def describe_ending(session: TrainingSession) -> dict[str, Any]:
         bars = draw_means(labeled, plan.measure.unit)
         if bars and session.goal is not None:
             bars.append(Bar(_("Goal"), format_quantity(session.goal, plan.measure.unit), None))
-        meaning = _("How strongly your foot pushed off, over all steps of this walk.")
+        meaning = _("How strongly your foot pushed off, on average over the steps with feedback.")
         return {
             "title": title,
             "meaning": meaning if is_push else "",

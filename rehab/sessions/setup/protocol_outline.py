@@ -66,10 +66,16 @@ def protocol_minutes(protocol: Protocol | None) -> int | None:
 
 def describe_end(protocol: Protocol) -> str:
     """Return what ends a walk by a protocol, in the active language."""
-    minutes = protocol_minutes(protocol)
-    if minutes is None:
+    phases, minutes = protocol.to_rules(), protocol_minutes(protocol)
+    if phases and phase_length_s(phases[-1]) is None:
         return gettext("You end the walk; the minutes are your plan.")
-    trained = sum(phase_length_s(one) or 0 for one in protocol.to_rules() if one.kind == "training")
+    if minutes is None:
+        return gettext("You end some phases; the protocol ends the walk.")
+    trained = sum(phase_length_s(one) or 0 for one in phases if one.kind == "training")
+    if not trained:
+        return gettext("The protocol ends the walk: %(all)s in all.") % {
+            "all": format_duration(60 * minutes)
+        }
     return gettext("The protocol ends the walk: %(trained)s of training, %(all)s in all.") % {
         "trained": format_duration(trained),
         "all": format_duration(60 * minutes),

@@ -176,9 +176,9 @@ export function setUpFloor(place) {
     drawHandles();
   }
 
-  function pointOf(event) {
+  function pointOf(event, beyond = { ahead: 0, left: 0 }) {
     const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-    const [ahead, left] = [-y, -x];
+    const [ahead, left] = [beyond.ahead - y, beyond.left - x];
     const share = Math.min(1, reach / (Math.hypot(ahead, left) || 1));
     return { x: ahead * share, y: left * share };
   }
@@ -199,12 +199,12 @@ export function setUpFloor(place) {
   });
   svg.addEventListener("pointermove", (event) => {
     if (!dragged) return;
-    const at = pointOf(event);
+    const at = pointOf(event, dragged.turns ? undefined : dragged);
     const poses = posesOf(rows.read());
     const own = poses[dragged.index];
     // A drive ends with the heading that it has; only a step that turns on the spot can be turned.
     if (!own.isDrive) own.heading = Math.atan2(at.y - own.y, at.x - own.x);
-    else if (!dragged.turns) Object.assign(own, { x: at.x + dragged.ahead, y: at.y + dragged.left });
+    else if (!dragged.turns) Object.assign(own, at);
     lead(poses);
     changed();
   });

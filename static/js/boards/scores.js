@@ -53,7 +53,7 @@ function choose(tab) {
     each.tabIndex = chosen ? 0 : -1;
     boardOf(each).hidden = !chosen;
   }
-  title.textContent = tab.dataset.title;
+  if (tab.dataset.title) title.textContent = tab.dataset.title;
   goTo(boardOf(tab));
 }
 

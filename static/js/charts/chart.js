@@ -103,11 +103,14 @@ export class Marks {
     return this.ctx.measureText(content).width;
   }
 
-  // Draw text from above to below.
-  upright(content, x, y) {
+  // Draw text from above to below, with a rim of the color behind it.
+  upright(content, x, y, rim) {
     this.ctx.save();
     this.ctx.translate(x, y);
     this.ctx.rotate(Math.PI / 2);
+    Object.assign(this.ctx, { strokeStyle: rim, lineWidth: 3 * this.unit, lineJoin: "round" });
+    this.ctx.font = `500 ${13 * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+    this.ctx.strokeText(content, 4 * this.unit, 0);
     this.text(content, 4 * this.unit, 0, { size: 13, align: "left" });
     this.ctx.restore();
   }

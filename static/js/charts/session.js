@@ -67,14 +67,12 @@ function drawPhases(marks) {
   }
 }
 
-// The names of narrow phases, clear of the lines that run through these.
+// The names of narrow phases, readable over what is drawn there.
 function drawUprightNames(marks) {
-  const { ctx, box, unit: pixel } = marks;
+  const { box, unit: pixel } = marks;
   for (const { phase, left, right, isWide } of placePhases(marks)) {
     if (isWide || right - left <= 18 * pixel) continue;
-    ctx.fillStyle = color(phase.feedback ? "card" : "well");
-    ctx.fillRect(left + 3 * pixel, box.top, 15 * pixel, marks.widthOf(phase.name) + 8 * pixel);
-    marks.upright(phase.name, left + 5 * pixel, box.top);
+    marks.upright(phase.name, left + 5 * pixel, box.top, color(phase.feedback ? "card" : "well"));
   }
 }
 

@@ -205,7 +205,8 @@ export class RobotPanel {
     const { simulated, state } = this.#status ?? {};
     const isFree = this.#isConnected && simulated === false && !this.isStopped;
     const isReady = isFree && (state === "away" || !this.#isHeld);
-    return isReady && this.#page.state.session?.state !== "running";
+    const { session } = this.#page.state;
+    return isReady && session?.state !== "running" && !whyHeld(session);
   }
 
   // Whether it drove home by its tag, and waits for a person to look.

@@ -36,8 +36,10 @@ showGoal();
 
 // The goal with which the last session ended, as a value.
 document.querySelector("[data-ended]")?.addEventListener("click", ({ currentTarget }) => {
-  document.querySelector("input[name=goal_value]").value = currentTarget.dataset.ended;
+  const goal = document.querySelector("input[name=goal_value]");
+  goal.value = currentTarget.dataset.ended;
   document.querySelector("input[name=goal_by][value=value]").click();
+  goal.focus(); // the button hides itself
 });
 
 // Start says where.

@@ -59,7 +59,9 @@ export function createFeedback(body) {
 
   function drawTotals({ has_points, unit, score, last }) {
     const counted = has_points ? _("Points") : _("This step");
-    if (!has_points) label.dataset.unit = unit;
+    label.toggleAttribute("data-summary", Boolean(last?.summary));
+    if (has_points || last?.summary) delete label.dataset.unit;
+    else label.dataset.unit = unit;
     set(label, last?.summary ? `${counted} · ${describeSummary(last.summary)}` : counted);
     const text = has_points ? format(score) : typeof last?.shown === "number" ? format(last.shown, 2) : "—";
     const before = shownScore;

@@ -79,7 +79,7 @@ export function createFitting(body, scene) {
       high = Math.max(high, words.offsetHeight);
     }
     const u = unit();
-    const total = count.offsetHeight / u;
+    const [total, digits] = [count.offsetHeight / u, key.offsetHeight / u];
     words.replaceChildren(...[was[0]].filter(Boolean));
     key.textContent = was[1];
     if (was[2] !== undefined) key.dataset.lost = was[2];
@@ -91,7 +91,7 @@ export function createFitting(body, scene) {
     // Badge and total, one below the other; the total below the thermometer.
     const isStacked = isHalf || !landscape.matches;
     const isExplicit = theme === "explicit";
-    const isAbove = !landscape.matches && isExplicit; // the value, right below the goal that the words name
+    const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, right below the goal that the words name
     const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
@@ -111,7 +111,7 @@ export function createFitting(body, scene) {
     const beside = isBelow || isAbove ? 0 : total;
     let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     // The badge is above the total, behind the goal's sign and the total's name.
-    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + key.offsetHeight / u);
+    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + digits);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;

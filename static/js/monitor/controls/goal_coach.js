@@ -39,6 +39,7 @@ export function createGoalCoach({ show, onPress, change }) {
     unit,
     goal: now,
   }) {
+    if (goal === null) declined = "";
     if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
     if (goal === null || now === null || goal === now || declined === `${now} ${goal}`) return "";
     const text =

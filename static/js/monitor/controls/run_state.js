@@ -16,7 +16,7 @@ const MAIN = {
 export function createRunState({ state, show, onPress, change }) {
   const main = document.querySelector("[data-main]");
   const end = document.querySelector("[data-end]");
-  const panels = document.querySelector(".panels");
+  const panels = document.querySelectorAll(".panels > :not(.remarks)"); // what happened may be noted at any time
   const confirmEnd = document.getElementById("sure");
 
   onPress("[data-main]", ({ value }) => change(value));
@@ -38,7 +38,7 @@ export function createRunState({ state, show, onPress, change }) {
   function drawButtons(session) {
     const [kind, label, iconId] = MAIN[session.state] ?? [""];
     const held = ["start", "resume"].includes(kind) ? whyHeld(session) : "";
-    panels.inert = Boolean(held);
+    for (const panel of panels) panel.inert = Boolean(held);
     end.disabled = !kind;
     main.disabled = Boolean(!kind || held);
     const drawn = `${kind} ${held}`;
