@@ -165,6 +165,19 @@ class FallSeverity(models.IntegerChoices):
     MODERATE = 2, _("moderately hurt")
     MAJOR = 3, _("badly hurt")
 
+    @property
+    def meaning(self) -> str:
+        """What it comes to, by the database's definitions."""
+        return str(_MEANINGS[self])
+
+
+_MEANINGS = {
+    FallSeverity.NONE: _("nothing seen or felt"),
+    FallSeverity.MINOR: _("pain, bruise or graze: ice, a dressing"),
+    FallSeverity.MODERATE: _("stitches, a splint, a strain"),
+    FallSeverity.MAJOR: _("broken bone, surgery, inner or head injury"),
+}
+
 
 # What helps a patient to walk: on or off.
 ASSISTANCE = (Remark.WALKING_AID, Remark.ORTHOSIS, Remark.HANDRAIL, Remark.HELPING_HAND)

@@ -80,7 +80,7 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
         ],
         "assistance": [(what.value, short) for what, short in ASSISTANCE_SHORT.items()],
         "adaptations": OPTIONS["goal_follows"].choices,
-        "severities": [(each.value, capfirst(each.label)) for each in FallSeverity],
+        "severities": [(one.value, capfirst(one.label), one.meaning) for one in FallSeverity],
         "levels": [(capfirst(_(name)), share) for name, share in ROBOT_LEVELS.items()],
     }
     return render(request, "sessions/monitor.html", context)
