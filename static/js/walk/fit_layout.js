@@ -28,7 +28,7 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_BESIDE = 52; // more than AIR, above and below the goal, where its sign is there
+const SIGN_BESIDE = 40; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -79,7 +79,7 @@ export function createFitting(body, scene) {
       high = Math.max(high, words.offsetHeight);
     }
     const u = unit();
-    const total = count.offsetHeight / u;
+    const [total, digits] = [count.offsetHeight / u, key.offsetHeight / u];
     words.replaceChildren(...[was[0]].filter(Boolean));
     key.textContent = was[1];
     if (was[2] !== undefined) key.dataset.lost = was[2];
@@ -88,7 +88,8 @@ export function createFitting(body, scene) {
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
-    const isStacked = isHalf || !landscape.matches; // badge and total, one below the other
+    // Badge and total, one below the other; the total below the thermometer.
+    const isStacked = isHalf || !landscape.matches;
     const isExplicit = theme === "explicit";
     const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, right below the goal that the words name
     const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
@@ -108,7 +109,9 @@ export function createFitting(body, scene) {
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + air;
     const beside = isBelow || isAbove ? 0 : total;
-    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    // The badge is above the total, behind the goal's sign and the total's name.
+    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + digits);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
