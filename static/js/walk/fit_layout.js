@@ -28,7 +28,7 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_BESIDE = 40; // more than AIR, above and below the goal, where its sign is there
+const SIGN_BESIDE = 52; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
