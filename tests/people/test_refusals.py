@@ -134,7 +134,7 @@ def test_a_protocol_is_refused_in_spanish(world):
     data = {f"phases-0-{name}": value for name, value in phases.items()}
     data |= {"name": "Uno", "phases-TOTAL_FORMS": "1", "phases-INITIAL_FORMS": "0"}
     found = complaints(world.pt, reverse("admin:rehab_protocol_add"), data)
-    assert "No se puede usar una ganancia de 9. Dé una de 0,5 a 1,5." in found
+    assert "Dé de 50 a 150 %." in found
 
 
 def test_a_preset_is_refused_in_spanish(world):
