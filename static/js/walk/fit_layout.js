@@ -91,7 +91,7 @@ export function createFitting(body, scene) {
     // Badge and total, one below the other; the total below the thermometer.
     const isStacked = isHalf || !landscape.matches;
     const isExplicit = theme === "explicit";
-    const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, right below the goal that the words name
+    const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, below the words
     const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
