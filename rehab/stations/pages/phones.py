@@ -47,7 +47,6 @@ def pair_phone(request: HttpRequest) -> HttpResponse:
         "stations": Station.objects.visible_to(user),
         "legs": LEGS.items(),
         "is_secure": secure_host() is not None or request.is_secure(),
-        "is_own": request.get_host().partition(":")[0] in {"127.0.0.1", "localhost"},
     }
     if request.method == "POST":
         try:
