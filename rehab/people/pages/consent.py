@@ -40,9 +40,9 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     user = user_of(request)
     patient = get_patient(user, patient_id)
     if request.method == "POST" and patient.erased_at is None:
-        purpose, answer = request.POST.get("purpose"), request.POST.get("answer", "")
-        answers = BoardsConsent.values if purpose == Purpose.BOARDS else ("yes", "no")
-        if answer in answers and purpose in _listed_purposes(patient):
+        purpose, answer = request.POST.get("purpose", ""), request.POST.get("answer", "")
+        is_asked = purpose in _listed_purposes(patient)
+        if is_asked and answer in dict(list_answers(Purpose(purpose), is_across=True)):
             record_answer(patient, Purpose(purpose), answer, user, timezone.now())
         else:
             messages.error(request, _("That cannot be chosen. Tap one of the answers."))

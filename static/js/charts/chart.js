@@ -93,9 +93,13 @@ export class Marks {
     ctx.restore();
   }
 
+  #setFont(weight, size) {
+    this.ctx.font = `${weight} ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+  }
+
   // Draw text at device pixels; return its width.
   text(content, x, y, { size = 14, weight = 500, fill = color("muted"), align = "center" } = {}) {
-    this.ctx.font = `${weight} ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+    this.#setFont(weight, size);
     this.ctx.fillStyle = fill;
     this.ctx.textAlign = align;
     this.ctx.textBaseline = "alphabetic";
@@ -109,14 +113,14 @@ export class Marks {
     this.ctx.translate(x, y);
     this.ctx.rotate(Math.PI / 2);
     Object.assign(this.ctx, { strokeStyle: rim, lineWidth: 3 * this.unit, lineJoin: "round" });
-    this.ctx.font = `500 ${13 * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+    this.#setFont(500, 13);
     this.ctx.strokeText(content, 4 * this.unit, 0);
     this.text(content, 4 * this.unit, 0, { size: 13, align: "left" });
     this.ctx.restore();
   }
 
   widthOf(content, size = 14) {
-    this.ctx.font = `700 ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+    this.#setFont(700, size);
     return this.ctx.measureText(content).width;
   }
 }
