@@ -171,7 +171,7 @@ def test_each_device_is_limited_by_itself_behind_one_address(tmp_path: Path, sho
         with ThreadPoolExecutor(8) as pool:
             answers = Counter(pool.map(ask, ["one"] * (least + 100)))
         assert answers[429] > 0
-        assert answers[200] >= 0.97 * least  # its window slides
+        assert answers[429] <= 100 + 0.03 * least, answers  # its window slides
         assert ask("another") == (200 if shown else 429)
 
 
@@ -213,8 +213,10 @@ def run_pages(port: int) -> Iterator[None]:
         def log_message(self, *_: object) -> None:
             """Say nothing."""
 
-    with ThreadingHTTPServer(("127.0.0.1", port), Handler) as server:
-        server.daemon_threads = True
+    class Pages(ThreadingHTTPServer):
+        daemon_threads, request_queue_size = True, 128  # the usual 5 overflow on a busy machine
+
+    with Pages(("127.0.0.1", port), Handler) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         try:
