@@ -79,7 +79,7 @@ export function createFitting(body, scene) {
       high = Math.max(high, words.offsetHeight);
     }
     const u = unit();
-    const [total, digits] = [count.offsetHeight / u, key.offsetHeight / u];
+    const total = count.offsetHeight / u;
     words.replaceChildren(...[was[0]].filter(Boolean));
     key.textContent = was[1];
     if (was[2] !== undefined) key.dataset.lost = was[2];
@@ -105,13 +105,12 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const hasBadge = level < BADGE && !isExplicit; // walk.css
+    const isInBulb = isLargest && isBeside; // the badge
+    const hasBadge = level < BADGE && !isExplicit && !isInBulb; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + air;
     const beside = isBelow || isAbove ? 0 : total;
-    let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
-    // The badge is above the total, behind the goal's sign and the total's name.
-    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + digits);
+    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
