@@ -63,13 +63,14 @@ FRAMES = f"""async ([texts, column]) => {{
     const [line, , sign, badge] = frames[`${{column}} ${{text}}`] = parts.map(box);
     const range = document.createRange();
     range.selectNodeContents(document.querySelector(".key"));
-    const digits = range.getBoundingClientRect().right, bulb = box(".bulb");
+    const {{ left, top, right, bottom }} = range.getBoundingClientRect();
+    const digits = [left, top, right, bottom], bulb = box(".bulb");
     const beside = box(".key")[1] < bulb?.[3];
-    if (beside && digits > bulb[0] - 24) wrong.push(`${{column}} ${{text}}: digits at the bulb`);
+    if (beside && right > bulb[0] - 24) wrong.push(`${{column}} ${{text}}: digits at the bulb`);
     const words = box(".words");
     if (badge && badge[1] < line[1] && badge[3] > line[1])
       wrong.push(`${{column}} ${{text}}: the badge crosses the goal`);
-    for (const other of [sign, words].filter((one) => badge && one))
+    for (const other of [sign, words, digits].filter((one) => badge && one))
       if (badge[0] < other[2] && other[0] < badge[2] && badge[1] < other[3] && other[1] < badge[3])
         wrong.push(`${{column}} ${{text}}: the badge at ${{badge}} is over ${{other}}`);
     if (sign && (sign[0] < 0 || sign[2] > innerWidth))

@@ -177,7 +177,7 @@ def test_a_session_from_start_to_scores(server, browser):
             feet.walk(1.2, 1.0, 1.0)
             looks(page, "calm", "Just walk as you usually do.")
             assert page.evaluate(TOO_SMALL) == []
-            assert page.locator(".part p").text_content() == "8 steps left in this part"
+            assert page.locator(".part p").text_content() == "8 steps to go in this part"
             assert page.locator(".part progress").get_attribute("value") in (None, "0.2")
             assert page.evaluate("document.querySelector('.part progress').value") == 0.2
         looks(page, "lost", "No signal from the sensor.")

@@ -95,12 +95,12 @@ def test_words_are_as_large_as_promised(
         assert found["word"] == pytest.approx(promised, rel=0.01), text
         usual = 2.0
         # Where no size is promised it leaves room to the others, on the side that is seen.
-        if not measured and valence == "explicit":
-            usual = 1.5 if side in HALVES or (text == "largest" and side not in COLUMNS) else 2.0
-        elif not measured and side in HALVES:
-            usual = 1.6 if width > height else 2.0
-        elif not measured and text == "largest" and side not in COLUMNS and width > height:
-            usual = 1.7
+        if not measured and valence == "explicit" and (
+            side in HALVES or (text == "largest" and side not in COLUMNS)
+        ):
+            usual = 1.5
+        elif not measured and (text == "largest" or (side in HALVES and width > height)):
+            usual = 1.6
         # Points that were lost are smaller.
         large = min(1.4, 0.85 * usual) if found["lost"] else usual
         assert found["key"] == pytest.approx(large * promised, rel=0.01), text

@@ -28,6 +28,7 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
+const [BULB, LARGE_BULB] = [94, 110]; // its radius; larger where it holds the badge
 const SIGN_BESIDE = 52; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
@@ -88,8 +89,7 @@ export function createFitting(body, scene) {
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
-    // Badge and total, one below the other; the total below the thermometer.
-    const isStacked = isHalf || !landscape.matches;
+    const isInBulb = isBeside && isLargest; // the badge
     const isExplicit = theme === "explicit";
     const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, below the words
     const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
@@ -105,16 +105,18 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const isInBulb = isLargest && isBeside; // the badge
     const hasBadge = level < BADGE && !isExplicit && !isInBulb; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + air;
     const beside = isBelow || isAbove ? 0 : total;
+    const isStacked = isHalf || !landscape.matches; // badge and total, one below the other
     const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    return { width, height, sign, inset, top, zero, goal, reach, above, high };
+    const bulb = isInBulb && !isExplicit ? LARGE_BULB : BULB;
+    const center = zero + FOOT - bulb; // the bulb's
+    return { width, height, sign, inset, bulb, center, top, zero, goal, reach, above, high };
   }
 
   function set(level, short) {

@@ -64,7 +64,7 @@ export function timeLeft(session) {
   if (session.state === "ready") return planned ? fill(_("%(time)s to walk"), { time: timer(planned) }) : "";
   if (!planned) return fill(_("%(time)s walked"), { time: timer(session.active_s) });
   return session.active_s < planned
-    ? fill(_("%(time)s left"), { time: timer(planned - session.active_s) })
+    ? fill(_("%(time)s to go"), { time: timer(planned - session.active_s) })
     : _("Time reached");
 }
 
@@ -74,13 +74,13 @@ export function phaseLeft({ phase, phase_s, phase_strides }) {
   if (phase.seconds)
     limits.push([
       phase_s / phase.seconds,
-      fill(_("%(time)s left in this part"), { time: timer(phase.seconds - phase_s) }),
+      fill(_("%(time)s to go in this part"), { time: timer(phase.seconds - phase_s) }),
     ]);
   if (phase.strides) {
     const left = Math.max(0, phase.strides - phase_strides);
     limits.push([
       phase_strides / phase.strides,
-      n_("%(count)s step left in this part", "%(count)s steps left in this part", left),
+      n_("%(count)s step to go in this part", "%(count)s steps to go in this part", left),
     ]);
   }
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
