@@ -28,7 +28,7 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const [BULB, LARGE_BULB] = [94, 110]; // its radius; larger where it holds the badge
+const [BULB, LARGE_BULB] = [94, 116]; // its radius; larger where it holds the badge
 const SIGN_BESIDE = 52; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
