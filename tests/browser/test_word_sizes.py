@@ -100,8 +100,7 @@ def test_words_are_as_large_as_promised(
         ):
             usual = 1.5
         elif not measured and (text == "largest" or (side in HALVES and width > height)):
-            is_stacked = width > height and side not in COLUMNS and found["drop"] < 2
-            usual = 1.4 if text == "largest" and is_stacked else 1.6
+            usual = 1.6
         # Points that were lost are smaller.
         large = min(1.5, 0.92 * usual) if found["lost"] else usual
         assert found["key"] == pytest.approx(large * promised, rel=0.01), text
