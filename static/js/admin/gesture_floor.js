@@ -123,8 +123,8 @@ export function setUpFloor(place) {
   const knobAt = (isDrive, x, y, r) =>
     isDrive ? "" : `<circle class="knob" cx="${-y}" cy="${-x}" r="${r}" data-knob />`;
 
-  // Return how long a pixel is on the floor [m], and how far from home a number may stand. The floor is not scaled while
-  // something is dragged.
+  // Return how long a pixel is on the floor [m], and how far from home a number may stand. The floor is not scaled
+  // while something is dragged.
   function fit(poses) {
     const isNear = poses.every(({ x, y }) => Math.max(Math.abs(x), Math.abs(y)) <= NEAR_M);
     if (!dragged) scene.zoom(svg, isNear ? 0.5 : 1);
