@@ -81,6 +81,11 @@ class Case:
     may_come: bool = False
 
     @property
+    def needs_visit(self) -> bool:
+        """Whether somebody is overdue without a visit to come: who is late today may yet come."""
+        return Flag.DUE in self.flags and self.next_visit is None
+
+    @property
     def goals(self) -> str:
         """How the goal went over the newest sessions of the present measure, as text."""
         shown = [format_number(goal) for goal in reversed(self._compared)]

@@ -15,7 +15,7 @@ from rehab.people.simulated import counted
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import JUST_NOW, format_device_states
+from rehab.stations.presence import format_device_states
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,8 @@ def _look_for_tablet(user: User, now: datetime) -> Found:
     tablets = list_devices(user, Device.Kind.TABLET)
     if not tablets:
         return Found(False, _("No tablet is paired yet."))
-    is_here = any(one.last_seen_at and now - one.last_seen_at < JUST_NOW for one in tablets)
-    return Found(is_here, _describe(tablets, now))
+    states = format_device_states(tablets, now)
+    return Found(True, ", ".join(f"{one.name}, {state}" for one, state in states))
 
 
 def _look_for_sensor(user: User, now: datetime) -> Found:
@@ -113,7 +113,3 @@ def list_devices(user: User, kind: Device.Kind) -> list[Device]:
     """Return a clinic's devices of a kind that may connect, but the server's own."""
     devices = Device.objects.visible_to(user).filter(kind=kind, builtin=False, revoked_at=None)
     return list(devices.order_by("name"))
-
-
-def _describe(devices: list[Device], now: datetime) -> str:
-    return ", ".join(f"{one.name}, {state}" for one, state in format_device_states(devices, now))

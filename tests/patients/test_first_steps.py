@@ -28,14 +28,24 @@ def device(world):
 def test_a_lead_is_shown_the_line_of_a_sensor_that_is_not_connected(world, device):
     page = world.lead.get(SENSOR).content.decode()
     assert "Not connected now: Plates" in page
-    assert "python -m rehab.sources … --stay --server http://testserver --token …" in page
-    assert page.index("--token …") < page.index("Command lost?") < page.index(LINE)
+    assert page.index("the command that you copied") < page.index("Is it lost?") < page.index(LINE)
+    assert "--token" not in page  # no line with gaps
     [form] = re.findall(r'action="([^"]+)">(?:(?!</form>).)*' + LINE, page, re.DOTALL)
     answer = world.lead.post(form, {"renew": ""}).content.decode()
     before = device.token_hash
     device.refresh_from_db()
     assert device.token_hash != before
     assert "Start its program" in answer
+    # What a clinic has its own of is filled in beside its line.
+    assert 'data-fills="port"' in answer
+    assert 'udp://0.0.0.0:<b data-blank="port">9101</b>' in answer
+
+
+def test_a_tablet_that_was_let_in_is_done_though_it_is_off(world, device):
+    Device.everywhere.filter(pk=device.pk).update(kind=Device.Kind.TABLET)
+    page = world.lead.get("/first-steps/?step=tablet").content.decode()
+    assert re.search(r'data-step="tablet"\s+class="done"', page)
+    assert re.search(r'data-step="sensor"\s+class="next"', page)
 
 
 def test_a_therapist_is_told_who_does_it(world, device):

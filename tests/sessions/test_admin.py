@@ -24,8 +24,10 @@ from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocol_outline import describe_phase_end
 from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
+from rehab.training.phases import Phase
 from tests.support.walks import make_patient, strides, walk
 from tests.support.world import NOW, World, build_world, client_of
 
@@ -325,6 +327,14 @@ def test_what_can_only_be_read_is_in_words(world):
     cells = re.findall(r"<td class=\"field-\w+\">\s*<p>(.*?)</p>", page)
     assert cells[:4] == ["Baseline", "no", "100 %", "54 strides, about 1\xa0min"]
     assert cells[4:7] == ["stays", "yes", "none"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "written"), [(45, "45 s"), (60, "1 min"), (75, "1:15 min"), (600, "10 min")]
+)
+def test_a_time_that_was_set_is_told_to_the_second(seconds, written):
+    phase = Phase(kind="washout", name="Washout", feedback=False, seconds=seconds)
+    assert describe_phase_end(phase) == written.replace(" ", "\xa0")
 
 
 def act(world: World, model: str, action: str, key: int, role: Role = Role.PT):

@@ -134,7 +134,7 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     pt = client_of(world)
     listed = words(seen(pt, "incidents"))
     assert "Iris fell." in listed
-    assert re.search(rf"Slightly hurt – 0\ss {by}", listed)
+    assert re.search(rf"Slightly hurt – Seen after 0\ss by {by}", listed)
     assert "The robot of Iris stopped by itself." in listed
     assert "Not seen yet" in listed
     assert "Falls 1 Near falls 0 Robot stopped by itself 1" in words(listed)
@@ -156,7 +156,7 @@ def test_a_severity_is_of_the_fall_that_was_one(world, session):
     note(session, "fall_withdrawn")
     note(session, "fall_severity", value=2)
     listed = words(seen(client_of(world), "incidents"))
-    assert re.search(rf"Moderately hurt – 0\ss {by}", listed)
+    assert re.search(rf"Moderately hurt – Seen after 0\ss by {by}", listed)
     assert listed.count("hurt") == 1
 
 
@@ -172,8 +172,8 @@ def test_what_is_counted_is_listed_with_what_was_done_then(world, session):
     where = re.escape(str(session.station or "–"))
     assert "Falls 0 Near falls 1 Robot stopped by itself 0 Pain 1 Dizziness 1" in listed
     for line in (
-        rf"Iris: near fall .*, \d\d:\d\d {where} – {by} Then: pause, {NOW:%H:%M}",
-        rf"Iris: pain 6 of 10 .*, \d\d:\d\d {where} – – Then: pause, {NOW:%H:%M}",
+        rf"Iris: near fall .*, \d\d:\d\d {where} – {by} Pause, {NOW:%H:%M}",
+        rf"Iris: pain 6 of 10 .*, \d\d:\d\d {where} – – Pause, {NOW:%H:%M}",
         rf"Iris: dizziness .*, \d\d:\d\d {where} – – During a pause",
     ):
         assert re.search(line, listed), line

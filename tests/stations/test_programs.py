@@ -3,6 +3,7 @@
 import shlex
 
 import pytest
+from django.utils.html import strip_tags
 
 from rehab.sources import SOURCES
 from rehab.sources.arguments import make_parser
@@ -19,7 +20,7 @@ def parse(command):
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda one: one.source.split()[0])
 def test_each_line_is_one_that_its_program_takes(program):
-    _name, options = parse(program.command(SERVER, "abc"))
+    _name, options = parse(strip_tags(program.command(SERVER, "abc")))
     assert (options.server, options.token, options.stay) == (SERVER, "abc", True)
 
 

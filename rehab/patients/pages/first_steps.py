@@ -20,7 +20,6 @@ from rehab.stations.forms import DeviceForm, StationForm
 from rehab.stations.models import Device, Station
 from rehab.stations.pages.pairing import let_in, tablet_address
 from rehab.stations.pages.stations import show_token
-from rehab.stations.sensor_programs import write_command
 
 SKIPPED, HIDDEN = "skipped_first_steps", "hidden_first_steps"  # keys of the browser session
 
@@ -58,6 +57,7 @@ def first_steps(request: HttpRequest) -> HttpResponse:
     context: dict[str, Any] = {
         "steps": [(step, found[step.slug], step.slug in skipped) for step in STEPS],
         "slug": slug,
+        "next": open_ones[0] if open_ones else "",
         "following": next(
             (one for one in STEPS if one.slug in open_ones and one.slug != slug), None
         ),
@@ -67,9 +67,7 @@ def first_steps(request: HttpRequest) -> HttpResponse:
     if slug == "tablet":
         context |= tablet_address(request) | {"stations": Station.objects.visible_to(user)}
     if slug == "sensor":
-        server = f"{request.scheme}://{request.get_host()}"
         context["sensors"] = list_devices(user, Device.Kind.SOURCE)
-        context["command"] = write_command("…", server, "…")
     acted = _act(request, slug, context)
     return acted or render(request, "patients/first_steps.html", context)
 

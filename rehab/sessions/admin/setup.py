@@ -20,7 +20,7 @@ from rehab.people.access import user_of
 from rehab.people.ranges import NumberField
 from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
-from rehab.sessions.formatting import format_duration, format_number, yes_or_no
+from rehab.sessions.formatting import format_number, yes_or_no
 from rehab.sessions.questionnaires import questionnaire_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocol_models import (
@@ -32,6 +32,7 @@ from rehab.sessions.setup.protocol_models import (
 from rehab.sessions.setup.protocol_outline import (
     STRIDE_S,
     describe_phase_end,
+    format_planned,
     protocol_minutes,
 )
 
@@ -184,7 +185,7 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     @admin.display(description=_("rest"))
     def rest(self, phase: ProtocolPhase) -> str:
         """The pause after it."""
-        return format_duration(phase.rest_s) if phase.rest_s else gettext("none")
+        return format_planned(phase.rest_s) if phase.rest_s else gettext("none")
 
 
 class ProtocolForm(ClinicForm):

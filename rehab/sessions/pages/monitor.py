@@ -67,6 +67,7 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     context = {
         "chart_marks": chart_marks(),
         "session": session,
+        "whom": session.patient.nickname if "beside" in request.GET else "",
         "locked": session.to_plan().locked,
         "alarms_elsewhere": f"?but={session.pk}&station={session.station_id or 0}",
         "remarks": [

@@ -32,8 +32,8 @@ RESUMES = {ChangeKind.START.value, ChangeKind.RESUME.value}
 class Entry:
     """One of them, as text; ``at`` by the clinic's clock.
 
-    ``hurt``: how badly, by a fall. ``waited`` and ``seen_by``: how long it took until whom saw it;
-    else ``then`` says what followed. ``is_one``: nobody took it back.
+    ``hurt``: how badly, by a fall. ``then``: what followed, as when who saw it. ``is_one``: nobody
+    took it back.
     """
 
     kind: str
@@ -42,9 +42,7 @@ class Entry:
     what: str
     hurt: str
     noted_by: str
-    then: str = ""
-    waited: str = ""
-    seen_by: str = ""
+    then: str
     is_open: bool = False
     is_one: bool = True
 
@@ -90,24 +88,21 @@ def _from_incident(user: User, incident: Incident) -> Entry:
     hurt = gettext("not said") if is_fall and incident.was_one else ""
     if incident.severity is not None:
         hurt = str(incident.severity.label)
-    then = waited = seen_by = ""
     if not incident.was_one:
         then = gettext("it was not a fall")
     elif ended is None:
         then = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
     else:
-        waited = format_duration(max((ended.at - raised.at).total_seconds(), 0.0))
-        seen_by = str(ended.by or "–")
+        time = format_duration(max((ended.at - raised.at).total_seconds(), 0.0))
+        then = gettext("seen after %(time)s by %(who)s") % {"time": time, "who": ended.by or "–"}
     return Entry(
         kind=raised.kind,
         session=raised.session,
         at=clinic_time(raised.at, clinic),
         what=what % {"name": raised.session.patient.nickname},
         hurt=capfirst(hurt),
-        noted_by=str(raised.by or "–") if is_fall else "–",
+        noted_by=str(raised.by or "") if is_fall else "",
         then=capfirst(then),
-        waited=waited,
-        seen_by=seen_by,
         is_open=ended is None,
         is_one=incident.was_one,
     )
@@ -135,7 +130,7 @@ def _list_remarks(user: User, since: datetime) -> list[Entry]:
             at=clinic_time(one.at, clinic),
             what=f"{one.event.session.patient.nickname}: {one.words}",
             hurt="",
-            noted_by=str(one.event.by or "–"),
+            noted_by=str(one.event.by or ""),
             then=capfirst(_find_answer(one.event, of_session[one.event.session_id], user)),
         )
         for one in noted
@@ -156,5 +151,5 @@ def _find_answer(remark: SessionEvent, course: Sequence[SessionEvent], user: Use
         return gettext("during a pause")
     if after:
         what, at = EVENTS[after[0].kind], clinic_time(after[0].at, clinic)
-        return gettext("then: %(what)s, %(time)s") % {"what": what, "time": f"{at:%H:%M}"}
+        return f"{what}, {at:%H:%M}"
     return gettext("walked on")

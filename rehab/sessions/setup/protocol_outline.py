@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from django.utils.translation import gettext
 
-from rehab.sessions.formatting import format_duration
+from rehab.sessions.formatting import NBSP, format_duration
 from rehab.sessions.setup.protocol_models import Protocol
 from rehab.training.phases import Phase
 
@@ -103,7 +103,15 @@ def _describe_phases(phases: tuple[Phase, ...]) -> str:
 
 def _describe_length(phase: Phase) -> str:
     seconds = phase_length_s(phase)
-    return gettext("until you move on") if seconds is None else format_duration(seconds)
+    if seconds is None:
+        return gettext("until you move on")
+    return format_planned(seconds) if seconds == phase.seconds else format_duration(seconds)
+
+
+def format_planned(seconds: float) -> str:
+    """Return a time that was set, to the second: 45 s, 3 min, 2:30 min."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02}{NBSP}min" if minutes and rest else format_duration(seconds)
 
 
 def _draw_phases(phases: tuple[Phase, ...]) -> list[Block]:

@@ -76,7 +76,9 @@ def show_token(request: HttpRequest, device: Device, token: str) -> HttpResponse
     context: dict[str, Any] = {"device": device, "token": token}
     if device.kind == Device.Kind.SOURCE:
         server = f"{request.scheme}://{request.get_host()}"
-        context["programs"] = [(one.kind, one.command(server, token)) for one in PROGRAMS]
+        context["programs"] = [
+            (one.kind, one.command(server, token), one.blanks) for one in PROGRAMS
+        ]
     return render(request, "stations/token.html", context)
 
 

@@ -9,9 +9,15 @@ import { WalkerView } from "garry/shared/walker_view";
 const PAUSE_MS = 250; // after the last change, before the server is asked
 const STRAIGHT_RAD = 0.02; // what still counts as straight back
 const NEAR_M = 0.15; // a gesture that stays within it is drawn twice as large
+const AHEAD_M = 0.45; // of the drawing, the least there is to a side
 // Sizes in pixels of the screen
 const SPOT = 18; // of a number, from its middle
 const APART = 40; // between two numbers
+// Where else a number may stand, in steps of that: a few behind its place, then beside, last ahead.
+const STEPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4];
+const OFFSETS = STEPS.flatMap((behind) =>
+  STEPS.map((beside) => ({ behind, beside, far: Math.hypot((behind > 0 ? 0.4 : 2) * behind, beside) })),
+).sort((one, other) => one.far - other.far);
 const KNOB = 48; // from a place to the knob that turns it
 const NAMES = ["turn_deg", "forward_m", "hold_s", "pace", "within_s"];
 const TRACKS = ["lights", "notes"]; // fields beside the steps
@@ -47,13 +53,16 @@ const rounded = (turn, way) => ({
   forward_m: Math.round(1000 * way) / 1000,
 });
 
-// Return where the numbers of poses are drawn: at their places, or behind one that stands there already.
-export function spotsOf(poses, apart_m) {
+// Return where the numbers of poses are drawn: at their places, or near those that stand there already, within a
+// distance from home ahead and beside.
+export function spotsOf(poses, apart_m, within_m) {
   const spots = [];
+  const isFree = (spot) =>
+    Math.max(Math.abs(spot.x), Math.abs(spot.y)) <= within_m &&
+    spots.every((one) => Math.hypot(one.x - spot.x, one.y - spot.y) >= apart_m - 1e-6);
   for (const { x, y } of poses) {
-    const spot = { x, y };
-    while (spots.some((one) => Math.hypot(one.x - spot.x, one.y - spot.y) < apart_m - 1e-6)) spot.x -= apart_m;
-    spots.push(spot);
+    const near = OFFSETS.map(({ behind, beside }) => ({ x: x - behind * apart_m, y: y - beside * apart_m }));
+    spots.push(near.find(isFree) ?? { x, y });
   }
   return spots;
 }
@@ -114,25 +123,26 @@ export function setUpFloor(place) {
   const knobAt = (isDrive, x, y, r) =>
     isDrive ? "" : `<circle class="knob" cx="${-y}" cy="${-x}" r="${r}" data-knob />`;
 
-  // Return how long a pixel is on the floor [m]. The floor is not scaled while something is dragged.
+  // Return how long a pixel is on the floor [m], and how far from home a number may stand. The floor is not scaled
+  // while something is dragged.
   function fit(poses) {
     const isNear = poses.every(({ x, y }) => Math.max(Math.abs(x), Math.abs(y)) <= NEAR_M);
     if (!dragged) scene.zoom(svg, isNear ? 0.5 : 1);
     const pixel = 1 / (svg.getScreenCTM()?.a || 450);
     svg.style.setProperty("--pixel", `${pixel}px`);
-    return pixel;
+    return { pixel, within_m: (isNear ? 0.5 : 1) * AHEAD_M - SPOT * pixel };
   }
 
   function drawHandles() {
     const poses = posesOf(rows.read());
-    const pixel = fit(poses);
+    const { pixel, within_m } = fit(poses);
     const way = [HOME, ...poses].map(({ x, y }) => `${-y} ${-x}`).join("L");
     const ways = poses.map(({ x, y, heading, isDrive }, index) => {
       const [kx, ky] = [x + KNOB * pixel * Math.cos(heading), y + KNOB * pixel * Math.sin(heading)];
       return `<g class="place" data-step="${index}"><path d="M${-y} ${-x}L${-ky} ${-kx}" />
         ${knobAt(isDrive, kx, ky, 12 * pixel)}</g>`;
     });
-    const numbers = spotsOf(poses, APART * pixel).map(
+    const numbers = spotsOf(poses, APART * pixel, within_m).map(
       ({ x, y }, index) => `<g class="place" data-step="${index}"><circle class="spot" cx="${-y}" cy="${-x}"
         r="${SPOT * pixel}" /><text x="${-y}" y="${-x}" dy=".35em">${index + 1}</text></g>`,
     );

@@ -1,5 +1,6 @@
 // A protocol drawn as it will be walked: a block for each phase, as wide as it is long.
 
+import { clock } from "garry/shared/format";
 import { fitText, shape, text, title } from "garry/shared/svg";
 
 const NARROWEST = 52; // pixels of a phase
@@ -7,7 +8,7 @@ const LETTER = 7; // pixels of a letter of its name
 const LETTERS_MAX = 20; // that no phase is widened for
 const OPEN_PHASE_S = 300; // a phase without an end is drawn as if it took this long
 const GROUND = 92;
-const MINUTE_FROM_S = 90;
+const MINUTE_FROM_S = 90; // of a time that follows from strides
 const MINUTE_WITHIN_S = 5; // fifty strides count as a minute
 
 // Divide the room by weight, so that no part is narrower than its least width.
@@ -34,8 +35,10 @@ function lengthOf({ strides, seconds }, stride_s) {
 export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
   const lengths = phases.map((phase) => lengthOf(phase, stride_s));
 
-  function formatLength(seconds) {
+  // A time that was set is written to the second.
+  function formatLength(seconds, isSet = false) {
     if (seconds === null) return labels.open;
+    if (isSet && seconds > 60 && seconds % 60) return `${clock(seconds)} ${labels.minutes}`;
     const minutes = Math.round(seconds / 60);
     const isMinute = Math.abs(seconds - 60) <= MINUTE_WITHIN_S;
     return seconds < MINUTE_FROM_S && !isMinute ? `${Math.round(seconds)} s` : `${minutes} ${labels.minutes}`;
@@ -48,7 +51,7 @@ export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
     const kind = `${phase.feedback ? "on" : "off"}${isOpen ? " endless" : ""}`;
     const block = { x: left + 2, y: GROUND - height, width: width - 4, height, rx: 4 };
     const gain = { class: "gain", x: left + width / 2, y: GROUND + 18 - height };
-    const length = formatLength(lengths[index]);
+    const length = formatLength(lengths[index], lengths[index] === phase.seconds);
     return shape(
       "g",
       {},
