@@ -95,8 +95,10 @@ def test_words_are_as_large_as_promised(
         assert found["word"] == pytest.approx(promised, rel=0.01), text
         usual = 2.0
         # Where no size is promised it leaves room to the others, on the side that is seen.
-        if not measured and valence == "explicit" and (
-            side in HALVES or (text == "largest" and side not in COLUMNS)
+        if (
+            not measured
+            and valence == "explicit"
+            and (side in HALVES or (text == "largest" and side not in COLUMNS))
         ):
             usual = 1.5
         elif not measured and (text == "largest" or (side in HALVES and width > height)):
