@@ -14,6 +14,7 @@ from rehab.people.models import Patient, User
 from rehab.people.simulated import counted
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
+from rehab.stations.device_trust import find_ended
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_device_states
 
@@ -47,8 +48,9 @@ def _look_for_tablet(user: User, now: datetime) -> Found:
     tablets = list_devices(user, Device.Kind.TABLET)
     if not tablets:
         return Found(False, _("No tablet is paired yet."))
+    is_paired = bool({one.pk for one in tablets} - find_ended(tablets, now))
     states = format_device_states(tablets, now)
-    return Found(True, ", ".join(f"{one.name}, {state}" for one, state in states))
+    return Found(is_paired, ", ".join(f"{one.name}, {state}" for one, state in states))
 
 
 def _look_for_sensor(user: User, now: datetime) -> Found:

@@ -41,6 +41,15 @@ def test_empty_clinic_is_walked_through_and_sees_each_step_work(server: Server, 
     page.click("details[open] .primary")
     token = page.locator("#token").inner_text().strip()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    # What is a clinic's own is filled into the line: quoted, never what a shell would run.
+    page.click("text=Lab Streaming Layer")
+    forces, mass = (page.locator(f"[open] [data-fills={one}]") for one in ("forces", "mass"))
+    for typed, stands in (("Our plates", "Our plates"), ("$(reboot)", "Treadmill")):
+        forces.fill(typed)
+        mass.fill("72,5")
+        told = shlex.split(page.locator("details[open] code").last.inner_text())
+        assert told[3:8] == ["lsl", "--stream", stands, "Mocap", "--mass"]
+        assert told[8] == "72.5"
     # Its program's line is copied as it stands, and is seen to work on the same page.
     page.click("text=simulated patient")
     line = shlex.split(page.locator("details[open] code").last.inner_text())

@@ -172,6 +172,7 @@ def test_each_device_is_limited_by_itself_behind_one_address(tmp_path: Path, sho
             answers = Counter(pool.map(ask, ["one"] * (least + 100)))
         assert answers[429] > 0
         assert answers[429] <= 100 + 0.03 * least, answers  # its window slides
+        assert answers[200] > 0.5 * least, answers  # others were dropped on a busy machine
         assert ask("another") == (200 if shown else 429)
 
 

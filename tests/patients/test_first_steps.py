@@ -7,6 +7,7 @@ import re
 import pytest
 from django.utils import timezone
 
+from rehab.people.roles import Role
 from rehab.stations.models import Device, Station
 
 pytestmark = pytest.mark.django_db
@@ -42,10 +43,15 @@ def test_a_lead_is_shown_the_line_of_a_sensor_that_is_not_connected(world, devic
 
 
 def test_a_tablet_that_was_let_in_is_done_though_it_is_off(world, device):
-    Device.everywhere.filter(pk=device.pk).update(kind=Device.Kind.TABLET)
+    tablets = Device.everywhere.filter(pk=device.pk)
+    tablets.update(kind=Device.Kind.TABLET, approver=world.people[Role.LEAD])
     page = world.lead.get("/first-steps/?step=tablet").content.decode()
     assert re.search(r'data-step="tablet"\s+class="done"', page)
     assert re.search(r'data-step="sensor"\s+class="next"', page)
+    # One whose approver is gone has to be let in again.
+    tablets.update(approver=None)
+    page = world.lead.get("/first-steps/?step=tablet").content.decode()
+    assert re.search(r'data-step="tablet"\s+class="next"', page)
 
 
 def test_a_therapist_is_told_who_does_it(world, device):

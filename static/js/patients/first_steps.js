@@ -7,6 +7,8 @@ async function look() {
   try {
     const answer = await fetch(root.dataset.state, { cache: "no-store" });
     for (const [slug, [isDone, words]] of Object.entries(await answer.json())) draw(slug, isDone, words);
+    const next = root.querySelector(".steps li:not(.done, .skipped)");
+    for (const step of root.querySelectorAll(".steps li")) step.classList.toggle("next", step === next);
   } catch {
     // asked again
   }
@@ -22,7 +24,7 @@ function draw(slug, isDone, words) {
   const live = root.querySelector(`[data-live=${slug}]`);
   if (!live) return;
   // What is done is folded away: the next step is what leads on.
-  if (isDone && !live.classList.contains("done")) root.querySelector("details")?.removeAttribute("open");
+  if (isDone && !live.classList.contains("done")) root.querySelector("details:not([name])")?.removeAttribute("open");
   live.classList.toggle("done", isDone);
   if (live.textContent !== words) live.textContent = words;
   for (const part of root.querySelectorAll("[data-when]")) part.hidden = (part.dataset.when === "done") !== isDone;

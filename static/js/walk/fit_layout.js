@@ -27,8 +27,8 @@ const SCALE_LEAST = 260; // of the thermometer
 const BESIDE_WORDS = 420; // the same, where words are beside it and so may be smaller for its sake
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
-const FOOT = 172; // below the scale: the bulb
-const [BULB, LARGE_BULB] = [94, 116]; // its radius; larger where it holds the badge
+const [BULB, LARGE_BULB] = [94, 104]; // its radius; larger where it holds the badge
+const OVERLAP = 16; // of the bulb and the scale
 const SIGN_BESIDE = [40, 28]; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
@@ -101,7 +101,8 @@ export function createFitting(body, scene) {
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
-    const zero = stand - FOOT;
+    const bulb = isInBulb && !isExplicit ? LARGE_BULB : BULB;
+    const zero = stand - 2 * bulb + OVERLAP;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
@@ -114,8 +115,7 @@ export function createFitting(body, scene) {
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    const bulb = isInBulb && !isExplicit ? LARGE_BULB : BULB;
-    const center = zero + FOOT - bulb; // the bulb's
+    const center = stand - bulb; // the bulb's
     return { width, height, sign, inset, bulb, center, top, zero, goal, reach, above, high };
   }
 
