@@ -72,7 +72,7 @@ def test_room_is_played_again_from_its_log(server, visit):
     assert page.locator("#strip .on-cloth").text_content() == "4.10"
     page.click("[data-step='-1']")
     patient.locator("body[data-step='4']").wait_for()
-    assert patient.locator(".words").inner_text() == "Not measured."
+    assert patient.locator(".words").inner_text() == "Not seen."
 
     # A note leads to its moment; that moment has an address.
     page.click(".told button:has-text('Dizziness')")

@@ -86,7 +86,7 @@ export function phaseLeft({ phase, phase_s, phase_strides }) {
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
 }
 
-const NOT_MEASURED = _("Not measured.");
+const NOT_MEASURED = _("Not seen.");
 
 // Return the words after a step; without points they are the goal, beside which the value stands.
 export function phraseOf(step) {
