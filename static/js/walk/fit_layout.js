@@ -20,16 +20,15 @@ const TWO = 2.02; // lines, with what is lost by rounding
 const EDGE = 24; // of the screen
 const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
-const [BADGE_LEAST, BADGE_IN_HALF] = [160, 220];
+const [BADGE_LEAST, BADGE_IN_HALF] = [160, 205];
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 260; // of the thermometer
 const BESIDE_WORDS = 420; // the same, where words are beside it and so may be smaller for its sake
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
-const [BULB, LARGE_BULB] = [94, 104]; // its radius; larger where it holds the badge
-const OVERLAP = 16; // of the bulb and the scale
-const SIGN_BESIDE = [40, 28]; // more than AIR, above and below the goal, where its sign is there
+const FOOT = 172; // below the scale: the bulb
+const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -80,7 +79,7 @@ export function createFitting(body, scene) {
       high = Math.max(high, words.offsetHeight);
     }
     const u = unit();
-    const total = count.offsetHeight / u;
+    const [total, digits] = [count.offsetHeight / u, key.offsetHeight / u];
     words.replaceChildren(...[was[0]].filter(Boolean));
     key.textContent = was[1];
     if (was[2] !== undefined) key.dataset.lost = was[2];
@@ -90,7 +89,6 @@ export function createFitting(body, scene) {
     const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
     const isStacked = isHalf || !landscape.matches; // badge and total, one below the other
-    const isInBulb = isBeside && isLargest; // the badge
     const isExplicit = theme === "explicit";
     const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, below the words
     const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
@@ -101,22 +99,22 @@ export function createFitting(body, scene) {
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
-    const bulb = isInBulb && !isExplicit ? LARGE_BULB : BULB;
-    const zero = stand - 2 * bulb + OVERLAP;
+    const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const hasBadge = level < BADGE && !isExplicit && !isInBulb; // walk.css
+    const hasBadge = level < BADGE && !isExplicit; // walk.css
     const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : isHalf ? BADGE_IN_HALF : BADGE_LEAST;
     const under = reach + airBelow;
     const beside = isBelow || isAbove ? 0 : total;
-    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    // The badge is above the total, behind the goal's sign and the total's name.
+    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + digits);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    const center = stand - bulb; // the bulb's
-    return { width, height, sign, inset, bulb, center, top, zero, goal, reach, above, high };
+    return { width, height, sign, inset, top, zero, goal, reach, above, high };
   }
 
   function set(level, short) {

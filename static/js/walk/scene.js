@@ -6,6 +6,7 @@ import { createDots } from "garry/walk/stride_dots";
 
 const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const TUBE_RADIUS = 68;
+const BULB_RADIUS = 94;
 const EDGE = 24;
 // The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
@@ -15,9 +16,9 @@ const AT_LINE = "M0 0l20 -40h132v80h-132z";
 const ON_LINE = "M0 40l20 -80h132v80z";
 const SIGNS = {
   behind: { path: AT_LINE, room: 230, rise: 0, turn: 1 },
-  beside: { path: AT_LINE, rise: 0, turn: -1 },
-  over: { path: ON_LINE, rise: 43, turn: 1 },
-  before: { path: ON_LINE, rise: 43, turn: -1 },
+  beside: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: -1 },
+  over: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: 1 },
+  before: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: -1 },
 };
 
 export function createScene(svg) {
@@ -33,20 +34,20 @@ export function createScene(svg) {
   // Place all: `top`, `zero` and `goal` are heights of the scale, `reach` that of the strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, top: top150, zero, goal, reach, sign, isFlipped, inset, bulb, center } = frame;
-    const { path, room = bulb, rise, turn } = SIGNS[sign];
+    const { width, height, top: top150, zero, goal, reach, sign, isFlipped, inset } = frame;
+    const { path, room, rise, turn } = SIGNS[sign];
     const x = width - EDGE - room - inset;
-    const [top, r] = [top150 - 36, TUBE_RADIUS];
-    const join = center - Math.sqrt(bulb ** 2 - r ** 2);
+    const [top, bottom, r] = [top150 - 36, zero + 78, TUBE_RADIUS];
+    const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
-    const shell = `${tube}A${bulb} ${bulb} 0 1 1 ${-r} ${join}Z`;
+    const shell = `${tube}A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
     find(".glass").setAttribute("transform", `translate(${x} 0)`);
     place(".hatched", 0, top, { height: zero - top });
-    place(".bulb", 0, center, { r: bulb });
+    place(".bulb", 0, bottom);
     place(".cut", 0, zero - 14);
-    place(".foot", 0, center, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
+    place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", turn * (r + 10), goal - rise, {}, ` scale(${turn} 1)`);
     find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
