@@ -66,7 +66,8 @@ FRAMES = f"""async ([texts, column]) => {{
     const {{ left, top, right, bottom }} = range.getBoundingClientRect();
     const digits = [left, top, right, bottom], bulb = box(".bulb");
     const beside = box(".key")[1] < bulb?.[3];
-    if (beside && right > bulb[0] - 24) wrong.push(`${{column}} ${{text}}: digits at the bulb`);
+    if (beside && right > bulb[0] - 24 && left < bulb[2] + 24)
+      wrong.push(`${{column}} ${{text}}: digits at the bulb`);
     const words = box(".words");
     if (badge && badge[1] < line[1] && badge[3] > line[1])
       wrong.push(`${{column}} ${{text}}: the badge crosses the goal`);
