@@ -7,7 +7,7 @@ async function look() {
   try {
     const answer = await fetch(root.dataset.state, { cache: "no-store" });
     for (const [slug, [isDone, words]] of Object.entries(await answer.json())) draw(slug, isDone, words);
-    const next = root.querySelector(".steps li:not(.done, .skipped)");
+    const next = root.querySelector(".steps li:not(.done, [data-skipped])");
     for (const step of root.querySelectorAll(".steps li")) step.classList.toggle("next", step === next);
   } catch {
     // asked again
