@@ -29,6 +29,7 @@ const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
+const UNDER_LINE = 10; // the badge, behind that sign
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -110,7 +111,7 @@ export function createFitting(body, scene) {
     const beside = isBelow || isAbove ? 0 : total;
     let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     // The badge is above the total, behind the goal's sign and the total's name.
-    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, AIR + badge + digits);
+    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, UNDER_LINE + badge + digits);
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
