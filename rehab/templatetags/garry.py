@@ -1,5 +1,6 @@
 """Tags and filters of all templates."""
 
+import json
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,6 +13,7 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 
 from rehab.people.web.help_pages import find_part
+from rehab.people.web.page_scripts import REPLAYED_SOCKET, SOCKET, find_modules
 from rehab.people.web.tour import show_step, where_in_tour
 from rehab.sessions.formatting import (
     format_duration,
@@ -46,15 +48,26 @@ def back(view: str, *args: object) -> SafeString:
     )
 
 
-@register.simple_tag
-def wire_limits() -> SafeString:
-    """Return what a page's scripts have to know of the wire, as the JSON element ``wire``."""
+@register.simple_tag(takes_context=True)
+def import_map(context: dict[str, Any], *scripts: str) -> SafeString:
+    """Return where scripts of static/js/ (of all pages, if none is named) find what they import,
+    and what they have to know of the wire, as the JSON element ``wire``.
+    """
+    files = find_modules(*scripts)
+    if context.get("replayed") and SOCKET in files:
+        files = {**files, SOCKET: REPLAYED_SOCKET}
+    imports = {name: static(file) for name, file in files.items()}
     limits = {
         "final_codes": sorted(FINAL_FOR_PAGES),
         "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S,
         "server_cookie": SERVER_COOKIE,
     }
-    return json_script(limits, "wire")
+    return format_html(
+        '{}<script type="importmap" nonce="{}">{}</script>',
+        json_script(limits, "wire"),
+        context["request"].csp_nonce,
+        SafeString(json.dumps({"imports": imports}, separators=(",", ":"))),
+    )
 
 
 @register.simple_tag(takes_context=True)

@@ -160,12 +160,13 @@ def test_what_goes_makes_words_larger(
     walking: Any, sizes: list[float], is_measured: bool, least: int, level: int
 ) -> None:
     """Where nobody measured, badge and thermometer stay for a tenth and two fifths of the size."""
-    chosen = walking("en", "positive").evaluate(
+    chosen, size = walking("en", "positive").evaluate(
         """async ([sizes, ...how]) => (await import("garry/walk/fit_layout"))
-          .chooseLevel((level) => sizes[level], ...how)""",
+          .chooseLayout((level, size) => size <= sizes[level], ...how)""",
         [sizes, is_measured, least],
     )
     assert chosen == level
+    assert sizes[level] - 0.005 <= size <= sizes[level]
 
 
 @pytest.mark.parametrize(

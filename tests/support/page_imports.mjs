@@ -1,4 +1,4 @@
-// Lets node import the pages' modules by the names of templates/importmap.html: garry/… is in static/js.
+// Lets node import the pages' modules by the names of rehab/people/web/page_scripts.py: garry/… is in static/js.
 import { register } from "node:module";
 
 const FOLDER = new URL("../../static/js/", import.meta.url).href;

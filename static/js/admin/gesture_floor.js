@@ -2,7 +2,7 @@
 // follow, and what is shown comes from the server, which simulates each change (or says what is wrong with it).
 
 import { playPreview } from "garry/shared/gesture_preview";
-import { append } from "garry/shared/svg";
+import { append } from "garry/shared/svg_element";
 import { RobotScene } from "garry/shared/robot_scene";
 import { WalkerView } from "garry/shared/walker_view";
 

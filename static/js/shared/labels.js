@@ -113,15 +113,6 @@ const WORN_CURES = {
   low_rate: _("Charge the phone, and turn its power saving off."),
 };
 
-// What ends a page's connection or refuses an order, by its code; others come with a text of their own.
-const REFUSALS = {
-  sign_in: _("Sign in again, or pair the tablet again."),
-  no_session: _("There is no such session for you."),
-  not_open: _("The session is not open. Reload the page."),
-  not_stored: _("It could not be stored. Try again."),
-};
-
-export const refusal = ({ code, message }) => REFUSALS[code] ?? message;
 export const typeName = (slug, label = slug) => TYPES[slug] ?? label;
 export const phaseName = (name) => PHASES[name] ?? name;
 export const severityName = (severity) => SEVERITIES[severity] ?? REMARKS.fall_severity;

@@ -1,7 +1,8 @@
 // The robot from above, in its own frame: home in the middle, ahead is up. Drawn once; then what moves is moved.
 
 import { _, number } from "garry/shared/language";
-import { append, shape, text } from "garry/shared/svg";
+import { shape, text } from "garry/shared/svg";
+import { append } from "garry/shared/svg_element";
 
 const TETHER_M = 0.3; // it never leaves this circle (docs/safety.md)
 const BASE_M = 0.175;

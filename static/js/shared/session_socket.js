@@ -13,7 +13,6 @@
 // socket's: `after(ms, act)` returns what cancels it.
 
 import { _ } from "garry/shared/language";
-import { refusal } from "garry/shared/labels";
 
 const wire = JSON.parse(document.getElementById("wire").textContent); // robot/wire/
 const STALE_MS = 2 * wire.heartbeat_ms; // after which nothing on the page counts as present
@@ -28,6 +27,14 @@ const FIRST_PAUSE_MS = 200;
 const LONGEST_PAUSE_MS = 5_000;
 const FINAL = new Set(wire.final_codes); // do not retry as it is
 const STEPS = new Set(["step", "missing", "calm"]);
+// What ends a page's connection or refuses an order, by its code; others come with a text of their own.
+const REFUSALS = {
+  sign_in: _("Sign in again, or pair the tablet again."),
+  no_session: _("There is no such session for you."),
+  not_open: _("The session is not open. Reload the page."),
+  not_stored: _("It could not be stored. Try again."),
+};
+const refusal = ({ code, message }) => REFUSALS[code] ?? message;
 
 export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
   const pending = new Map(); // changes that have not been answered

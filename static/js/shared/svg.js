@@ -1,4 +1,4 @@
-// SVG drawings, as markup that is set at once and as elements that stay.
+// SVG drawings, as markup that is set at once.
 
 const ESCAPES = { "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" };
 
@@ -29,7 +29,3 @@ export function fitViewBox(svg) {
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   return [width, height];
 }
-
-// Add a new element of SVG to another one and return it.
-export const append = (parent, name) =>
-  parent.appendChild(document.createElementNS("http://www.w3.org/2000/svg", name));

@@ -1,7 +1,8 @@
 // The robot as a walker sees it: 2 m in front of it, eyes at 1.55 m, with a face on its mast. Each flat part is drawn
 // in its own units, and laid into the picture as a plane that the eye sees.
 
-import { append, shape } from "garry/shared/svg";
+import { shape } from "garry/shared/svg";
+import { append } from "garry/shared/svg_element";
 import { COLORS, FACE, showFace } from "garry/shared/robot_scene";
 
 const EYE = [2, 0, 1.55];

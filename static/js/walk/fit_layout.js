@@ -14,7 +14,8 @@ const ENOUGH = 0.99; // of the largest size that is possible
 // So much of it must be left where no size is promised, for the chart, the badge and the thermometer to stay.
 const WORTH = [ENOUGH, 0.9, 0.6];
 const LEAST = 0.1; // of the promised size
-const HALVINGS = 8; // of the search for what fits
+const STEP = 0.004; // to which it is found
+const STEP_PX = 4; // the same, of the words' width
 const TWO = 2.02; // lines, with what is lost by rounding
 
 const EDGE = 24; // of the screen
@@ -35,19 +36,41 @@ const SCENE = 188; // the thermometer's width
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
 
-// Return how much goes, by the largest size of words at each level, at least so much.
-export function chooseLevel(size, isMeasured, least) {
-  const worth = (level) => (isMeasured ? ENOUGH : WORTH[level]);
+// Return the value nearest to `not` that is found to hold, to one `step`; `fits` does.
+function findLimit(fits, not, step, holds) {
+  while (Math.abs(not - fits) > step) {
+    const value = (fits + not) / 2;
+    if (holds(value)) fits = value;
+    else not = value;
+  }
+  return fits;
+}
+
+const largest = (holds) => (holds(1) ? 1 : findLimit(LEAST, 1, STEP, holds));
+
+// Return how much goes, at least so much, and the size of words, in shares of the promised one: the largest that holds.
+export function chooseLayout(holds, isMeasured, least) {
+  if (holds(least, 1)) return [least, 1];
+  const most = largest((size) => holds(LAST, size));
+  const worth = (level) => most * (isMeasured ? ENOUGH : WORTH[level]);
   let level = least;
-  while (level < LAST && size(level) < 1 && size(level) < worth(level) * size(LAST)) level++;
-  while (level > least && size(level - 1) === size(level)) level--; // what is in no word's way
-  return level;
+  while (level < LAST && !holds(level, worth(level))) level++;
+  if (level === LAST) return [level, most];
+  const size = findLimit(worth(level), Math.min(most + STEP, 1), STEP, (size) => holds(level, size));
+  while (level > least && holds(level - 1, size)) level--; // what is in no word's way
+  return [level, size];
+}
+
+function sampleOf(text) {
+  const sample = Object.assign(document.createElement("span"), { textContent: text });
+  sample.style.display = "block";
+  return sample;
 }
 
 export function createFitting(body, scene) {
   const find = (selector) => body.querySelector(selector);
-  const [stage, main, phrase, words, count, key] = [".stage", "main", ".phrase", ".words", ".count", ".key"].map(find);
-  const [part, actions] = [".part", ".actions"].map(find);
+  const [stage, ground, main, phrase, words] = [".stage", ".ground", "main", ".phrase", ".words"].map(find);
+  const [count, key, part, actions] = [".count", ".key", ".part", ".actions"].map(find);
   const landscape = matchMedia("(orientation: landscape)");
   const { pxPerMm, distance } = body.dataset;
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
@@ -55,6 +78,8 @@ export function createFitting(body, scene) {
 
   const unit = () => parseFloat(getComputedStyle(main).right) / EDGE; // walk.css
   const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
+
+  const heights = () => [...words.children].map((sample) => sample.offsetHeight);
 
   // Return whether a message fits between header and buttons. By its parts' lines: letters reach beyond theirs.
   function holdsMessage() {
@@ -64,28 +89,23 @@ export function createFitting(body, scene) {
     return high <= phrase.clientHeight + 1 && !parts.some(isTooWide);
   }
 
-  // Return the frame that holds each of the samples and the number; null if none does.
-  function frameOf(level, samples, number) {
-    const was = [words.firstChild, key.textContent, key.dataset.lost];
+  // Return whether the number is too wide for its place, also as points that were lost.
+  function isNumberTooWide(number) {
+    const mayBeLost = ["negative", "binary"].includes(body.dataset.theme);
+    return (mayBeLost ? [`−${number}`, number] : [number]).some((text) => {
+      key.toggleAttribute("data-lost", text !== number);
+      key.textContent = text;
+      return isTooWide(key);
+    });
+  }
+
+  // Return the frame that holds each of the samples, which `words` has as its children; null if none does.
+  function frameOf(level) {
+    if (isTooWide(words)) return null;
     const { column, text, theme } = body.dataset;
-    key.textContent = `−${number}`;
-    key.dataset.lost = "";
-    let [isTooLarge, high] = [["negative", "binary"].includes(theme) && isTooWide(key), 0];
-    key.textContent = number;
-    delete key.dataset.lost;
-    isTooLarge ||= isTooWide(key);
-    for (const sample of samples) {
-      words.textContent = sample;
-      isTooLarge ||= isTooWide(words);
-      high = Math.max(high, words.offsetHeight);
-    }
     const u = unit();
     const [total, digits] = [count.offsetHeight / u, key.offsetHeight / u];
-    words.replaceChildren(...[was[0]].filter(Boolean));
-    key.textContent = was[1];
-    if (was[2] !== undefined) key.dataset.lost = was[2];
-    if (isTooLarge) return null;
-
+    let high = Math.max(...heights());
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
@@ -118,48 +138,54 @@ export function createFitting(body, scene) {
     return { width, height, sign, inset, top, zero, goal, reach, above, high };
   }
 
-  function set(level, short) {
+  function set(level, size) {
     body.dataset.drop = level;
-    if (short < 1) body.dataset.short = short.toFixed(4);
+    if (size < 1) body.dataset.short = size.toFixed(4);
     else delete body.dataset.short;
-    body.style.setProperty("--short", short);
-    body.style.removeProperty("--measure");
-  }
-
-  // Return the largest size of words, in shares of the promised one, at which a layout holds all.
-  function largest(level, holds) {
-    set(level, 1);
-    if (holds(level)) return 1;
-    let [fits, not] = [LEAST, 1];
-    for (let i = 0; i < HALVINGS; i++) {
-      const short = (fits + not) / 2;
-      set(level, short);
-      if (holds(level)) fits = short;
-      else not = short;
-    }
-    return fits;
+    main.style.setProperty("--short", size);
+    phrase.style.removeProperty("--measure");
   }
 
   // Make the words' place as narrow as it can be: so they stand near the thermometer. One line may become two where
   // the frame has room for them; more there are not for that.
-  function narrow(samples, high) {
-    const said = words.firstChild;
-    const heightOf = (sample) => {
-      words.textContent = sample;
-      return words.offsetHeight;
-    };
+  function narrow(high) {
     const two = Math.min(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    const most = samples.map((sample) => Math.max(heightOf(sample), two));
-    let [fits, not] = [phrase.parentElement.clientWidth, 0];
-    for (let i = 0; i < HALVINGS; i++) {
-      const width = (fits + not) / 2;
-      body.style.setProperty("--measure", `${width}px`);
-      const isHeld = samples.every((sample, index) => heightOf(sample) <= most[index] && !isTooWide(words));
-      if (isHeld) fits = width;
-      else not = width;
-    }
-    words.replaceChildren(...[said].filter(Boolean));
-    body.style.setProperty("--measure", `${Math.ceil(fits) + 1}px`);
+    const most = heights().map((height) => Math.max(height, two));
+    const width = findLimit(main.clientWidth, 0, STEP_PX, (width) => {
+      phrase.style.setProperty("--measure", `${width}px`);
+      return !isTooWide(words) && heights().every((height, index) => height <= most[index]);
+    });
+    phrase.style.setProperty("--measure", `${Math.ceil(width) + 1}px`);
+  }
+
+  // Lay out a step's page for all that it may say.
+  function fitStep(number) {
+    const frame = (level, size) => {
+      set(level, size);
+      const found = frameOf(level);
+      return found && !isNumberTooWide(number) ? found : null;
+    };
+    // In the middle, or in a half, is no room for the chart; who needs the largest words does not see it.
+    const least = body.dataset.column || body.dataset.text === "largest" ? CHART : 0;
+    const [level, size] = chooseLayout(frame, Boolean(body.dataset.pxPerMm), least);
+    const found = frame(level, size);
+    if (!found) return; // a screen so small that nothing fits
+    ground.style.setProperty("--floor", `${found.goal * unit()}px`);
+    if (level === LAST) return;
+    main.style.setProperty("--above", `${found.above * unit()}px`);
+    narrow(found.high);
+    scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });
+  }
+
+  function fitMessage() {
+    const holds = (size) => {
+      set(0, size);
+      return holdsMessage();
+    };
+    set(0, largest(holds));
+    const foot = Math.max(part.offsetHeight, actions.offsetHeight);
+    const below = foot ? foot / unit() + 36 + EDGE : 64;
+    ground.style.setProperty("--floor", `${stage.clientHeight - below * unit()}px`);
   }
 
   // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
@@ -175,27 +201,14 @@ export function createFitting(body, scene) {
     const wanted = [screen, said, number, text, column, side, innerWidth, innerHeight, degree, status].join("|");
     if (wanted === fitted) return;
     fitted = wanted;
+    if (!isFeedback) return fitMessage();
 
-    if (!isFeedback) {
-      set(0, largest(0, holdsMessage));
-      const foot = Math.max(part.offsetHeight, actions.offsetHeight);
-      const below = foot ? foot / unit() + 36 + EDGE : 64;
-      body.style.setProperty("--floor", `${stage.clientHeight - below * unit()}px`);
-      return;
-    }
-    const frame = (level) => frameOf(level, samples, number);
-    const sizes = [];
-    const size = (level) => (sizes[level] ??= largest(level, frame));
-    // In the middle, or in a half, is no room for the chart; who needs the largest words does not see it.
-    const least = column || text === "largest" ? CHART : 0;
-    const level = chooseLevel(size, Boolean(body.dataset.pxPerMm), least);
-    set(level, size(level));
-    const found = frame(level);
-    if (!found) return; // a screen so small that nothing fits
-    body.style.setProperty("--floor", `${found.goal * unit()}px`);
-    if (level === LAST) return;
-    body.style.setProperty("--above", `${found.above * unit()}px`);
-    narrow(samples, found.high);
-    scene.layOut({ ...found, isFlipped: side === "left" });
+    const [lines, total, isLost] = [[...words.childNodes], key.textContent, key.hasAttribute("data-lost")];
+    words.replaceChildren(...samples.map(sampleOf));
+    key.removeAttribute("data-lost"); // its digits are smaller
+    fitStep(number);
+    words.replaceChildren(...lines);
+    key.textContent = total;
+    key.toggleAttribute("data-lost", isLost);
   };
 }

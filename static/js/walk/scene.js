@@ -1,7 +1,7 @@
 // The thermometer and the latest strides. Everything is drawn once for each frame (fit_layout.js) and then only moved,
 // so a step costs a handful of attributes.
 
-import { append } from "garry/shared/svg";
+import { append } from "garry/shared/svg_element";
 import { createDots } from "garry/walk/stride_dots";
 
 const TOP = 1.5; // the scale's end; the goal is always at two thirds of it

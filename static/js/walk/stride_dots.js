@@ -1,7 +1,7 @@
 // The latest strides about the goal line: a disc at or above it, a ring below, a small disc where it was close, a gap
 // where nothing was measured, an arrow up or down where a step is off the chart. Few and large, to be read from 2 m;
 // the newest is the largest.
-import { append } from "garry/shared/svg";
+import { append } from "garry/shared/svg_element";
 import { isStill } from "garry/walk/reduced_motion";
 
 const SHOWN = 6;

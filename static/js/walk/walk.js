@@ -122,6 +122,7 @@ function watchServer() {
 setInterval(watchServer, WATCH_MS);
 
 addEventListener("resize", redraw); // words fit another place
+document.fonts.load(`1em ${getComputedStyle(body).fontFamily}`, "0").then(redraw, redraw); // its file is not the other letters'
 document.fonts.ready.then(redraw);
 redraw();
 if (!isMirror) {
