@@ -122,7 +122,8 @@ function watchServer() {
 setInterval(watchServer, WATCH_MS);
 
 addEventListener("resize", redraw); // words fit another place
-document.fonts.load(`1em ${getComputedStyle(body).fontFamily}`, "0").then(redraw, redraw); // its file is not the other letters'
+// Its zero has a file of its own, which the first score would ask for.
+document.fonts.load(`1em ${getComputedStyle(body).fontFamily}`, "0").then(redraw, redraw);
 document.fonts.ready.then(redraw);
 redraw();
 if (!isMirror) {
