@@ -28,6 +28,7 @@ MEASURE = """() => {
     lost: document.querySelector(".key").textContent.startsWith("−"),
     buttons: [...document.querySelectorAll("header button")].filter((one) => one.checkVisibility())
       .map((one) => { const { left, right } = one.getBoundingClientRect(); return [left, right]; }),
+    tube: box(".shell.wall"), badge: box(".emblem svg"),
     ground: document.querySelector(".ground").getBoundingClientRect().top,
     label: box(".label"), foot: document.querySelector(".thermometer .foot").getScreenCTM().a > 0,
     emblem: shown(".emblem"), scene: shown(".thermometer"), chart: shown(".strides") };

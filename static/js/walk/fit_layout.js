@@ -29,8 +29,9 @@ const BESIDE_WORDS = 420; // the same, where words are beside it and so may be s
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
-const UNDER_LINE = 10; // the badge, behind that sign
+// More than AIR, above and below the goal, where its sign is below the words.
+const SIGN_ROOM = { beside: [54, 28], before: [76, 0], behind: [0, 0] };
+const UNDER_BADGE = 344; // the scale, from the screen's top
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -104,7 +105,7 @@ export function createFitting(body, scene) {
     if (isTooWide(words)) return null;
     const { column, text, theme } = body.dataset;
     const u = unit();
-    const [total, digits] = [count.offsetHeight / u, key.offsetHeight / u];
+    const total = count.offsetHeight / u;
     let high = Math.max(...heights());
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
@@ -115,23 +116,23 @@ export function createFitting(body, scene) {
     const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
-    if (isBeside) sign = isHalf || isLargest ? "beside" : "behind";
-    const [airAbove, airBelow] = (sign === "beside" ? SIGN_BESIDE : [0, 0]).map((more) => AIR + more);
+    if (isBeside && !isHalf) sign = isLargest ? "beside" : "behind";
+    const [airAbove, airBelow] = (isBeside ? SIGN_ROOM[sign] : [0, 0]).map((more) => AIR + more);
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
-    const top = Math.max(isBeside ? SCALE_TOP : sky + SPARKS, (3 * (sky + reach) - zero) / 2);
-    const goal = zero - (2 / 3) * (zero - top);
     const hasBadge = level < BADGE && !isExplicit; // walk.css
-    const badge = !hasBadge ? 0 : level < CHART ? BESIDE_CHART : isHalf ? BADGE_IN_HALF : BADGE_LEAST;
+    const isOver = hasBadge && isLargest && isBeside; // the badge, over the thermometer
+    const head = isOver ? UNDER_BADGE : isBeside ? SCALE_TOP : sky + SPARKS;
+    const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
+    const goal = zero - (2 / 3) * (zero - top);
+    const badge = !hasBadge || isOver ? 0 : level < CHART ? BESIDE_CHART : isHalf ? BADGE_IN_HALF : BADGE_LEAST;
     const under = reach + airBelow;
     const beside = isBelow || isAbove ? 0 : total;
-    let ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
-    // The badge is above the total, behind the goal's sign and the total's name.
-    if (isLargest && isBeside && badge) ground = goal + Math.max(under + total, UNDER_LINE + badge + digits);
+    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
@@ -169,6 +170,7 @@ export function createFitting(body, scene) {
     const least = body.dataset.column || body.dataset.text === "largest" ? CHART : 0;
     const [level, size] = chooseLayout(frame, Boolean(body.dataset.pxPerMm), least);
     const found = frame(level, size);
+    stage.style.setProperty("--short", size); // of all, once it is found
     if (!found) return; // a screen so small that nothing fits
     ground.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
@@ -205,7 +207,6 @@ export function createFitting(body, scene) {
 
     const [lines, total, isLost] = [[...words.childNodes], key.textContent, key.hasAttribute("data-lost")];
     words.replaceChildren(...samples.map(sampleOf));
-    key.removeAttribute("data-lost"); // its digits are smaller
     fitStep(number);
     words.replaceChildren(...lines);
     key.textContent = total;
