@@ -21,7 +21,7 @@ const TWO = 2.02; // lines, with what is lost by rounding
 const EDGE = 24; // of the screen
 const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
-const [BADGE_LEAST, BADGE_IN_HALF] = [160, 205];
+const [BADGE_LEAST, BADGE_IN_HALF] = [160, 200];
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 260; // of the thermometer
@@ -30,7 +30,7 @@ const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
 // More than AIR, above and below the goal, where its sign is below the words.
-const SIGN_ROOM = { beside: [54, 28], before: [76, 0], behind: [0, 0] };
+const SIGN_ROOM = { beside: [54, 28], before: [92, 0], behind: [0, 0] };
 const UNDER_BADGE = 344; // the scale, from the screen's top
 const SCENE = 188; // the thermometer's width
 
@@ -112,8 +112,8 @@ export function createFitting(body, scene) {
     const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
     const isStacked = isHalf || !landscape.matches; // badge and total, one below the other
     const isExplicit = theme === "explicit";
-    const isAbove = level < LAST && !landscape.matches && isExplicit; // the value, below the words
-    const isBelow = !landscape.matches && !isExplicit && (isLargest || column);
+    const isBelow = !landscape.matches && (isLargest || column); // the total, below the thermometer
+    const isAbove = level < LAST && !landscape.matches && isExplicit && !isBelow; // the value, below the words
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
     if (isBeside && !isHalf) sign = isLargest ? "beside" : "behind";
