@@ -101,15 +101,14 @@ def test_words_are_as_large_as_promised(
         assert found["word"] == pytest.approx(promised, rel=0.01), text
         usual = 2.0
         # Where no size is promised it leaves room to the others, on the side that is seen.
-        if (
-            not measured
-            and valence == "explicit"
-            and (side in HALVES or (text == "largest" and side not in COLUMNS))
-        ):
-            usual = 1.5
-        elif not measured and (text == "largest" or (side in HALVES and width > height)):
-            is_wide_largest = width > height and side not in COLUMNS
-            usual = 1.7 if is_wide_largest else 1.6
+        is_upright = height >= width
+        if not measured and (text == "largest" or side in COLUMNS):
+            if valence == "explicit":
+                usual = 1.5
+            elif not is_upright and side != "center":
+                usual = 1.7
+            elif text == "largest":
+                usual = 1.6
         # Points that were lost are smaller.
         large = min(1.5, 0.95 * usual) if found["lost"] else usual
         assert found["key"] == pytest.approx(large * promised, rel=0.01), text

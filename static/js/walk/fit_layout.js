@@ -21,17 +21,16 @@ const TWO = 2.02; // lines, with what is lost by rounding
 const EDGE = 24; // of the screen
 const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
-const [BADGE_LEAST, BADGE_IN_HALF] = [160, 200];
+const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const SIGN = 40; // of a step, beside the total's name and higher than that
-const SCALE_LEAST = 260; // of the thermometer
-const BESIDE_WORDS = 420; // the same, where words are beside it and so may be smaller for its sake
+const SCALE_LEAST = 248; // of the thermometer
+const BESIDE_WORDS = 400; // the same, where words are beside it and so may be smaller for its sake
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-// More than AIR, above and below the goal, where its sign is below the words.
-const SIGN_ROOM = { beside: [54, 28], before: [92, 0], behind: [0, 0] };
-const UNDER_BADGE = 344; // the scale, from the screen's top
+const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
+const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [356, 404]; // the scale, from the screen's top
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -109,15 +108,15 @@ export function createFitting(body, scene) {
     let high = Math.max(...heights());
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
-    const isBeside = landscape.matches && column !== "center"; // words and thermometer, one beside the other
-    const isStacked = isHalf || !landscape.matches; // badge and total, one below the other
+    const isUpright = !landscape.matches;
+    const isBeside = !isUpright && column !== "center"; // words and thermometer, one beside the other
     const isExplicit = theme === "explicit";
-    const isBelow = !landscape.matches && (isLargest || column); // the total, below the thermometer
-    const isAbove = level < LAST && !landscape.matches && isExplicit && !isBelow; // the value, below the words
+    const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
+    const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
     if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
-    if (isBeside && !isHalf) sign = isLargest ? "beside" : "behind";
-    const [airAbove, airBelow] = (isBeside ? SIGN_ROOM[sign] : [0, 0]).map((more) => AIR + more);
+    if (isBeside) sign = isHalf || isLargest ? "beside" : "behind";
+    const [airAbove, airBelow] = (sign === "beside" ? SIGN_BESIDE : [0, 0]).map((more) => AIR + more);
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
@@ -125,14 +124,15 @@ export function createFitting(body, scene) {
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
-    const isOver = hasBadge && isLargest && isBeside; // the badge, over the thermometer
-    const head = isOver ? UNDER_BADGE : isBeside ? SCALE_TOP : sky + SPARKS;
+    const isOver = hasBadge && sign === "beside"; // the badge, over the thermometer
+    const underBadge = isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE;
+    const head = isOver ? underBadge : isBeside ? SCALE_TOP : sky + SPARKS;
     const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const badge = !hasBadge || isOver ? 0 : level < CHART ? BESIDE_CHART : isHalf ? BADGE_IN_HALF : BADGE_LEAST;
+    const badge = !hasBadge || isOver ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + airBelow;
     const beside = isBelow || isAbove ? 0 : total;
-    const ground = goal + under + (isStacked ? badge + beside : Math.max(badge, beside));
+    const ground = goal + under + (isUpright ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
@@ -170,7 +170,6 @@ export function createFitting(body, scene) {
     const least = body.dataset.column || body.dataset.text === "largest" ? CHART : 0;
     const [level, size] = chooseLayout(frame, Boolean(body.dataset.pxPerMm), least);
     const found = frame(level, size);
-    stage.style.setProperty("--short", size); // of all, once it is found
     if (!found) return; // a screen so small that nothing fits
     ground.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
