@@ -50,21 +50,22 @@ def back(view: str, *args: object) -> SafeString:
 
 @register.simple_tag(takes_context=True)
 def import_map(context: dict[str, Any], *scripts: str) -> SafeString:
-    """Return where scripts of static/js/ (of all pages, if none is named) find what they import,
-    and what they have to know of the wire, as the JSON element ``wire``.
+    """Return where scripts of static/js/ (of all pages, if none is named) find what they import.
+
+    With it comes what the session's socket has to know of the wire, as the JSON element ``wire``.
     """
     files = find_modules(*scripts)
-    if context.get("replayed") and SOCKET in files:
-        files = {**files, SOCKET: REPLAYED_SOCKET}
-    imports = {name: static(file) for name, file in files.items()}
     limits = {
         "final_codes": sorted(FINAL_FOR_PAGES),
         "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S,
         "server_cookie": SERVER_COOKIE,
     }
+    if context.get("replayed"):
+        files = {**files, SOCKET: REPLAYED_SOCKET}
+    imports = {name: static(file) for name, file in files.items()}
     return format_html(
         '{}<script type="importmap" nonce="{}">{}</script>',
-        json_script(limits, "wire"),
+        json_script(limits, "wire") if SOCKET in files else "",
         context["request"].csp_nonce,
         SafeString(json.dumps({"imports": imports}, separators=(",", ":"))),
     )

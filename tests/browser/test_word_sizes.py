@@ -14,10 +14,10 @@ from playwright.sync_api import Browser, Page
 
 from rehab.sessions.pages.walk import COLUMNS
 from tests.support.browsers import signed_in
-from tests.support.layout import SCREENS
+from tests.support.layout import DRAWN, SCREENS
 from tests.support.servers import Server
 from tests.support.walk_seed import feet_of, make_walks
-from tests.support.word_sizes import NEVER_STILL, SIDES, look
+from tests.support.word_sizes import MEASURE, NEVER_STILL, SIDES, look
 
 pytestmark = pytest.mark.browser
 
@@ -200,6 +200,17 @@ def test_unmeasured_tablets_keep_the_thermometer(walking: Any, side: str, screen
     assert found["scene"]
     assert found["short"] >= KEPT_FROM
     assert found["word"] > look(walking("en", "positive"), side, screen, "normal", None)["word"]
+
+
+@pytest.mark.parametrize("side", ["right", "in_left"])
+def test_low_windows_keep_the_badge_off_the_thermometer(walking: Any, side: str) -> None:
+    page = walking("en", "positive")
+    look(page, side, "tablet-landscape", "largest", None)
+    page.set_viewport_size({"width": 800, "height": 360})
+    page.evaluate(DRAWN)
+    found = page.evaluate(MEASURE)
+    assert found["emblem"]
+    assert not overlap(found["badge"], found["tube"], 2)
 
 
 def test_what_no_screen_can_hold_is_told(walking: Any) -> None:

@@ -1,4 +1,4 @@
-"""The colors of the patient's pages: as readable as they promise, and as bright in each theme."""
+"""Colors: as readable as they promise, and on patients' pages as bright in each theme."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ TOKENS = Path(__file__).parents[2] / "static" / "css" / "shared" / "tokens.css"
 THEMES = [*VALENCES, "calm"]
 
 
-def colors_of(theme: str) -> dict[str, str]:
-    """Return the colors of a theme, with those that all share, by name: ``"#e2eefe"``."""
-    blocks = [":root", f'[data-theme="{theme}"]']
+def colors_of(*blocks: str) -> dict[str, str]:
+    """Return the colors of these blocks, with those that all share, by name: ``"#e2eefe"``."""
     text = TOKENS.read_text()
-    bodies = [text.split(f"\n{block} {{", 1)[1].split("\n}", 1)[0] for block in blocks]
+    bodies = [text.split(f"{block} {{", 1)[1].split("}", 1)[0] for block in (":root", *blocks)]
     return dict(re.findall(r"--(\w[\w-]*): (#[0-9a-f]{6})", "".join(bodies)))
 
 
@@ -35,13 +34,27 @@ def contrast(one: str, other: str) -> float:
 
 @pytest.mark.parametrize("theme", THEMES)
 def test_words_and_shapes_stand_out(theme: str) -> None:
-    color = colors_of(theme)
-    for words, behind in [("ink", "sky"), ("ink", "ground"), ("deep", "ground"), ("tube", "deep")]:
+    color = colors_of(f'[data-theme="{theme}"]')
+    for words, behind in [
+        ("ink", "sky"),
+        ("ink", "ground"),
+        ("deep", "ground"),
+        ("on-deep", "deep"),
+    ]:
         assert contrast(color[words], color[behind]) >= 7, (words, behind)
     for behind in ("tube", "ground"):
         assert contrast(color["fill"], color[behind]) >= 4, behind
 
 
 def test_no_type_is_brighter_than_another() -> None:
-    grounds = [luminance(colors_of(theme)["ground"]) for theme in THEMES]
+    grounds = [luminance(colors_of(f'[data-theme="{theme}"]')["ground"]) for theme in THEMES]
     assert 0.655 <= min(grounds) <= max(grounds) <= 0.695
+
+
+@pytest.mark.parametrize(
+    "blocks", [[":root,\n[data-pt]"], [":root,\n[data-pt]", '[data-pt="dark"]']]
+)
+def test_shapes_of_charts_stand_out(blocks: list[str]) -> None:
+    color = colors_of(*blocks)
+    for shape in ("edge", "c-miss", "c-third", "primary"):  # a hit is primary
+        assert contrast(color[shape], color["card"]) >= 3, shape

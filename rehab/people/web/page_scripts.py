@@ -30,7 +30,7 @@ def find_modules(*scripts: str) -> dict[str, str]:
     found: dict[str, str] = {}
     paths = [FOLDER / f"{script}.js" for script in scripts] or sorted(FOLDER.rglob("*.js"))
     while paths:
-        for name in _IMPORTED.findall(paths.pop().read_text()):
+        for name in _IMPORTED.findall(paths.pop().read_text("utf-8")):
             if name not in found:
                 found[name] = PACKAGES.get(name) or f"{name.replace('garry', 'js', 1)}.js"
                 if name not in PACKAGES:

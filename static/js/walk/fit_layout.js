@@ -30,13 +30,13 @@ const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
-const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [356, 404]; // the scale, from the screen's top
+const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [248, 280]; // the scale, from that badge's top
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
 
-// Return the value nearest to `not` that is found to hold, to one `step`; `fits` does.
+// Return the value nearest to `not` that is found to hold, to one `step`; `fits` if none does.
 function findLimit(fits, not, step, holds) {
   while (Math.abs(not - fits) > step) {
     const value = (fits + not) / 2;
@@ -56,7 +56,7 @@ export function chooseLayout(holds, isMeasured, least) {
   let level = least;
   while (level < LAST && !holds(level, worth(level))) level++;
   if (level === LAST) return [level, most];
-  const size = findLimit(worth(level), Math.min(most + STEP, 1), STEP, (size) => holds(level, size));
+  const size = holds(level, most) ? most : findLimit(worth(level), most, STEP, (size) => holds(level, size));
   while (level > least && holds(level - 1, size)) level--; // what is in no word's way
   return [level, size];
 }
@@ -125,7 +125,7 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const isOver = hasBadge && sign === "beside"; // the badge, over the thermometer
-    const underBadge = isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE;
+    const underBadge = main.offsetTop / u + (isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE);
     const head = isOver ? underBadge : isBeside ? SCALE_TOP : sky + SPARKS;
     const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);

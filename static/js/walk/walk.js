@@ -123,7 +123,7 @@ setInterval(watchServer, WATCH_MS);
 
 addEventListener("resize", redraw); // words fit another place
 // Its zero has a file of its own, which the first score would ask for.
-document.fonts.load(`1em ${getComputedStyle(body).fontFamily}`, "0").then(redraw, redraw);
+document.fonts.load(`1em ${getComputedStyle(body).fontFamily}`, "0").catch(() => {});
 document.fonts.ready.then(redraw);
 redraw();
 if (!isMirror) {
