@@ -134,9 +134,11 @@ export function createFitting(body, scene) {
     const beside = isBelow || isAbove ? 0 : total;
     const ground = goal + under + (isUpright ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
-    const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
+    // In the middle: of the screen, or of what a value and the thermometer take together.
+    const aside = isExplicit && !isUpright && column === "center" ? (count.offsetWidth / u + AIR) / 2 : 0;
+    const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    return { width, height, sign, inset, top, zero, goal, reach, above, high };
+    return { width, height, sign, inset, aside, top, zero, goal, reach, above, high };
   }
 
   function set(level, size) {
@@ -144,6 +146,7 @@ export function createFitting(body, scene) {
     if (size < 1) body.dataset.short = size.toFixed(4);
     else delete body.dataset.short;
     main.style.setProperty("--short", size);
+    main.style.removeProperty("--aside");
     phrase.style.removeProperty("--measure");
   }
 
@@ -174,6 +177,7 @@ export function createFitting(body, scene) {
     ground.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
+    main.style.setProperty("--aside", `${-found.aside * unit()}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });
   }
