@@ -119,11 +119,12 @@ def test_a_disk_that_hangs_holds_nothing_up_and_what_it_costs_is_told(tmp_path, 
 
 def test_a_disk_that_is_full_is_said_and_recording_goes_on_later(tmp_path, clock, monkeypatch):
     monkeypatch.setattr(recorder, "WRITE_EVERY_S", 0.01)
-    append, full = Ring.append, threading.Event()
+    append, full, refused = Ring.append, threading.Event(), []
     full.set()
 
     def refuse(ring, text):
         if full.is_set():
+            refused.append(str(text))
             raise OSError(28, "No space left on device")
         append(ring, text)
 
@@ -137,6 +138,7 @@ def test_a_disk_that_is_full_is_said_and_recording_goes_on_later(tmp_path, clock
 
     with BlackBox(tmp_path) as box:
         box.note(number=1)
+        until(lambda: "number" in "".join(refused))
         until(lambda: "No space left" in box.problem)
         full.clear()
         box.note(number=2)
