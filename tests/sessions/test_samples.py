@@ -8,12 +8,12 @@ from django.urls import reverse
 
 from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocol_models import Protocol
 from rehab.sessions.setup.recordings import check_upload, recordings_folder
 from rehab.sources.recording import read_recording
 from rehab.sources.recording.sample_recordings import is_sample
 from rehab.stations.models import Station
 from tests.support import samples
+from tests.support.setup_form import choices
 
 SIGNALS, STRIDES = samples.FOLDER / "signals.csv", samples.FOLDER / "strides.csv"
 REAL = ["live", "recording walk.csv"]
@@ -80,22 +80,7 @@ def test_what_nobody_walked_is_not_counted(world, settings, tmp_path, source, wa
         clinic=world.clinic, code="S1", nickname="Joon", simulated=walked_by_nobody, body_mass_kg=75
     )
     station = Station.everywhere.create(clinic=world.clinic, name="Free")
-    protocol = Protocol.everywhere.get(name="Training only", clinic=None)
-    answers = {
-        "valence": "negative",
-        "goal_by": "value",
-        "goal_value": "4.05",
-        "goal_percent": "110",
-        "wanted_hits": "65",
-        "minutes": "12",
-        "protocol": protocol.pk,
-        "station": station.pk,
-        "source": source,
-        "trained_side": "left",
-        "robot": "gentle",
-        "robot_above": "(usual)",
-        "robot_below": "(usual)",
-    }
+    answers = choices(station, source=source, trained_side="left")
     page = world.pt.post(reverse("setup", args=[patient.pk]), answers)
     assert page.status_code == 302, page.context["form"].errors
     session = TrainingSession.everywhere.get(patient=patient)

@@ -18,11 +18,6 @@ SHOWN = 'data-px-per-mm="5.884" data-distance="2.0"'
 
 
 @pytest.fixture
-def station(world: World) -> Station:
-    return Station.everywhere.create(clinic=world.clinic, name="Free")
-
-
-@pytest.fixture
 def session(world: World, station: Station) -> TrainingSession:
     return make_session(make_patient(world.clinic), station=station)
 

@@ -17,20 +17,10 @@ from rehab.training.measures import MEASURES
 from rehab.training.valences import CueGestures
 from tests.support.setup_form import choices, newest
 from tests.support.tablets import approved
-from tests.support.walks import make_patient, make_session
-from tests.support.world import NOW, World, build_world
+from tests.support.walks import make_session
+from tests.support.world import NOW, build_world
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def patient(world: World) -> Patient:
-    return make_patient(world.clinic, code="K7-204")
-
-
-@pytest.fixture
-def station(world: World) -> Station:
-    return Station.everywhere.create(clinic=world.clinic, name="Free")
 
 
 def a_pulse(world) -> MeasureDefinition:

@@ -7,11 +7,9 @@ import re
 import pytest
 
 from rehab.gestures.models import ComposedGesture
-from rehab.people.models import Patient
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
 from rehab.sessions.setup.protocol_models import Protocol
-from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import InvalidSetting
 from rehab.training.robot_cueing import CueTiming
@@ -22,20 +20,10 @@ from robot.motion.pose import HOME
 from robot.wire.cue_limits import CueRule
 from tests.support.page_text import plain
 from tests.support.setup_form import choices, newest
-from tests.support.walks import make_patient, make_session
+from tests.support.walks import make_session
 from tests.support.world import World, build_world
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def patient(world: World) -> Patient:
-    return make_patient(world.clinic, code="K7-204")
-
-
-@pytest.fixture
-def station(world: World) -> Station:
-    return Station.everywhere.create(clinic=world.clinic, name="Free")
 
 
 @pytest.mark.django_db(transaction=True)  # the writer has its own connection
