@@ -171,7 +171,7 @@ def test_nobody_begins_where_somebody_else_may_be_walking(pt, patient, station, 
     walking = newest()
     other = Patient.everywhere.create(clinic=world.clinic, code="K8", nickname="Joon")
     page = pt.post(f"/patients/{other.pk}/new/", choices(station)).content.decode()
-    assert "still has an open session of Rosa (K7-204)" in page
+    assert "still has an open session of Rosa (B-1)" in page
     assert newest() == walking
     change_session(walking, ChangeKind.ABORT)
     pt.post(f"/patients/{other.pk}/new/", choices(station))
