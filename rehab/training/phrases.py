@@ -50,15 +50,15 @@ def join(*phrases: str) -> str:
 
 
 ONWARD = join(
-    gettext_noop("On to the next."),
+    gettext_noop("To the next."),
     gettext_noop("And the next."),
     gettext_noop("Keep going."),
     gettext_noop("Step by step."),
     gettext_noop("On we go."),
     gettext_noop("A step more."),
     gettext_noop("Walk on."),
-    gettext_noop("The next one."),
-    gettext_noop("Just walk on."),
+    gettext_noop("One more."),
+    gettext_noop("Just go on."),
     gettext_noop("On you go."),
     gettext_noop("A new step."),
     gettext_noop("Carry on."),
@@ -66,15 +66,15 @@ ONWARD = join(
 
 NEAR = join(
     gettext_noop("Nearly there."),
-    gettext_noop("Close to the goal."),
-    gettext_noop("Nearly at the goal."),
+    gettext_noop("Close now."),
+    gettext_noop("Nearly met."),
     gettext_noop("Very near."),
     gettext_noop("A little more."),
-    gettext_noop("The goal is near."),
+    gettext_noop("Goal is near."),
     gettext_noop("Not far now."),
-    gettext_noop("Near the goal."),
+    gettext_noop("Near goal."),
     gettext_noop("So close."),
-    gettext_noop("Only a bit more."),
+    gettext_noop("A bit more."),
     gettext_noop("A bit short."),
     gettext_noop("A touch more."),
 )
@@ -85,12 +85,12 @@ REACHED = join(
     gettext_noop("At the goal!"),
     gettext_noop("You did it!"),
     gettext_noop("You got there!"),
-    gettext_noop("That is the goal!"),
+    gettext_noop("That is it!"),
     gettext_noop("Well done!"),
     gettext_noop("Nicely done!"),
     gettext_noop("A good step!"),
     gettext_noop("Yes!"),
-    gettext_noop("You made it!"),
+    gettext_noop("Made it!"),
     gettext_noop("Good step!"),
 )
 
@@ -99,13 +99,13 @@ STRONG = join(
     gettext_noop("What a step!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
-    gettext_noop("Past the goal!"),
+    gettext_noop("Past goal!"),
     gettext_noop("Nice going!"),
-    gettext_noop("A strong one!"),
+    gettext_noop("Strong one!"),
     gettext_noop("Great going!"),
     gettext_noop("Very strong!"),
     gettext_noop("Great step!"),
-    gettext_noop("Over the goal!"),
+    gettext_noop("Over goal!"),
     gettext_noop("So good!"),
 )
 
@@ -121,7 +121,7 @@ STRONGEST = join(
     gettext_noop("Well above!"),
     gettext_noop("Way over!"),
     gettext_noop("Far over!"),
-    gettext_noop("That was strong!"),
+    gettext_noop("Super step!"),
 )
 
 FAR_BELOW = join(
@@ -132,7 +132,7 @@ FAR_BELOW = join(
     gettext_noop("Far off."),
     gettext_noop("A long way."),
     gettext_noop("Way below."),
-    gettext_noop("The goal is far up."),
+    gettext_noop("Goal is far."),
     gettext_noop("A wide gap."),
     gettext_noop("Still far below."),
     gettext_noop("Quite far off."),
@@ -141,30 +141,30 @@ FAR_BELOW = join(
 
 BELOW = join(
     gettext_noop("Below goal."),
-    gettext_noop("Under the goal."),
+    gettext_noop("Under goal."),
     gettext_noop("Just below."),
     gettext_noop("A little below."),
     gettext_noop("Not far below."),
-    gettext_noop("Short of the goal."),
-    gettext_noop("Not at the goal."),
+    gettext_noop("A bit under."),
+    gettext_noop("Not met."),
     gettext_noop("Just under."),
     gettext_noop("A bit below."),
     gettext_noop("Not quite."),
     gettext_noop("A little short."),
-    gettext_noop("Near, but below."),
+    gettext_noop("Not there."),
 )
 
 NOTHING_LOST = join(
-    gettext_noop("No point lost."),
     gettext_noop("None lost."),
+    gettext_noop("Not one lost."),
     gettext_noop("Points kept."),
     gettext_noop("All are kept."),
     gettext_noop("All still there."),
     gettext_noop("No loss."),
     gettext_noop("Points stay."),
-    gettext_noop("Points are safe."),
+    gettext_noop("Points safe."),
     gettext_noop("As before."),
     gettext_noop("Same score."),
-    gettext_noop("Still the same."),
-    gettext_noop("As many points."),
+    gettext_noop("Same points."),
+    gettext_noop("None gone."),
 )

@@ -77,10 +77,10 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(monitor.locator("[data-gains] .on")).to_have_text("0.85")
         feet.walk(0.9)
         at_step(tablet, 3)
-        expect(words).to_have_text("On to the next.")  # 0.85 × 3.6 of 4.1
+        expect(words).to_have_text("To the next.")  # 0.85 × 3.6 of 4.1
 
         pressed(monitor, "data-words", "0")
-        expect(words).to_have_text("On to the next.")
+        expect(words).to_have_text("To the next.")
         feet.walk(1.3)
         at_step(tablet, 4)
         expect(words).to_have_text("")

@@ -21,7 +21,7 @@ BLAME = {
 }
 ALL = [(slug, language) for slug in VALENCES for language, _ in LANGUAGES]
 # Ours are shorter than a clinic's may be: in half an upright tablet the longest word sets the size.
-OURS = LENGTHS | {"en": (19, 8)}
+OURS = LENGTHS | {"en": (16, 8)}
 
 
 @pytest.mark.parametrize(("slug", "language"), ALL)

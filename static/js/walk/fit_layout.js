@@ -24,13 +24,15 @@ const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const SIGN = 40; // of a step, beside the total's name and higher than that
-const SCALE_LEAST = 248; // of the thermometer
+const SCALE_LEAST = 240; // of the thermometer
 const BESIDE_WORDS = 300; // the same in a half, whose units are smaller
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
-const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [248, 280]; // the scale, from that badge's top
+// More than AIR, above and below the goal, where its sign is there.
+const SIGN_AIR = { beside: [54, 28], over: [0, 28] };
+const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
+const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -109,14 +111,16 @@ export function createFitting(body, scene) {
     const isHalf = column === "right" || column === "left";
     const isLargest = text === "largest" && !column;
     const isUpright = !landscape.matches;
-    const isBeside = !isUpright && column !== "center"; // words and thermometer, one beside the other
     const isExplicit = theme === "explicit";
+    // Words and thermometer, one beside the other.
+    const isBeside = !isUpright && column !== "center" && !(isExplicit && (isHalf || isLargest));
     const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
-    if (isLargest) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
+    if (isLargest && !isExplicit) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
     if (isBeside) sign = isHalf || isLargest ? "beside" : "behind";
-    const [airAbove, airBelow] = (sign === "beside" ? SIGN_BESIDE : [0, 0]).map((more) => AIR + more);
+    const signSize = column ? SIGN_IN_PART : 1;
+    const [airAbove, airBelow] = (SIGN_AIR[sign] ?? [0, 0]).map((more) => AIR + more * signSize);
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
@@ -138,7 +142,7 @@ export function createFitting(body, scene) {
     const aside = isExplicit && !isUpright && column === "center" ? (count.offsetWidth / u + AIR) / 2 : 0;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    return { width, height, sign, inset, aside, top, zero, goal, reach, above, high };
+    return { width, height, sign, signSize, inset, aside, top, zero, goal, reach, above, high };
   }
 
   function set(level, size) {

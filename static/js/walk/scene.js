@@ -11,13 +11,13 @@ const EDGE = 24;
 // The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
-// The goal's sign: it points at the line, behind or before the thermometer, or stands on the horizon.
+// The goal's sign: it points at the line, behind or before the thermometer, or stands on the horizon before it.
 const AT_LINE = "M0 0l20 -40h132v80h-132z";
 const ON_LINE = "M0 40l20 -80h132v80z";
 const SIGNS = {
   behind: { path: AT_LINE, room: 230, rise: 0, turn: 1 },
   beside: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: -1 },
-  over: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: 1 },
+  over: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: 1 },
   before: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: -1 },
 };
 
@@ -34,7 +34,7 @@ export function createScene(svg) {
   // Place all: `top`, `zero` and `goal` are heights of the scale, `reach` that of the strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, top: top150, zero, goal, reach, sign, isFlipped, inset } = frame;
+    const { width, height, top: top150, zero, goal, reach, sign, signSize, isFlipped, inset } = frame;
     const { path, room, rise, turn } = SIGNS[sign];
     const x = width - EDGE - room - inset;
     const [top, bottom, r] = [top150 - 36, zero + 78, TUBE_RADIUS];
@@ -48,7 +48,7 @@ export function createScene(svg) {
     place(".bulb", 0, bottom);
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
-    place(".pennant", turn * (r + 10), goal - rise, {}, ` scale(${turn} 1)`);
+    place(".pennant", turn * (r + 10), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
     find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
     find(".pennant text").setAttribute("transform", isTurned ? "translate(164 0) scale(-1 1)" : "");
