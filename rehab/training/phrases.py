@@ -57,7 +57,7 @@ ONWARD = join(
     gettext_noop("On we go."),
     gettext_noop("A step more."),
     gettext_noop("Walk on."),
-    gettext_noop("One more."),
+    gettext_noop("Next one."),
     gettext_noop("Just go on."),
     gettext_noop("On you go."),
     gettext_noop("A new step."),
@@ -66,7 +66,7 @@ ONWARD = join(
 
 NEAR = join(
     gettext_noop("Nearly there."),
-    gettext_noop("Close now."),
+    gettext_noop("Quite near."),
     gettext_noop("Nearly met."),
     gettext_noop("Very near."),
     gettext_noop("A little more."),
@@ -85,7 +85,7 @@ REACHED = join(
     gettext_noop("At the goal!"),
     gettext_noop("You did it!"),
     gettext_noop("You got there!"),
-    gettext_noop("That is it!"),
+    gettext_noop("On target!"),
     gettext_noop("Well done!"),
     gettext_noop("Nicely done!"),
     gettext_noop("A good step!"),
@@ -99,7 +99,7 @@ STRONG = join(
     gettext_noop("What a step!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
-    gettext_noop("Past goal!"),
+    gettext_noop("Beyond goal!"),
     gettext_noop("Nice going!"),
     gettext_noop("Strong one!"),
     gettext_noop("Great going!"),
@@ -146,17 +146,17 @@ BELOW = join(
     gettext_noop("A little below."),
     gettext_noop("Not far below."),
     gettext_noop("A bit under."),
-    gettext_noop("Not met."),
+    gettext_noop("Almost."),
     gettext_noop("Just under."),
     gettext_noop("A bit below."),
     gettext_noop("Not quite."),
     gettext_noop("A little short."),
-    gettext_noop("Not there."),
+    gettext_noop("Still under."),
 )
 
 NOTHING_LOST = join(
     gettext_noop("None lost."),
-    gettext_noop("Not one lost."),
+    gettext_noop("Zero lost."),
     gettext_noop("Points kept."),
     gettext_noop("All are kept."),
     gettext_noop("All still there."),
@@ -166,5 +166,5 @@ NOTHING_LOST = join(
     gettext_noop("As before."),
     gettext_noop("Same score."),
     gettext_noop("Same points."),
-    gettext_noop("None gone."),
+    gettext_noop("Same total."),
 )

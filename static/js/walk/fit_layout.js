@@ -29,8 +29,7 @@ const BESIDE_WORDS = 300; // the same in a half, whose units are smaller
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
-// More than AIR, above and below the goal, where its sign is there.
-const SIGN_AIR = { beside: [54, 28], over: [0, 28] };
+const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
 const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const SCENE = 188; // the thermometer's width
@@ -112,15 +111,18 @@ export function createFitting(body, scene) {
     const isLargest = text === "largest" && !column;
     const isUpright = !landscape.matches;
     const isExplicit = theme === "explicit";
-    // Words and thermometer, one beside the other.
-    const isBeside = !isUpright && column !== "center" && !(isExplicit && (isHalf || isLargest));
+    const isAcross = !isUpright && column !== "center";
+    const isOneSided = isAcross && (isHalf || isLargest);
+    const isBeside = isAcross && !(isOneSided && isExplicit); // words and thermometer, one beside the other
     const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
     if (isLargest && !isExplicit) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    let sign = column === "center" ? "over" : "before"; // the goal's (scene.js)
-    if (isBeside) sign = isHalf || isLargest ? "beside" : "behind";
+    let sign = column === "center" ? "after" : "before"; // the goal's (scene.js)
+    if (isAcross) sign = isOneSided ? "beside" : "behind";
     const signSize = column ? SIGN_IN_PART : 1;
-    const [airAbove, airBelow] = (SIGN_AIR[sign] ?? [0, 0]).map((more) => AIR + more * signSize);
+    const reaching = sign === "beside" || sign === "after" ? signSize : 0; // of the sign, to words and total
+    const airAbove = AIR + (isBeside ? SIGN_BESIDE[0] * reaching : 0);
+    const airBelow = AIR + SIGN_BESIDE[1] * reaching;
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
@@ -128,7 +130,7 @@ export function createFitting(body, scene) {
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
-    const isOver = hasBadge && sign === "beside"; // the badge, over the thermometer
+    const isOver = hasBadge && isOneSided; // the badge, over the thermometer
     const underBadge = main.offsetTop / u + (isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE);
     const head = isOver ? underBadge : isBeside ? SCALE_TOP : sky + SPARKS;
     const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
@@ -200,14 +202,14 @@ export function createFitting(body, scene) {
   // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
   return function fit(screen, { phrases: samples, number: usual }) {
     const isFeedback = screen === "feedback";
-    const shown = key.textContent.replace("−", "").replace(/\d/g, "8");
+    const shown = key.textContent.replace("−", "").replace(/\d/g, "6");
     widest = [usual, shown].reduce((a, b) => (b.length > a.length ? b : a), widest);
     const number = isFeedback ? widest : "";
     const said = isFeedback ? samples : [phrase.textContent, actions.textContent];
-    const { text, column, side } = body.dataset;
+    const { text, column, side, theme } = body.dataset;
     const degree = body.style.getPropertyValue("--degree");
     const { status } = document.fonts;
-    const wanted = [screen, said, number, text, column, side, innerWidth, innerHeight, degree, status].join("|");
+    const wanted = [screen, said, number, text, column, side, theme, innerWidth, innerHeight, degree, status].join("|");
     if (wanted === fitted) return;
     fitted = wanted;
     if (!isFeedback) return fitMessage();

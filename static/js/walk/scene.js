@@ -17,7 +17,7 @@ const ON_LINE = "M0 40l20 -80h132v80z";
 const SIGNS = {
   behind: { path: AT_LINE, room: 230, rise: 0, turn: 1 },
   beside: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: -1 },
-  over: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: 1 },
+  after: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: 1 },
   before: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: -1 },
 };
 
