@@ -67,6 +67,7 @@ export function createFeedback(body) {
     const before = shownScore;
     shownScore = score;
     key.toggleAttribute("data-lost", has_points && score < 0);
+    key.dataset.ends = text.at(-1);
     if (set(key, text) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }

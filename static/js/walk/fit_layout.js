@@ -23,6 +23,7 @@ const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
+const BADGE_IN_SKY = 290; // with what is between it and the goal line
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 240; // of the thermometer
 const BESIDE_WORDS = 300; // the same in a half, whose units are smaller
@@ -32,6 +33,8 @@ const FOOT = 172; // below the scale: the bulb
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
 const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
+const USUAL = 2 / 3; // of a total of three digits: most have two
+const [SIGN_REACH, BEFORE_NUMBER] = [288, 130]; // in the middle, from the thermometer's axis
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -60,6 +63,13 @@ export function chooseLayout(holds, isMeasured, least) {
   const size = holds(level, most) ? most : findLimit(worth(level), most, STEP, (size) => holds(level, size));
   while (level > least && holds(level - 1, size)) level--; // what is in no word's way
   return [level, size];
+}
+
+// Return the width of what an element says, in pixels.
+function widthOf(element) {
+  const text = document.createRange();
+  text.selectNodeContents(element);
+  return text.getBoundingClientRect().width;
 }
 
 function sampleOf(text) {
@@ -112,16 +122,17 @@ export function createFitting(body, scene) {
     const isUpright = !landscape.matches;
     const isExplicit = theme === "explicit";
     const isAcross = !isUpright && column !== "center";
+    const isMiddle = !isUpright && column === "center";
     const isOneSided = isAcross && (isHalf || isLargest);
-    const isBeside = isAcross && !(isOneSided && isExplicit); // words and thermometer, one beside the other
     const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
-    if (isLargest && !isExplicit) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    let sign = column === "center" ? "after" : "before"; // the goal's (scene.js)
-    if (isAcross) sign = isOneSided ? "beside" : "behind";
+    if (isLargest && (isOneSided || !isExplicit))
+      high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
+    const isBeside = isOneSided || column === "center";
+    const sign = isBeside ? "beside" : isAcross ? "behind" : "before"; // the goal's (scene.js)
     const signSize = column ? SIGN_IN_PART : 1;
-    const reaching = sign === "beside" || sign === "after" ? signSize : 0; // of the sign, to words and total
-    const airAbove = AIR + (isBeside ? SIGN_BESIDE[0] * reaching : 0);
+    const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
+    const airAbove = AIR + SIGN_BESIDE[0] * reaching;
     const airBelow = AIR + SIGN_BESIDE[1] * reaching;
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
@@ -131,20 +142,23 @@ export function createFitting(body, scene) {
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const isOver = hasBadge && isOneSided; // the badge, over the thermometer
+    const isInSky = hasBadge && isMiddle; // the badge, over the goal line
     const underBadge = main.offsetTop / u + (isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE);
-    const head = isOver ? underBadge : isBeside ? SCALE_TOP : sky + SPARKS;
-    const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
+    const head = isOver ? underBadge : isAcross ? SCALE_TOP : sky + SPARKS;
+    const top = Math.max(head, (3 * (sky + (isInSky ? BADGE_IN_SKY : reach)) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const badge = !hasBadge || isOver ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
+    const badge = !hasBadge || isOver || isInSky ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + airBelow;
     const beside = isBelow || isAbove ? 0 : total;
     const ground = goal + under + (isUpright ? badge + beside : Math.max(badge, beside));
-    if (zero - top < (isBeside && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
-    // In the middle: of the screen, or of what a value and the thermometer take together.
-    const aside = isExplicit && !isUpright && column === "center" ? (count.offsetWidth / u + AIR) / 2 : 0;
+    if (zero - top < (isAcross && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
+    // In the middle: of the screen, or of what the sign, the thermometer and a usual number take together.
+    const number = (widthOf(key) / u) * (isExplicit ? 1 : USUAL);
+    const aside = isMiddle ? (BEFORE_NUMBER + number - SIGN_REACH) / 2 : 0;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    return { width, height, sign, signSize, inset, aside, top, zero, goal, reach, above, high };
+    const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : top; // of the glass: it goes on in a badge's place
+    return { width, height, sign, signSize, inset, aside, full, top, zero, goal, reach, above, high };
   }
 
   function set(level, size) {
@@ -215,10 +229,13 @@ export function createFitting(body, scene) {
     if (!isFeedback) return fitMessage();
 
     const [lines, total, isLost] = [[...words.childNodes], key.textContent, key.hasAttribute("data-lost")];
+    const { ends } = key.dataset;
+    delete key.dataset.ends;
     words.replaceChildren(...samples.map(sampleOf));
     fitStep(number);
     words.replaceChildren(...lines);
     key.textContent = total;
     key.toggleAttribute("data-lost", isLost);
+    if (ends) key.dataset.ends = ends;
   };
 }

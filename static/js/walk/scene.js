@@ -4,21 +4,21 @@
 import { append } from "garry/shared/svg_element";
 import { createDots } from "garry/walk/stride_dots";
 
-const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
+const TOP = 1.5; // the scale's end; the goal is always at two thirds of it. The glass may go on.
 const TUBE_RADIUS = 68;
-const BULB_RADIUS = 94;
+const BULB_RADIUS = 88;
+const HALF = 94; // of the thermometer's width, with air beside the bulb
 const EDGE = 24;
 // The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: it points at the line, behind or before the thermometer, or stands on the horizon before it.
-const AT_LINE = "M0 0l20 -40h132v80h-132z";
-const ON_LINE = "M0 40l20 -80h132v80z";
+const AT_LINE = "M0 0l20 -40h148v80h-148z";
+const ON_LINE = "M0 40l20 -80h148v80z";
 const SIGNS = {
-  behind: { path: AT_LINE, room: 230, rise: 0, turn: 1 },
-  beside: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: -1 },
-  after: { path: AT_LINE, room: BULB_RADIUS, rise: 0, turn: 1 },
-  before: { path: ON_LINE, room: BULB_RADIUS, rise: 43, turn: -1 },
+  behind: { path: AT_LINE, room: 246, rise: 0, turn: 1 },
+  beside: { path: AT_LINE, room: HALF, rise: 0, turn: -1 },
+  before: { path: ON_LINE, room: HALF, rise: 43, turn: -1 },
 };
 
 export function createScene(svg) {
@@ -29,15 +29,17 @@ export function createScene(svg) {
   const dots = createDots(svg);
   let layout, shown;
 
-  const y = (performance) => layout.zero - ((layout.zero - layout.top) * Math.min(Math.max(performance, 0), TOP)) / TOP;
+  const onScale = (performance) => layout.zero - ((layout.zero - layout.top) * Math.max(performance, 0)) / TOP;
+  const y = (performance) => Math.max(onScale(performance), layout.full);
 
-  // Place all: `top`, `zero` and `goal` are heights of the scale, `reach` that of the strides about the goal.
+  // Place all: `top`, `zero` and `goal` are heights of the scale, `full` where the glass is, `reach` that of the strides
+  // about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, top: top150, zero, goal, reach, sign, signSize, isFlipped, inset } = frame;
+    const { width, height, full, zero, goal, reach, sign, signSize, isFlipped, inset } = frame;
     const { path, room, rise, turn } = SIGNS[sign];
     const x = width - EDGE - room - inset;
-    const [top, bottom, r] = [top150 - 36, zero + 78, TUBE_RADIUS];
+    const [top, bottom, r] = [full - 36, zero + 78, TUBE_RADIUS];
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
     const shell = `${tube}A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
@@ -51,7 +53,7 @@ export function createScene(svg) {
     place(".pennant", turn * (r + 10), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
     find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
-    find(".pennant text").setAttribute("transform", isTurned ? "translate(164 0) scale(-1 1)" : "");
+    find(".pennant text").setAttribute("transform", isTurned ? "translate(182 0) scale(-1 1)" : "");
     place(".sparkles", 0, top);
     for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);
     ticks.forEach((tick, i) => tick.setAttribute("d", `M${r - 3} ${y(TICKS[i])}h${TICKS[i] === 0.5 ? -32 : -20}`));
@@ -94,7 +96,7 @@ export function createScene(svg) {
     ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));
     thermometer.dataset.hit = hit && !close ? "yes" : "no";
     thermometer.toggleAttribute("data-missing", performance === null);
-    thermometer.toggleAttribute("data-over", performance > TOP);
+    thermometer.toggleAttribute("data-over", onScale(performance) < layout.full);
     dots.draw(entries);
   }
 
