@@ -106,15 +106,14 @@ def test_words_are_as_large_as_promised(
         is_across = not is_upright and (is_largest or side in HALVES)
         if not measured and (is_largest or side in COLUMNS):
             if is_across:
-                usual = 1.65 if valence == "explicit" else 1.9
+                points = 1.8 if side in HALVES else 1.9
+                usual = 1.65 if valence == "explicit" else points
             elif valence == "explicit":
                 usual = 1.5
             elif is_largest:
                 usual = 1.6
         # Points that were lost are smaller, less so where all totals are.
-        most = 1.5
-        if is_across and not measured:
-            most = 1.66 if side in HALVES else 1.8
+        most = 1.8 if is_across and not measured else 1.5
         large = min(most, 0.95 * usual) if found["lost"] else usual
         assert found["key"] == pytest.approx(large * promised, rel=0.01), text
         # What goes, goes in this order.

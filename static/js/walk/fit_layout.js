@@ -34,7 +34,7 @@ const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where 
 const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const USUAL = 2 / 3; // of a total of three digits: most have two
-const [SIGN_REACH, BEFORE_NUMBER] = [288, 130]; // in the middle, from the thermometer's axis
+const [SIGN_REACH, BEFORE_NUMBER] = [310, 140]; // in the middle, from the thermometer's axis
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -100,10 +100,10 @@ export function createFitting(body, scene) {
     return high <= phrase.clientHeight + 1 && !parts.some(isTooWide);
   }
 
-  // Return whether the number is too wide for its place, also as points that were lost.
+  // Return whether the number is too wide for its place, also as points that were lost: as many letters with the minus.
   function isNumberTooWide(number) {
     const mayBeLost = ["negative", "binary"].includes(body.dataset.theme);
-    return (mayBeLost ? [`−${number}`, number] : [number]).some((text) => {
+    return (mayBeLost ? [number.replace(/^6/, "−"), number] : [number]).some((text) => {
       key.toggleAttribute("data-lost", text !== number);
       key.textContent = text;
       return isTooWide(key);
@@ -216,7 +216,7 @@ export function createFitting(body, scene) {
   // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
   return function fit(screen, { phrases: samples, number: usual }) {
     const isFeedback = screen === "feedback";
-    const shown = key.textContent.replace("−", "").replace(/\d/g, "6");
+    const shown = key.textContent.replace(/[−\d]/g, "6");
     widest = [usual, shown].reduce((a, b) => (b.length > a.length ? b : a), widest);
     const number = isFeedback ? widest : "";
     const said = isFeedback ? samples : [phrase.textContent, actions.textContent];
