@@ -157,7 +157,7 @@ export function createFitting(body, scene) {
     const aside = isMiddle ? (BEFORE_NUMBER + number - SIGN_REACH) / 2 : 0;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : top; // of the glass: it goes on in a badge's place
+    const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : isInSky ? head : top; // of the glass: it goes on in a badge's place
     return { width, height, sign, signSize, inset, aside, full, top, zero, goal, reach, above, high };
   }
 
