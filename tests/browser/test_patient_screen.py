@@ -82,13 +82,10 @@ def test_the_thermometer_stands_where_the_patient_looks(
     assert wide["left"] == pytest.approx(wide["right"], rel=0.01)
     assert at["center"][".phrase"] == pytest.approx(0.5, abs=0.02)  # on the midline
     thermometer, total, badge = (at["center"][one] for one in (parts[0], ".key", ".emblem"))
-    sign = at["center"][".pennant text"]
-    assert sign < thermometer < badge  # the goal's sign and the badge on either side
-    if size == "tablet-portrait":  # the total below the thermometer
-        assert [thermometer, total] == pytest.approx([0.5, 0.5], abs=0.02)
-    else:
-        assert 0.2 < sign < thermometer <= 0.5 < total < 0.8
-        assert 0.5 < badge < 0.7  # over the total
+    # All on the midline; the goal's sign and the badge on either side.
+    assert [thermometer, total] == pytest.approx([0.5, 0.5], abs=0.1)
+    assert thermometer == pytest.approx(0.5, abs=0.02)
+    assert at["center"][".pennant text"] < thermometer < badge
 
 
 def test_on_a_calm_page_nothing_moves_and_nothing_bursts(browser: Browser, server: Server) -> None:
