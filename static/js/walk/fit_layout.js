@@ -28,7 +28,7 @@ const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 240; // of the thermometer
 const BESIDE_WORDS = 300; // the same in a half, whose units are smaller
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
-const [SPARKS, DOME] = [76, 56]; // above the scale, where words stand over it
+const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
 const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
@@ -124,37 +124,42 @@ export function createFitting(body, scene) {
     const isAcross = !isUpright && column !== "center";
     const isMiddle = !isUpright && column === "center";
     const isOneSided = isAcross && (isHalf || isLargest);
-    const isBelow = isMiddle || (isUpright && (isLargest || column)); // the total, below the thermometer
+    const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
     if (isLargest && (isOneSided || !isExplicit))
       high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const isBeside = isOneSided || column === "center";
     const sign = isBeside ? "beside" : isAcross ? "behind" : "before"; // the goal's (scene.js)
     const signSize = column ? SIGN_IN_PART : 1;
-    const reaching = isOneSided && !body.hasAttribute("data-goal-named") ? signSize : 0; // of the sign, to words and total
+    const isNamed = body.hasAttribute("data-goal-named"); // the goal, by the words: there is no sign
+    const reaching = isOneSided && !isNamed ? signSize : 0; // of the sign, to words and total
     const airAbove = AIR + SIGN_BESIDE[0] * reaching;
     const airBelow = AIR + SIGN_BESIDE[1] * reaching;
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
-    const stand = isBelow ? bottom - total - (isMiddle ? 0 : level < BADGE ? AIR : SIGN) : bottom;
+    const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const isOver = hasBadge && isOneSided; // the badge, over the thermometer
+    const isInSky = hasBadge && isMiddle; // the badge, over the goal line
     const underBadge = main.offsetTop / u + (isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE);
-    const head = isOver ? underBadge : isAcross ? SCALE_TOP : sky + (isMiddle ? DOME : SPARKS);
-    const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
+    const head = isOver ? underBadge : isAcross ? SCALE_TOP : sky + SPARKS;
+    const top = Math.max(head, (3 * (sky + (isInSky ? BADGE_IN_SKY : reach)) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const badge = !hasBadge || isOver ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
+    const badge = !hasBadge || isOver || isInSky ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + airBelow;
     const beside = isBelow || isAbove ? 0 : total;
     const ground = goal + under + (isUpright ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isAcross && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
-    const inset = column === "center" ? (width - SCENE) / 2 - EDGE : 0;
+    // In the middle: of the screen, or of what the sign, the thermometer and a usual number take together.
+    const number = (widthOf(key) / u) * (isExplicit ? 1 : USUAL);
+    const aside = isMiddle ? (BEFORE_NUMBER + number - (isNamed ? SCENE / 2 : SIGN_REACH)) / 2 : 0;
+    const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : top; // of the glass: it goes on in a badge's place
-    return { width, height, sign, signSize, inset, full, top, zero, goal, reach, above, high };
+    const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : isInSky ? head : top; // of the glass: it goes on in a badge's place
+    return { width, height, sign, signSize, inset, aside, full, top, zero, goal, reach, above, high };
   }
 
   function set(level, size) {
@@ -162,6 +167,7 @@ export function createFitting(body, scene) {
     if (size < 1) body.dataset.short = size.toFixed(4);
     else delete body.dataset.short;
     main.style.setProperty("--short", size);
+    main.style.removeProperty("--aside");
     phrase.style.removeProperty("--measure");
   }
 
@@ -192,6 +198,7 @@ export function createFitting(body, scene) {
     ground.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
+    main.style.setProperty("--aside", `${-found.aside * unit()}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });
   }
