@@ -24,7 +24,7 @@ from rehab.stations.models import Device
 
 COOKIE = "garry_screen"
 COOKIE_AGE_S = 5 * 365 * 24 * 3600
-# How much larger words are than one degree, and points than two (static/css/walk/walk.css).
+# How much larger words are than one degree, and points than two (static/css/walk/layouts.css).
 FACTORS = {"normal": 1.0, "large": 1.4, "largest": 1.8}
 DISTANCES = {1.5: "1.5 m", 2.0: "2 m", 3.0: "3 m"}
 PX_PER_MM = (0.5, 40.0)  # a television of 2 m; four times the finest telephone

@@ -2,7 +2,7 @@
 
 import { pixelsOfDegree } from "garry/walk/fit_layout";
 
-const FACTORS = { normal: 1, large: 1.4, largest: 1.8 }; // static/css/walk/walk.css
+const FACTORS = { normal: 1, large: 1.4, largest: 1.8 }; // static/css/walk/layouts.css
 const { pxPerMm, distance, then } = document.body.dataset;
 const letters = JSON.parse(document.getElementById("letters").textContent);
 const letter = document.querySelector(".letter");

@@ -155,7 +155,7 @@ export function createFitting(body, scene) {
     if (zero - top < (isAcross && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle: of the screen, or of what the sign, the thermometer and a usual number take together.
     const number = (widthOf(key) / u) * (isExplicit ? 1 : USUAL);
-    const aside = isMiddle ? (BEFORE_NUMBER + number - (isNamed ? SCENE / 2 : SIGN_REACH)) / 2 : 0;
+    const aside = isMiddle ? (BEFORE_NUMBER + number - (isNamed ? SCENE : SIGN_REACH)) / 2 : 0;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
     const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : isInSky ? head : top; // of the glass: it goes on in a badge's place
