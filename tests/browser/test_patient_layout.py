@@ -71,6 +71,9 @@ FRAMES = f"""async ([texts, column]) => {{
     const words = box(".words");
     if (badge && badge[1] < line[1] && badge[3] > line[1])
       wrong.push(`${{column}} ${{text}}: the badge crosses the goal`);
+    const inMiddle = badge && column === "center"; // across over the goal
+    if (inMiddle && (badge[2] > innerWidth || (innerWidth > innerHeight && badge[3] > line[1])))
+      wrong.push(`${{column}} ${{text}}: the badge at ${{badge}} leaves the sky`);
     for (const other of [sign, words, digits].filter((one) => badge && one))
       if (badge[0] < other[2] && other[0] < badge[2] && badge[1] < other[3] && other[1] < badge[3])
         wrong.push(`${{column}} ${{text}}: the badge at ${{badge}} is over ${{other}}`);

@@ -3,7 +3,7 @@
 import { signed } from "garry/shared/format";
 import { _, fill, number as format } from "garry/shared/language";
 import { isStill } from "garry/walk/reduced_motion";
-import { describeStep, describeSummary, messageFor, phaseLeft, phraseOf, timeLeft } from "garry/walk/text";
+import { describeStep, describeSummary, messageFor, namesGoal, phaseLeft, phraseOf, timeLeft } from "garry/walk/text";
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
 const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };
@@ -42,6 +42,7 @@ export function createFeedback(body) {
   function drawStep(session) {
     const step = session.last;
     setLines(words, phraseOf(step));
+    body.toggleAttribute("data-goal-named", namesGoal(step));
     emblem.dataset.emblem = step?.kind === "missing" ? "none" : (step?.emblem ?? "");
     emblem.toggleAttribute("data-hit", Boolean(session.has_points && step?.hit && !step.close));
     const isMoreWanted = step?.points === 0 && !step.hit && !step.close;

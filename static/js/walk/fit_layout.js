@@ -27,6 +27,7 @@ const BADGE_IN_SKY = 290; // with what is between it and the goal line
 const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 240; // of the thermometer
 const BESIDE_WORDS = 300; // the same in a half, whose units are smaller
+const UNDER_PAUSE = 48; // the glass, from the words' top
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
@@ -34,7 +35,8 @@ const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where 
 const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const USUAL = 2 / 3; // of a total of three digits: most have two
-const [SIGN_REACH, BEFORE_NUMBER] = [310, 140]; // in the middle, from the thermometer's axis
+// In the middle, from the thermometer's axis. A value's sign is seldom there: the words name the goal.
+const [SIGN_REACH, VALUE_REACH, BEFORE_NUMBER] = [310, 188, 140];
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -100,10 +102,10 @@ export function createFitting(body, scene) {
     return high <= phrase.clientHeight + 1 && !parts.some(isTooWide);
   }
 
-  // Return whether the number is too wide for its place, also as points that were lost: as many letters with the minus.
+  // Return whether the number is too wide for its place, also as points that were lost.
   function isNumberTooWide(number) {
     const mayBeLost = ["negative", "binary"].includes(body.dataset.theme);
-    return (mayBeLost ? [number.replace(/^6/, "−"), number] : [number]).some((text) => {
+    return (mayBeLost ? [`−${number}`, number] : [number]).some((text) => {
       key.toggleAttribute("data-lost", text !== number);
       key.textContent = text;
       return isTooWide(key);
@@ -131,8 +133,7 @@ export function createFitting(body, scene) {
     const isBeside = isOneSided || column === "center";
     const sign = isBeside ? "beside" : isAcross ? "behind" : "before"; // the goal's (scene.js)
     const signSize = column ? SIGN_IN_PART : 1;
-    const isNamed = body.hasAttribute("data-goal-named"); // the goal, by the words: there is no sign
-    const reaching = isOneSided && !isNamed ? signSize : 0; // of the sign, to words and total
+    const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
     const airAbove = AIR + SIGN_BESIDE[0] * reaching;
     const airBelow = AIR + SIGN_BESIDE[1] * reaching;
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
@@ -155,10 +156,12 @@ export function createFitting(body, scene) {
     if (zero - top < (isAcross && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle: of the screen, or of what the sign, the thermometer and a usual number take together.
     const number = (widthOf(key) / u) * (isExplicit ? 1 : USUAL);
-    const aside = isMiddle ? (BEFORE_NUMBER + number - (isNamed ? SCENE : SIGN_REACH)) / 2 : 0;
+    const before = isExplicit ? VALUE_REACH : SIGN_REACH;
+    const aside = isMiddle ? Math.max(0, (BEFORE_NUMBER + number - before) / 2) : 0;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    const full = isOneSided && isExplicit ? main.offsetTop / u + 48 : isInSky ? head : top; // of the glass: it goes on in a badge's place
+    // The glass goes on where no badge is, and beside a badge in the sky.
+    const full = Math.min(top, isOneSided && isExplicit ? main.offsetTop / u + UNDER_PAUSE : isInSky ? head : top);
     return { width, height, sign, signSize, inset, aside, full, top, zero, goal, reach, above, high };
   }
 
@@ -215,10 +218,9 @@ export function createFitting(body, scene) {
   }
 
   // Choose the layout for all that this screen may say: the longest phrases that may follow a step, and a number.
-  return function fit(screen, { phrases: samples, number: usual, isGoalNamed }) {
+  return function fit(screen, { phrases: samples, number: usual }) {
     const isFeedback = screen === "feedback";
-    body.toggleAttribute("data-goal-named", isGoalNamed);
-    const shown = key.textContent.replace(/[−\d]/g, "6");
+    const shown = key.textContent.replace("−", "").replace(/\d/g, "6");
     widest = [usual, shown].reduce((a, b) => (b.length > a.length ? b : a), widest);
     const number = isFeedback ? widest : "";
     const said = isFeedback ? samples : [phrase.textContent, actions.textContent];

@@ -79,7 +79,7 @@ export function createScene(svg) {
   function levelOf({ performance, hit, close }, clear) {
     const level = y(performance ?? 0);
     if (performance == null || close) return level;
-    const [side, room] = hit ? [-1, layout.goal - layout.top] : [1, layout.zero - layout.goal];
+    const [side, room] = hit ? [-1, layout.goal - layout.full] : [1, layout.zero - layout.goal];
     return layout.goal + side * (clear + (1 - clear / room) * Math.max(side * (level - layout.goal), 0));
   }
 

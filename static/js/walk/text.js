@@ -88,20 +88,20 @@ export function phaseLeft({ phase, phase_s, phase_strides }) {
 
 const NOT_MEASURED = _("Not seen.");
 
-// Return the words after a step; without points they are the goal, beside which the value stands.
+// Return whether the words after a step name the goal: without points, beside the value.
+export const namesGoal = (step) => typeof step?.goal === "number" && !step.words && step.kind !== "missing";
+
+// Return the words after a step.
 export function phraseOf(step) {
   if (step?.kind === "missing") return NOT_MEASURED;
-  if (typeof step?.goal !== "number") return step?.words ?? "";
-  return step.words || fill(_("Goal: %(goal)s"), { goal: number(step.goal, 2) });
+  return namesGoal(step) ? fill(_("Goal: %(goal)s"), { goal: number(step.goal, 2) }) : (step?.words ?? "");
 }
 
-// Return the longest phrases that may follow a step, whether all name the goal, and a number as wide as most.
+// Return the longest phrases that may follow a step, and a number as wide as most.
 export function samplesOf(session) {
-  const [phrases, longest] = [[NOT_MEASURED], session?.longest ?? []];
-  const hasWords = session?.words_shown !== false;
-  const isValue = session?.has_points === false;
-  if (hasWords) phrases.push(phraseOf({ goal: 8.88 }), ...longest);
-  return { phrases, isGoalNamed: isValue && hasWords && !longest.length, number: isValue ? number(6.66, 2) : "666" };
+  const phrases = [NOT_MEASURED];
+  if (session?.words_shown !== false) phrases.push(phraseOf({ goal: 8.88 }), ...(session?.longest ?? []));
+  return { phrases, number: session?.has_points === false ? number(6.66, 2) : "666" };
 }
 
 // Return one line for screen readers: "Well above. Plus 2. 128 points."
