@@ -36,7 +36,7 @@ const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units a
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const USUAL = 2 / 3; // of a total of three digits: most have two
 // In the middle, from the thermometer's axis. A value's sign is seldom there: the words name the goal.
-const [SIGN_REACH, VALUE_REACH, BEFORE_NUMBER] = [310, 188, 140];
+const [SIGN_REACH, VALUE_REACH, BEFORE_NUMBER] = [310, 150, 140];
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -128,11 +128,11 @@ export function createFitting(body, scene) {
     const isOneSided = isAcross && (isHalf || isLargest);
     const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
-    if (isLargest && (isOneSided || !isExplicit))
+    if (text === "largest" && !isHalf && !isMiddle)
       high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const isBeside = isOneSided || column === "center";
     const sign = isBeside ? "beside" : isAcross ? "behind" : "before"; // the goal's (scene.js)
-    const signSize = column ? SIGN_IN_PART : 1;
+    const signSize = isHalf || isMiddle ? SIGN_IN_PART : 1;
     const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
     const airAbove = AIR + SIGN_BESIDE[0] * reaching;
     const airBelow = AIR + SIGN_BESIDE[1] * reaching;

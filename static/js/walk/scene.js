@@ -32,8 +32,8 @@ export function createScene(svg) {
   const onScale = (performance) => layout.zero - ((layout.zero - layout.top) * Math.max(performance, 0)) / TOP;
   const y = (performance) => Math.max(onScale(performance), layout.full);
 
-  // Place all: `top`, `zero` and `goal` are heights of the scale, `full` where the glass is, `reach` that of the strides
-  // about the goal.
+  // Place all: `top`, `zero` and `goal` are heights of the scale, `full` where the glass ends, `reach` that of the
+  // strides about the goal.
   function layOut(frame) {
     layout = frame;
     const { width, height, full, zero, goal, reach, sign, signSize, isFlipped, inset } = frame;
