@@ -99,7 +99,8 @@ def test_with_the_largest_words_the_goal_is_named_once(browser: Browser, server:
     """By the words after a step; by its sign where they do not. The frame stays."""
     (walk,) = make_walks(server, {"valence": "explicit", "screen": {"screen_text": "largest"}})
     sign, frames = {}, []
-    with page_of(browser, server, walk) as page, feet_of(server, walk) as feet:
+    screen = page_of(browser, server, walk, "tablet-landscape")
+    with screen as page, feet_of(server, walk) as feet:
         for performance in (0.9, None, 1.1):
             feet.walk(performance)
             until_step(page, feet.number)

@@ -35,8 +35,7 @@ const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where 
 const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const USUAL = 2 / 3; // of a total of three digits: most have two
-// In the middle, from the thermometer's axis. A value's sign is seldom there: the words name the goal.
-const [SIGN_REACH, VALUE_REACH, BEFORE_NUMBER] = [310, 150, 140];
+const [SIGN_REACH, BEFORE_NUMBER] = [310, 140]; // in the middle, from the thermometer's axis
 const SCENE = 188; // the thermometer's width
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -156,8 +155,7 @@ export function createFitting(body, scene) {
     if (zero - top < (isAcross && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
     // In the middle: of the screen, or of what the sign, the thermometer and a usual number take together.
     const number = (widthOf(key) / u) * (isExplicit ? 1 : USUAL);
-    const before = isExplicit ? VALUE_REACH : SIGN_REACH;
-    const aside = isMiddle ? Math.max(0, (BEFORE_NUMBER + number - before) / 2) : 0;
+    const aside = isMiddle ? Math.max(0, (BEFORE_NUMBER + number - SIGN_REACH) / 2) : 0;
     const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
     // The glass goes on where no badge is, and beside a badge in the sky.
@@ -201,6 +199,7 @@ export function createFitting(body, scene) {
     ground.style.setProperty("--floor", `${found.goal * unit()}px`);
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
+    main.style.setProperty("--high", `${found.high}px`);
     main.style.setProperty("--aside", `${-found.aside * unit()}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });

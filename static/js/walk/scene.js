@@ -16,7 +16,7 @@ const TICKS = [0.25, 0.5, 0.75, 1.25];
 const AT_LINE = "M0 0l20 -40h148v80h-148z";
 const ON_LINE = "M0 40l20 -80h148v80z";
 const SIGNS = {
-  behind: { path: AT_LINE, room: 246, rise: 0, turn: 1 },
+  behind: { path: AT_LINE, room: 250, rise: 0, turn: 1 },
   beside: { path: AT_LINE, room: HALF, rise: 0, turn: -1 },
   before: { path: ON_LINE, room: HALF, rise: 43, turn: -1 },
 };
@@ -50,7 +50,7 @@ export function createScene(svg) {
     place(".bulb", 0, bottom);
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
-    place(".pennant", turn * (r + 10), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
+    place(".pennant", turn * (r + 14), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
     find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
     find(".pennant text").setAttribute("transform", isTurned ? "translate(182 0) scale(-1 1)" : "");
