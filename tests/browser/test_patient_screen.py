@@ -95,8 +95,10 @@ def test_the_thermometer_stands_where_the_patient_looks(
         assert badge == pytest.approx(total, abs=0.1)
 
 
-def test_with_the_largest_words_the_goal_is_named_once(browser: Browser, server: Server) -> None:
-    """By the words after a step; by its sign where they do not. The frame stays."""
+def test_across_the_largest_words_name_the_goal_on_its_line(
+    browser: Browser, server: Server
+) -> None:
+    """Where they do not, its sign does. The frame stays; what follows is in its own place."""
     (walk,) = make_walks(server, {"valence": "explicit", "screen": {"screen_text": "largest"}})
     sign, frames = {}, []
     screen = page_of(browser, server, walk, "tablet-landscape")
@@ -107,6 +109,12 @@ def test_with_the_largest_words_the_goal_is_named_once(browser: Browser, server:
             words = page.locator(".words").inner_text().split()[0]
             sign[words] = page.locator(".pennant").is_visible()
             frames.append([page.evaluate(BOX, part) for part in (".wall", ".goal")])
+        near = page.evaluate(BOX, ".goal")[1] - page.evaluate(BOX, ".words")[3]
+        page.click(".pause")
+        page.wait_for_selector("body[data-look=paused]")
+        down = page.evaluate("() => getComputedStyle(document.querySelector('.phrase')).translate")
+    assert 0 <= near < 40
+    assert down == "none"
     assert sign == {"Goal:": False, "Not": True}
     assert frames == [frames[0]] * 3
 

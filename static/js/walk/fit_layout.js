@@ -32,7 +32,7 @@ const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const SPARKS = 76; // above the scale, where words stand over it
 const FOOT = 172; // below the scale: the bulb
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
-const SIGN_IN_PART = 1.25; // larger, in the middle and in a half, whose units are smaller
+const SIGN_IN_PART = 1.25; // larger, in a half and across in the middle, whose units are smaller
 const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
 const USUAL = 2 / 3; // of a total of three digits: most have two
 const [SIGN_REACH, BEFORE_NUMBER] = [310, 140]; // in the middle, from the thermometer's axis
@@ -104,11 +104,13 @@ export function createFitting(body, scene) {
   // Return whether the number is too wide for its place, also as points that were lost.
   function isNumberTooWide(number) {
     const mayBeLost = ["negative", "binary"].includes(body.dataset.theme);
-    return (mayBeLost ? [`−${number}`, number] : [number]).some((text) => {
+    const isTooWideAs = (text) => {
       key.toggleAttribute("data-lost", text !== number);
       key.textContent = text;
       return isTooWide(key);
-    });
+    };
+    const isLostTooWide = mayBeLost && isTooWideAs(`−${number}`);
+    return isTooWideAs(number) || isLostTooWide; // the number itself stays: frameOf measures it
   }
 
   // Return the frame that holds each of the samples, which `words` has as its children; null if none does.
@@ -140,7 +142,7 @@ export function createFitting(body, scene) {
     const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
     const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
-    if (level === LAST) return sky + AIR + total > bottom ? null : { width, height, goal: (sky + bottom - total) / 2 };
+    if (level === LAST) return sky + AIR + total > bottom ? null : { goal: (sky + bottom - total) / 2, high };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const isOver = hasBadge && isOneSided; // the badge, over the thermometer
     const isInSky = hasBadge && isMiddle; // the badge, over the goal line
@@ -197,9 +199,10 @@ export function createFitting(body, scene) {
     const found = frame(level, size);
     if (!found) return; // a screen so small that nothing fits
     ground.style.setProperty("--floor", `${found.goal * unit()}px`);
+    main.style.setProperty("--words-high", `${found.high}px`);
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
-    main.style.setProperty("--high", `${found.high}px`);
+    main.style.setProperty("--words-down", `${(found.goal - AIR) * unit() - main.offsetTop - found.high}px`);
     main.style.setProperty("--aside", `${-found.aside * unit()}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });

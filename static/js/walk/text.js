@@ -97,10 +97,14 @@ export function phraseOf(step) {
   return namesGoal(step) ? fill(_("Goal: %(goal)s"), { goal: number(step.goal, 2) }) : (step?.words ?? "");
 }
 
+let widestGoal = 8.88; // so far: where one step names none, the words' place stays
+
 // Return the longest phrases that may follow a step, and a number as wide as most.
 export function samplesOf(session) {
+  const goal = session?.last?.goal;
+  if (typeof goal === "number") widestGoal = Math.max(widestGoal, Number(goal.toFixed(2).replace(/\d/g, "8")));
   const phrases = [NOT_MEASURED];
-  if (session?.words_shown !== false) phrases.push(phraseOf({ goal: 8.88 }), ...(session?.longest ?? []));
+  if (session?.words_shown !== false) phrases.push(phraseOf({ goal: widestGoal }), ...(session?.longest ?? []));
   return { phrases, number: session?.has_points === false ? number(6.66, 2) : "666" };
 }
 
