@@ -290,7 +290,7 @@ STATICFILES_DIRS = [
 STORAGES = {
     "default": {"BACKEND": "django.core.files.storage.FileSystemStorage"},
     "staticfiles": {
-        "BACKEND": "whitenoise.storage.CompressedManifestStaticFilesStorage"
+        "BACKEND": "rehab.people.web.static_files.MinifiedStorage"
         if HOSTED
         else "django.contrib.staticfiles.storage.StaticFilesStorage"
     },

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import ssl
 import subprocess
 import sys
@@ -146,24 +145,3 @@ def test_what_the_proxy_lets_through(hosted: Hosted, tmp_path: Path) -> None:
         assert "garry_ready 1.0" in figures
         for path in ("/metrics", "/livez"):
             assert hosted.get(f"{hosted.secure}{path}", **allowed)[0] == 404
-
-
-def test_a_second_server_on_the_database_waits_until_the_first_has_ended(hosted: Hosted) -> None:
-    with hosted.serve() as first:
-        second = subprocess.Popen(
-            [sys.executable, "manage.py", "serve", "--port", "0"],
-            cwd=ROOT,
-            env=hosted.torture.environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        try:
-            warning = json.loads(second.stderr.readline())
-            assert warning["message"].startswith("Another server runs on this database")
-            assert first.poll() is None
-            first.kill()  # its lock goes with its connection
-            assert any(line.startswith("Ready") for line in second.stdout)
-        finally:
-            second.terminate()
-            second.communicate(timeout=40)
