@@ -195,6 +195,34 @@ def test_the_frame_stays_from_step_to_step(server: Server, visit: Visit) -> None
             assert found == [found[0]] * len(found), screen
 
 
+def test_the_frame_stays_when_a_hundred_points_are_lost(server: Server, visit: Visit) -> None:
+    (walk,) = make_walks(server, {"valence": "negative"})
+    page = visit(walk.path, walk, reduced_motion="reduce")
+    key = page.locator(".key")
+    with feet_of(server, walk) as feet:
+        page.click("[data-change=start]")
+        page.wait_for_selector("body[data-look=begin]")
+        feet.walk(*[0.8] * 90)
+        found, sizes = [], []
+        for _ in range(2):
+            frames: dict[str, Any] = {}
+            for screen in ("tablet-portrait", "tablet-landscape"):
+                set_screen(page, screen)
+                for column in ("", "center", "right", "left"):
+                    feet.walk(0.8)
+                    page.wait_for_function("n => document.body.dataset.step == n", arg=feet.number)
+                    seen, wrong = page.evaluate(FRAMES, [TEXTS, column])
+                    assert (screen, wrong) == (screen, [])
+                    frames |= {f"{screen} {name}": frame for name, frame in seen.items()}
+                    assert key.evaluate("one => one.scrollWidth <= one.clientWidth + 1")
+                    sizes.append(key.evaluate("one => getComputedStyle(one).fontSize"))
+            found.append(frames)
+            feet.walk(*[0.8] * 10)
+        assert key.text_content() == "−126"
+    assert found[0] == found[1]
+    assert sizes[:8] != sizes[8:]  # a total of four signs is smaller
+
+
 def test_a_near_miss_is_seen_to_miss_and_a_step_off_the_chart_to_be_off(
     server: Server, visit: Visit
 ) -> None:

@@ -4,6 +4,7 @@ import { signed } from "garry/shared/format";
 import { _, fill, number as format } from "garry/shared/language";
 import { isStill } from "garry/walk/reduced_motion";
 import { describeStep, describeSummary, messageFor, namesGoal, phaseLeft, phraseOf, timeLeft } from "garry/walk/text";
+import { writeTotal } from "garry/walk/total";
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
 const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };
@@ -67,9 +68,7 @@ export function createFeedback(body) {
     const text = has_points ? format(score) : typeof last?.shown === "number" ? format(last.shown, 2) : "—";
     const before = shownScore;
     shownScore = score;
-    key.toggleAttribute("data-lost", has_points && score < 0);
-    key.dataset.ends = text.at(-1);
-    if (set(key, text) && has_points && !isStill()) {
+    if (writeTotal(key, text, has_points) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }
   }

@@ -7,6 +7,8 @@
 // One frame holds for all steps: it follows from the longest phrases and a number of as many digits, so that goal,
 // thermometer, badge and total stay where they are. Heights are in units, --u (walk.css).
 
+import { writeTotal } from "garry/walk/total";
+
 const CHART = 1;
 const BADGE = 2;
 const LAST = 3;
@@ -23,20 +25,17 @@ const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
-const BADGE_IN_SKY = 290; // with what is between it and the goal line
-const SIGN = 40; // of a step, beside the total's name and higher than that
 const SCALE_LEAST = 240; // of the thermometer
-const BESIDE_WORDS = 300; // the same in a half, whose units are smaller
+const BESIDE_WORDS = 300; // the same in the middle or a half, whose units are smaller
 const UNDER_PAUSE = 48; // the glass, from the words' top
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
-const SPARKS = 76; // above the scale, where words stand over it
-const FOOT = 172; // below the scale: the bulb
+const [SPARKS, CAP] = [76, 52]; // above the scale, where words stand over it
+const [FOOT, BADGE_FOOT] = [172, 198]; // below the scale: the bulb, or the badge in its place
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
-const SIGN_IN_PART = 1.25; // larger, in a half and across in the middle, whose units are smaller
-const [UNDER_BADGE, UNDER_BADGE_IN_HALF] = [252, 286]; // the scale, from that badge's top
-const USUAL = 2 / 3; // of a total of three digits: most have two
-const [SIGN_REACH, BEFORE_NUMBER] = [310, 140]; // in the middle, from the thermometer's axis
-const SCENE = 188; // the thermometer's width
+const [SIGN_IN_PART, SIGN_UPRIGHT] = [1.25, 1.15]; // larger, where units are smaller or room is
+const [UNDER_BADGE, UNDER_BADGE_IN_PART] = [254, 298]; // the scale, from that badge's top
+const [HALF, HALF_BADGE, BEFORE_SIGN] = [94, 108, 250]; // from the thermometer's axis to the screen's edge
+const BESIDE_MIDDLE = 265; // the same to the middle, where words and total are beside it
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -66,13 +65,6 @@ export function chooseLayout(holds, isMeasured, least) {
   return [level, size];
 }
 
-// Return the width of what an element says, in pixels.
-function widthOf(element) {
-  const text = document.createRange();
-  text.selectNodeContents(element);
-  return text.getBoundingClientRect().width;
-}
-
 function sampleOf(text) {
   const sample = Object.assign(document.createElement("span"), { textContent: text });
   sample.style.display = "block";
@@ -88,7 +80,7 @@ export function createFitting(body, scene) {
   if (pxPerMm) body.style.setProperty("--degree", `${pixelsOfDegree(Number(pxPerMm), Number(distance))}px`);
   let [fitted, widest] = ["", ""];
 
-  const unit = () => parseFloat(getComputedStyle(main).right) / EDGE; // walk.css
+  const unit = () => parseFloat(getComputedStyle(main).left) / EDGE; // walk.css
   const isTooWide = (box) => box.scrollWidth > box.clientWidth + 1;
 
   const heights = () => [...words.children].map((sample) => sample.offsetHeight);
@@ -103,10 +95,10 @@ export function createFitting(body, scene) {
 
   // Return whether the number is too wide for its place, also as points that were lost.
   function isNumberTooWide(number) {
-    const mayBeLost = ["negative", "binary"].includes(body.dataset.theme);
+    const { theme } = body.dataset;
+    const mayBeLost = ["negative", "binary"].includes(theme);
     const isTooWideAs = (text) => {
-      key.toggleAttribute("data-lost", text !== number);
-      key.textContent = text;
+      writeTotal(key, text, theme !== "explicit");
       return isTooWide(key);
     };
     const isLostTooWide = mayBeLost && isTooWideAs(`−${number}`);
@@ -120,49 +112,45 @@ export function createFitting(body, scene) {
     const u = unit();
     const total = count.offsetHeight / u;
     let high = Math.max(...heights());
-    const isHalf = column === "right" || column === "left";
-    const isLargest = text === "largest" && !column;
     const isUpright = !landscape.matches;
     const isExplicit = theme === "explicit";
-    const isAcross = !isUpright && column !== "center";
+    const isInPart = !isUpright && column; // of the screen, with smaller units
     const isMiddle = !isUpright && column === "center";
-    const isOneSided = isAcross && (isHalf || isLargest);
-    const isBelow = isUpright && (isLargest || column); // the total, below the thermometer
+    const isLargest = text === "largest";
+    const isOneSided = !isUpright && (column || isLargest);
+    const isBelow = isUpright && (column || isLargest); // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
-    if (text === "largest" && !isHalf && !isMiddle)
-      high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
+    const isOnTwoLines = isMiddle ? level < LAST : isLargest && (!column || column === "center");
+    if (isOnTwoLines) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const isBeside = isOneSided || column === "center";
-    const sign = isBeside ? "beside" : isAcross ? "behind" : "before"; // the goal's (scene.js)
-    const signSize = isHalf || isMiddle ? SIGN_IN_PART : 1;
+    const sign = isBeside ? "beside" : isUpright ? "before" : "behind"; // the goal's (scene.js)
+    const signSize = isInPart ? SIGN_IN_PART : isBelow ? SIGN_UPRIGHT : 1;
     const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
     const airAbove = AIR + SIGN_BESIDE[0] * reaching;
     const airBelow = AIR + SIGN_BESIDE[1] * reaching;
     const [width, height] = [stage.clientWidth / u, stage.clientHeight / u];
     const [sky, bottom] = [main.offsetTop / u + high / u + (isAbove ? total : 0) + airAbove, height - EDGE];
-    const stand = isBelow ? bottom - total - (level < BADGE ? AIR : SIGN) : bottom;
-    const zero = stand - FOOT;
     const reach = level < CHART ? CHART_REACH : 0;
     if (level === LAST) return sky + AIR + total > bottom ? null : { goal: (sky + bottom - total) / 2, high };
     const hasBadge = level < BADGE && !isExplicit; // walk.css
     const isOver = hasBadge && isOneSided; // the badge, over the thermometer
-    const isInSky = hasBadge && isMiddle; // the badge, over the goal line
-    const underBadge = main.offsetTop / u + (isHalf ? UNDER_BADGE_IN_HALF : UNDER_BADGE);
-    const head = isOver ? underBadge : isAcross ? SCALE_TOP : sky + SPARKS;
-    const top = Math.max(head, (3 * (sky + (isInSky ? BADGE_IN_SKY : reach)) - zero) / 2);
+    const isBadgeBulb = !isExplicit && isBelow; // the badge is the thermometer's bulb
+    const stand = isBelow ? bottom - total - AIR : bottom;
+    const zero = stand - (isBadgeBulb ? BADGE_FOOT : FOOT);
+    const underBadge = main.offsetTop / u + (isInPart ? UNDER_BADGE_IN_PART : UNDER_BADGE);
+    const head = isOver ? underBadge : isUpright ? sky + (isBelow ? CAP : SPARKS) : SCALE_TOP;
+    const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
-    const badge = !hasBadge || isOver || isInSky ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
+    const badge = !hasBadge || isOneSided || isBelow ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
     const under = reach + airBelow;
     const beside = isBelow || isAbove ? 0 : total;
     const ground = goal + under + (isUpright ? badge + beside : Math.max(badge, beside));
-    if (zero - top < (isAcross && isHalf ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
-    // In the middle: of the screen, or of what the sign, the thermometer and a usual number take together.
-    const number = (widthOf(key) / u) * (isExplicit ? 1 : USUAL);
-    const aside = isMiddle ? Math.max(0, (BEFORE_NUMBER + number - SIGN_REACH) / 2) : 0;
-    const inset = column === "center" ? (width - SCENE) / 2 - EDGE + aside : 0;
+    if (zero - top < (isInPart ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
+    const atEdge = width - EDGE - (isBelow ? HALF_BADGE : isOneSided || isUpright ? HALF : BEFORE_SIGN);
+    const axis = column === "center" ? width / 2 + (isUpright ? 0 : BESIDE_MIDDLE) : atEdge;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
-    // The glass goes on where no badge is, and beside a badge in the sky.
-    const full = Math.min(top, isOneSided && isExplicit ? main.offsetTop / u + UNDER_PAUSE : isInSky ? head : top);
-    return { width, height, sign, signSize, inset, aside, full, top, zero, goal, reach, above, high };
+    const full = isOneSided && isExplicit ? Math.min(top, main.offsetTop / u + UNDER_PAUSE) : top; // the glass goes on
+    return { width, height, sign, signSize, isBadgeBulb, stand, axis, full, top, zero, goal, reach, above, high };
   }
 
   function set(level, size) {
@@ -170,7 +158,6 @@ export function createFitting(body, scene) {
     if (size < 1) body.dataset.short = size.toFixed(4);
     else delete body.dataset.short;
     main.style.setProperty("--short", size);
-    main.style.removeProperty("--aside");
     phrase.style.removeProperty("--measure");
   }
 
@@ -203,7 +190,6 @@ export function createFitting(body, scene) {
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
     main.style.setProperty("--words-down", `${(found.goal - AIR) * unit() - main.offsetTop - found.high}px`);
-    main.style.setProperty("--aside", `${-found.aside * unit()}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });
   }
@@ -234,14 +220,10 @@ export function createFitting(body, scene) {
     fitted = wanted;
     if (!isFeedback) return fitMessage();
 
-    const [lines, total, isLost] = [[...words.childNodes], key.textContent, key.hasAttribute("data-lost")];
-    const { ends } = key.dataset;
-    delete key.dataset.ends;
+    const [lines, total] = [[...words.childNodes], key.textContent];
     words.replaceChildren(...samples.map(sampleOf));
     fitStep(number);
     words.replaceChildren(...lines);
-    key.textContent = total;
-    key.toggleAttribute("data-lost", isLost);
-    if (ends) key.dataset.ends = ends;
+    writeTotal(key, total, theme !== "explicit");
   };
 }

@@ -7,18 +7,18 @@ import { createDots } from "garry/walk/stride_dots";
 const TOP = 1.5; // the scale's end; the goal is always at two thirds of it. The glass may go on.
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 88;
-const HALF = 94; // of the thermometer's width, with air beside the bulb
-const EDGE = 24;
+const BULB_HIGH = 94; // its middle, above the thermometer's foot
 // The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: it points at the line, behind or before the thermometer, or stands on the horizon before it.
 const AT_LINE = "M0 0l20 -40h148v80h-148z";
 const ON_LINE = "M0 40l20 -80h148v80z";
+const SIGN_WIDE = 184; // with air
 const SIGNS = {
-  behind: { path: AT_LINE, room: 250, rise: 0, turn: 1 },
-  beside: { path: AT_LINE, room: HALF, rise: 0, turn: -1 },
-  before: { path: ON_LINE, room: HALF, rise: 43, turn: -1 },
+  behind: { path: AT_LINE, rise: 0, turn: 1 },
+  beside: { path: AT_LINE, rise: 0, turn: -1 },
+  before: { path: ON_LINE, rise: 43, turn: -1 },
 };
 
 export function createScene(svg) {
@@ -36,13 +36,13 @@ export function createScene(svg) {
   // strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, full, zero, goal, reach, sign, signSize, isFlipped, inset } = frame;
-    const { path, room, rise, turn } = SIGNS[sign];
-    const x = width - EDGE - room - inset;
-    const [top, bottom, r] = [full - 36, zero + 78, TUBE_RADIUS];
+    const { width, height, full, zero, goal, reach, sign, signSize, isFlipped, axis: x, isBadgeBulb, stand } = frame;
+    const { path, rise, turn } = SIGNS[sign];
+    const [top, bottom, r] = [full - 36, stand - BULB_HIGH, TUBE_RADIUS];
     const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
-    const shell = `${tube}A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
+    const bulb = isBadgeBulb ? `V${bottom}H${-r}Z` : `A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
+    const shell = tube + bulb;
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
     find(".glass").setAttribute("transform", `translate(${x} 0)`);
@@ -57,7 +57,7 @@ export function createScene(svg) {
     place(".sparkles", 0, top);
     for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);
     ticks.forEach((tick, i) => tick.setAttribute("d", `M${r - 3} ${y(TICKS[i])}h${TICKS[i] === 0.5 ? -32 : -20}`));
-    const end = x - r - 50 - (turn > 0 ? 0 : room + 90);
+    const end = x - r - 50 - (turn > 0 ? 0 : SIGN_WIDE);
     const swing = reach - 30; // of the middle of a dot
     dots.layOut({
       left: 60,
