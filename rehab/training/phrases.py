@@ -126,9 +126,9 @@ STRONGEST = join(
 
 FAR_BELOW = join(
     gettext_noop("Far below."),
-    gettext_noop("Well below."),
+    gettext_noop("Quite low."),
     gettext_noop("Far under."),
-    gettext_noop("Well under."),
+    gettext_noop("Low step."),
     gettext_noop("Far off."),
     gettext_noop("A long way."),
     gettext_noop("Way below."),

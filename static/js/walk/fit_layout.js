@@ -30,11 +30,12 @@ const BESIDE_WORDS = 300; // the same in the middle or a half, whose units are s
 const UNDER_PAUSE = 48; // the glass, from the words' top
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const [SPARKS, CAP] = [76, 52]; // above the scale, where words stand over it
-const [FOOT, BADGE_FOOT] = [172, 198]; // below the scale: the bulb, or the badge in its place
+const [FOOT, BADGE_FOOT] = [172, 216]; // below the scale: the bulb, or the badge in its place
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
 const [SIGN_IN_PART, SIGN_UPRIGHT] = [1.25, 1.15]; // larger, where units are smaller or room is
+const THICK_IN_PART = 1.16; // the thermometer
 const [UNDER_BADGE, UNDER_BADGE_IN_PART] = [254, 298]; // the scale, from that badge's top
-const [HALF, HALF_BADGE, BEFORE_SIGN] = [94, 108, 250]; // from the thermometer's axis to the screen's edge
+const [HALF, HALF_BADGE, BEFORE_SIGN] = [94, 118, 250]; // from the thermometer's axis to the screen's edge
 const BESIDE_MIDDLE = 265; // the same to the middle, where words and total are beside it
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -124,6 +125,7 @@ export function createFitting(body, scene) {
     if (isOnTwoLines) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
     const isBeside = isOneSided || column === "center";
     const sign = isBeside ? "beside" : isUpright ? "before" : "behind"; // the goal's (scene.js)
+    const thick = isInPart ? THICK_IN_PART : 1;
     const signSize = isInPart ? SIGN_IN_PART : isBelow ? SIGN_UPRIGHT : 1;
     const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
     const airAbove = AIR + SIGN_BESIDE[0] * reaching;
@@ -150,7 +152,23 @@ export function createFitting(body, scene) {
     const axis = column === "center" ? width / 2 + (isUpright ? 0 : BESIDE_MIDDLE) : atEdge;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
     const full = isOneSided && isExplicit ? Math.min(top, main.offsetTop / u + UNDER_PAUSE) : top; // the glass goes on
-    return { width, height, sign, signSize, isBadgeBulb, stand, axis, full, top, zero, goal, reach, above, high };
+    return {
+      width,
+      height,
+      sign,
+      signSize,
+      isBadgeBulb,
+      stand,
+      axis,
+      thick,
+      full,
+      top,
+      zero,
+      goal,
+      reach,
+      above,
+      high,
+    };
   }
 
   function set(level, size) {

@@ -7,7 +7,7 @@ import { createDots } from "garry/walk/stride_dots";
 const TOP = 1.5; // the scale's end; the goal is always at two thirds of it. The glass may go on.
 const TUBE_RADIUS = 68;
 const BULB_RADIUS = 88;
-const BULB_HIGH = 94; // its middle, above the thermometer's foot
+const [BULB_HIGH, BADGE_HIGH] = [94, 104]; // its middle, above the thermometer's foot; the badge's in its place
 // The least gap between a step and the goal line, in the thermometer and in the chart: seen from 2 m.
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
@@ -36,12 +36,27 @@ export function createScene(svg) {
   // strides about the goal.
   function layOut(frame) {
     layout = frame;
-    const { width, height, full, zero, goal, reach, sign, signSize, isFlipped, axis: x, isBadgeBulb, stand } = frame;
+    const {
+      width,
+      height,
+      full,
+      zero,
+      goal,
+      reach,
+      sign,
+      signSize,
+      isFlipped,
+      axis: x,
+      isBadgeBulb,
+      stand,
+      thick,
+    } = frame;
     const { path, rise, turn } = SIGNS[sign];
-    const [top, bottom, r] = [full - 36, stand - BULB_HIGH, TUBE_RADIUS];
-    const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - r ** 2);
+    const [r, bulbRadius] = [TUBE_RADIUS * thick, BULB_RADIUS * thick];
+    const [top, bottom] = [full - 36, stand - (isBadgeBulb ? BADGE_HIGH : BULB_HIGH)];
+    const join = bottom - Math.sqrt(bulbRadius ** 2 - r ** 2);
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
-    const bulb = isBadgeBulb ? `V${bottom}H${-r}Z` : `A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
+    const bulb = isBadgeBulb ? `V${bottom}H${-r}Z` : `A${bulbRadius} ${bulbRadius} 0 1 1 ${-r} ${join}Z`;
     const shell = tube + bulb;
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
