@@ -25,7 +25,6 @@ MEASURE = """() => {
   probe.remove();
   return { word: size(".words"), key: size(".key"), degree, drop: Number(drop),
     short: Number(short ?? 1), words: box(".words"), number: box(".key"), head: box("header"),
-    lost: document.querySelector(".key").textContent.startsWith("−"),
     buttons: [...document.querySelectorAll("header button")].filter((one) => one.checkVisibility())
       .map((one) => { const { left, right } = one.getBoundingClientRect(); return [left, right]; }),
     tube: box(".shell.wall"), badge: box(".emblem svg"),

@@ -1,39 +1,54 @@
 """Static files, minified: gathered for a hosted server, or served on one machine.
 
-A minified file has no comments, which are a quarter of what the patient's page loads.
+Without comments the patient's page is a fifth lighter.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from csp.utils import build_policy
 from django.conf import settings
 from django.contrib.staticfiles.handlers import ASGIStaticFilesHandler
 from django.core.exceptions import SuspiciousOperation
-from django.core.files.base import ContentFile, File
 from django.http import FileResponse, Http404, HttpRequest
-from rcssmin import cssmin
 from rjsmin import jsmin
 from whitenoise.storage import CompressedManifestStaticFilesStorage
 
-# GARRY's own; libraries come minified, and Django's admin stays as it is.
-MINIFIERS = {"css": cssmin, "js": jsmin}
+# No minifier: those for Python take the space out of "&:has(a) :is(b)", which is another selector.
+CSS_COMMENTS_AND_INDENTS = re.compile(rb"/\*.*?\*/|^\s+", re.DOTALL | re.MULTILINE)
 
 
 def minify(name: str, content: bytes) -> bytes:
-    """Return a static file's content: a style sheet or script of GARRY's minified."""
-    minifier = MINIFIERS.get(name.partition("/")[0])
-    return minifier(content.decode()).encode() if minifier else content
+    """Return a static file's content: a style sheet or script of GARRY's minified.
+
+    Libraries come minified, and Django's admin stays as it is.
+    """
+    match name.partition("/")[0]:
+        case "css":
+            return CSS_COMMENTS_AND_INDENTS.sub(b"", content)
+        case "js":
+            return str(jsmin(content.decode())).encode()
+    return content
 
 
 class MinifiedStorage(CompressedManifestStaticFilesStorage):  # type: ignore[misc]
     """WhiteNoise's storage, which collectstatic fills for a hosted server."""
 
-    def save(self, name: str, content: File[bytes], max_length: int | None = None) -> str:
-        """Store a file, and return its name."""
-        minified = ContentFile(minify(name, content.read()))
-        return str(super().save(name, minified, max_length=max_length))
+    def post_process(self, paths: dict[str, Any], **options: Any) -> Iterator[Any]:
+        """Minify what was gathered, then name it by its hash and compress it."""
+        if options.get("dry_run"):
+            return
+        for name in paths:
+            path = Path(self.path(name))
+            content = path.read_bytes()
+            if (minified := minify(name, content)) != content:
+                path.write_bytes(minified)
+        gathered = {name: (self, name) for name in paths}  # not the files as they are written
+        yield from super().post_process(gathered, **options)
 
 
 class StaticFilesHandler(ASGIStaticFilesHandler):

@@ -18,7 +18,7 @@ const rosette = Array.from({ length: 240 }, (_, i) => {
 export function createFeedback(body) {
   const find = (selector) => body.querySelector(selector);
   const [words, sub, live] = [".words", ".sub", ".said"].map(find);
-  const [label, key] = [".label", ".key"].map(find);
+  const [label, counts, summary, key] = [".label", ".label .name", ".summary", ".key"].map(find);
   const [time, part, bar, partWords] = [".time", ".part", ".part progress", ".part p"].map(find);
   const emblem = find(".emblem svg");
   const signs = emblem.querySelectorAll("text");
@@ -61,10 +61,10 @@ export function createFeedback(body) {
 
   function drawTotals({ has_points, unit, score, last }) {
     const counted = has_points ? _("Points") : _("This step");
-    label.toggleAttribute("data-summary", Boolean(last?.summary));
     if (has_points || last?.summary) delete label.dataset.unit;
     else label.dataset.unit = unit;
-    set(label, last?.summary ? `${counted} · ${describeSummary(last.summary)}` : counted);
+    set(counts, last?.summary ? `${counted} · ` : counted);
+    set(summary, last?.summary ? describeSummary(last.summary) : "");
     const text = has_points ? format(score) : typeof last?.shown === "number" ? format(last.shown, 2) : "—";
     const before = shownScore;
     shownScore = score;

@@ -102,8 +102,7 @@ export function createFitting(body, scene) {
       writeTotal(key, text, theme !== "explicit");
       return isTooWide(key);
     };
-    const isLostTooWide = mayBeLost && isTooWideAs(`−${number}`);
-    return isTooWideAs(number) || isLostTooWide; // the number itself stays: frameOf measures it
+    return isTooWideAs(number) || (mayBeLost && isTooWideAs(`−${number}`));
   }
 
   // Return the frame that holds each of the samples, which `words` has as its children; null if none does.
@@ -167,6 +166,7 @@ export function createFitting(body, scene) {
       goal,
       reach,
       above,
+      below: total,
       high,
     };
   }
@@ -207,6 +207,7 @@ export function createFitting(body, scene) {
     main.style.setProperty("--words-high", `${found.high}px`);
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
+    main.style.setProperty("--below", `${found.below * unit()}px`);
     main.style.setProperty("--words-down", `${(found.goal - AIR) * unit() - main.offsetTop - found.high}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });
