@@ -108,6 +108,15 @@ LOOK = f"""async ([texts, buttons, words]) => {{
 }}"""
 
 
+# Which drawing a badge has, and how many arcs the thermometer's outline: its top, and its bulb.
+BULB = """(emblem) => {
+  document.querySelector(".emblem svg").dataset.emblem = emblem;
+  const shown = [...document.querySelectorAll(".emblem g")]
+    .find((one) => getComputedStyle(one).visibility === "visible");
+  const outline = document.querySelector(".shell.wall").getAttribute("d");
+  return [shown?.getAttribute("class") ?? "", outline.split("A").length - 1];
+}"""
+
 # How far the level is below the goal line, and how many steps are off the chart.
 LEVEL = """() => {
   const top = (name) => document.querySelector(name).getBoundingClientRect().top;
@@ -222,6 +231,23 @@ def test_the_frame_stays_when_a_hundred_points_are_lost(server: Server, visit: V
     assert found[0] == found[1]
     for usual, long in zip(sizes[:8], sizes[8:], strict=True):  # a total of four signs is smaller
         assert 0.75 < long / usual < 0.96
+
+
+def test_upright_a_step_that_is_not_answered_leaves_the_thermometer_its_bulb(
+    server: Server, visit: Visit
+) -> None:
+    (walk,) = make_walks(server, {"valence": "binary", "screen": {"screen_text": "largest"}})
+    page = visit(walk.path, walk, reduced_motion="reduce")
+    with feet_of(server, walk) as feet:
+        page.click("[data-change=start]")
+        page.wait_for_selector("body[data-look=begin]")
+        feet.walk(1.1)
+        page.wait_for_selector("body[data-step='1']")
+        seen = []
+        for screen in ("tablet-portrait", "tablet-landscape"):
+            set_screen(page, screen)
+            seen += [page.evaluate(BULB, emblem) for emblem in ("gain", "")]
+    assert seen == [["gain", 1], ["neutral", 1], ["gain", 2], ["", 2]]
 
 
 def test_a_near_miss_is_seen_to_miss_and_a_step_off_the_chart_to_be_off(

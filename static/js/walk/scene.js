@@ -62,7 +62,7 @@ export function createScene(svg) {
     for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
     find(".glass").setAttribute("transform", `translate(${x} 0)`);
     place(".hatched", 0, top, { height: zero - top });
-    place(".bulb", 0, bottom);
+    place(".bulb", 0, bottom, { r: bulbRadius });
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", turn * (r + 14), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
