@@ -55,7 +55,7 @@ ONWARD = join(
     gettext_noop("Keep going."),
     gettext_noop("Next step."),
     gettext_noop("On we go."),
-    gettext_noop("A step more."),
+    gettext_noop("Keep on."),
     gettext_noop("Walk on."),
     gettext_noop("Next one."),
     gettext_noop("Just go on."),
@@ -75,7 +75,7 @@ NEAR = join(
     gettext_noop("Near goal."),
     gettext_noop("So close."),
     gettext_noop("A bit more."),
-    gettext_noop("A bit short."),
+    gettext_noop("Close now."),
     gettext_noop("So near."),
 )
 
@@ -99,7 +99,7 @@ STRONG = join(
     gettext_noop("Great one!"),
     gettext_noop("Very good!"),
     gettext_noop("Strong step!"),
-    gettext_noop("Past goal!"),
+    gettext_noop("Super one!"),
     gettext_noop("Nice going!"),
     gettext_noop("Strong one!"),
     gettext_noop("Great going!"),
@@ -110,16 +110,16 @@ STRONG = join(
 )
 
 STRONGEST = join(
-    gettext_noop("Top step!"),
+    gettext_noop("Truly good!"),
     gettext_noop("Bravo!"),
-    gettext_noop("Big step!"),
+    gettext_noop("First rate!"),
     gettext_noop("Wow!"),
     gettext_noop("Bold step!"),
-    gettext_noop("Just great!"),
+    gettext_noop("So great!"),
     gettext_noop("Far above!"),
     gettext_noop("Great stride!"),
     gettext_noop("Well above!"),
-    gettext_noop("Way over!"),
+    gettext_noop("World class!"),
     gettext_noop("Far over!"),
     gettext_noop("Super step!"),
 )
@@ -128,15 +128,15 @@ FAR_BELOW = join(
     gettext_noop("Far below."),
     gettext_noop("Not near."),
     gettext_noop("Far under."),
-    gettext_noop("Way off."),
+    gettext_noop("Quite far."),
     gettext_noop("Far off."),
-    gettext_noop("A long way."),
+    gettext_noop("Far away."),
     gettext_noop("Way below."),
     gettext_noop("Goal is far."),
     gettext_noop("Big gap."),
     gettext_noop("Far short."),
     gettext_noop("Still far."),
-    gettext_noop("A way to go."),
+    gettext_noop("Far to go."),
 )
 
 BELOW = join(
@@ -144,13 +144,13 @@ BELOW = join(
     gettext_noop("Under goal."),
     gettext_noop("Just below."),
     gettext_noop("Bit short."),
-    gettext_noop("Just off."),
+    gettext_noop("Just shy."),
     gettext_noop("A bit under."),
     gettext_noop("Just short."),
     gettext_noop("Just under."),
     gettext_noop("A bit below."),
     gettext_noop("Not quite."),
-    gettext_noop("A bit off."),
+    gettext_noop("Short of it."),
     gettext_noop("Still under."),
 )
 
@@ -163,7 +163,7 @@ NOTHING_LOST = join(
     gettext_noop("No loss."),
     gettext_noop("Points stay."),
     gettext_noop("Points safe."),
-    gettext_noop("All safe."),
+    gettext_noop("None taken."),
     gettext_noop("Same score."),
     gettext_noop("Score kept."),
     gettext_noop("Same total."),
