@@ -65,11 +65,14 @@ def test_our_files_are_served_without_comments(name, settings):
 def test_a_hosted_server_gets_them_minified_too(tmp_path, name):
     storage = MinifiedStorage(location=tmp_path)
     written = Path(finders.find(name)).read_bytes()
+    names = set()
     for _ in range(2):  # gathered again, by the next release
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_bytes(written)
+        if not (tmp_path / name).exists():  # as Django does, where nothing is newer
+            (tmp_path / name).write_bytes(written)
         assert all(done for *_, done in storage.post_process({name: (None, name)}))
-    hashed = tmp_path / storage.stored_name(name)
+        names.add(storage.stored_name(name))
+    (hashed,) = (tmp_path / one for one in names)
     assert hashed.name != Path(name).name
     assert hashed.read_bytes() == minify(name, written)
     assert (minify(name, written) == written) == name.startswith("admin/")

@@ -19,7 +19,7 @@ from rjsmin import jsmin
 from whitenoise.storage import CompressedManifestStaticFilesStorage
 
 # No minifier: those for Python take the space out of "&:has(a) :is(b)", which is another selector.
-CSS_COMMENTS_AND_INDENTS = re.compile(rb"/\*.*?\*/|^\s+", re.DOTALL | re.MULTILINE)
+CSS_COMMENTS_AND_INDENTS = re.compile(rb"^(?:\s|/\*.*?\*/)+|/\*.*?\*/", re.DOTALL | re.MULTILINE)
 
 
 def minify(name: str, content: bytes) -> bytes:

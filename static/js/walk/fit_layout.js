@@ -26,7 +26,7 @@ const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
 const SCALE_LEAST = 240; // of the thermometer
-const BESIDE_WORDS = 300; // the same in the middle or a half, whose units are smaller
+const BESIDE_WORDS = 300; // the same across in the middle or a half, whose units are smaller
 const UNDER_PAUSE = 48; // the glass, from the words' top
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
 const [SPARKS, CAP] = [76, 52]; // above the scale, where words stand over it
@@ -35,7 +35,7 @@ const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where 
 const [SIGN_IN_PART, SIGN_UPRIGHT] = [1.25, 1.15]; // larger, where units are smaller or room is
 const THICK_IN_PART = 1.16; // the thermometer
 const [UNDER_BADGE, UNDER_BADGE_IN_PART] = [254, 298]; // the scale, from that badge's top
-const [HALF, HALF_BADGE, BEFORE_SIGN] = [94, 118, 250]; // from the thermometer's axis to the screen's edge
+const [HALF, HALF_BADGE, BEFORE_SIGN] = [94, 118, 250]; // from the thermometer's axis to the page's margin
 const BESIDE_MIDDLE = 265; // the same to the middle, where words and total are beside it
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
@@ -139,7 +139,11 @@ export function createFitting(body, scene) {
     const stand = isBelow ? bottom - total - AIR : bottom;
     const zero = stand - (isBadgeBulb ? BADGE_FOOT : FOOT);
     const underBadge = main.offsetTop / u + (isInPart ? UNDER_BADGE_IN_PART : UNDER_BADGE);
-    const head = isOver ? underBadge : isUpright ? sky + (isBelow ? CAP : SPARKS) : SCALE_TOP;
+    const head = isOver
+      ? underBadge
+      : isUpright
+        ? sky + (isBelow ? CAP : SPARKS)
+        : Math.max(SCALE_TOP, isInPart ? main.offsetTop / u + 12 : 0);
     const top = Math.max(head, (3 * (sky + reach) - zero) / 2);
     const goal = zero - (2 / 3) * (zero - top);
     const badge = !hasBadge || isOneSided || isBelow ? 0 : level < CHART ? BESIDE_CHART : BADGE_LEAST;
