@@ -129,7 +129,7 @@ async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place,
         assert (await monitor.change(kind, value))["type"] == "done"
     await source.walk(4.0)
     before, after = await tablet.until_step(1), await tablet.until_step(2)
-    assert (before["words"], before["chart"]) == ("Top step!", "points")
+    assert (before["words"], before["chart"]) == ("Truly good!", "points")
     assert (after["words"], after["chart"], after["emblem"], after["score"]) == (
         "",
         "line",
