@@ -118,7 +118,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(tablet.locator("body")).to_have_attribute("data-theme", "binary")
         feet.walk(1.3)
         at_step(tablet, 14)
-        expect(words).to_have_text("Top step!")
+        expect(words).to_have_text("Truly good!")
         types = "Positive, changed to Negative, Binary"
         expect(monitor.locator("[data-show=types]")).to_have_text(types)
 
