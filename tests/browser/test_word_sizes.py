@@ -21,7 +21,6 @@ from tests.support.word_sizes import MEASURE, NEVER_STILL, SIDES, look
 
 pytestmark = pytest.mark.browser
 
-HALVES = ("in_right", "in_left")
 FACTORS = {"normal": 1.0, "large": 1.4, "largest": 1.8}
 # On a wide screen that nobody measured there is room for more.
 WIDE = {"normal": 1.45, "large": 1.6, "largest": 1.8}
