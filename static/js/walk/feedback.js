@@ -11,7 +11,7 @@ const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };
 
 const rosette = Array.from({ length: 240 }, (_, i) => {
   const angle = (Math.PI * i) / 120;
-  const radius = 137 + 10 * Math.cos(12 * angle);
+  const radius = 134 + 10 * Math.cos(12 * angle);
   return `${(150 + radius * Math.cos(angle)).toFixed(1)} ${(150 + radius * Math.sin(angle)).toFixed(1)}`;
 }).join("L");
 

@@ -29,14 +29,14 @@ const SCALE_LEAST = 240; // of the thermometer
 const BESIDE_WORDS = 300; // the same across in the middle or a half, whose units are smaller
 const UNDER_PAUSE = 48; // the glass, from the words' top
 const SCALE_TOP = 150; // from the screen's top, where words stand beside it
-const [SPARKS, CAP] = [76, 52]; // above the scale, where words stand over it
+const [SPARKS, CAP] = [76, 68]; // above the scale, where words stand over it
 const [FOOT, BADGE_FOOT] = [172, 216]; // below the scale: the bulb, or the badge in its place
 const SIGN_BESIDE = [54, 28]; // more than AIR, above and below the goal, where its sign is there
 const [SIGN_IN_PART, SIGN_UPRIGHT] = [1.25, 1.15]; // larger, where units are smaller or room is
 const THICK_IN_PART = 1.16; // the thermometer
 const [UNDER_BADGE, UNDER_BADGE_IN_PART] = [254, 298]; // the scale, from that badge's top
 const [HALF, HALF_BADGE, BEFORE_SIGN] = [94, 118, 250]; // from the thermometer's axis to the page's margin
-const BESIDE_MIDDLE = 265; // the same to the middle, where words and total are beside it
+const BESIDE_MIDDLE = 249; // the same to the middle, where words and total are beside it
 
 // Return the pixels of one degree on a screen of so many pixels a millimeter, seen from so far.
 export const pixelsOfDegree = (pxPerMm, distance_m) => 2 * distance_m * 1000 * Math.tan(Math.PI / 360) * pxPerMm;
@@ -117,13 +117,13 @@ export function createFitting(body, scene) {
     const isInPart = !isUpright && column; // of the screen, with smaller units
     const isMiddle = !isUpright && column === "center";
     const isLargest = text === "largest";
-    const isOneSided = !isUpright && (column || isLargest);
-    const isBelow = isUpright && (column || isLargest); // the total, below the thermometer
+    const isColumn = column || isLargest; // all that counts
+    const isOneSided = !isUpright && isColumn;
+    const isBelow = isUpright && isColumn; // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
     const isOnTwoLines = isMiddle ? level < LAST : isLargest && (!column || column === "center");
     if (isOnTwoLines) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    const isBeside = isOneSided || column === "center";
-    const sign = isBeside ? "beside" : isUpright ? "before" : "behind"; // the goal's (scene.js)
+    const sign = isColumn ? "beside" : isUpright ? "before" : "behind"; // the goal's (scene.js)
     const thick = isInPart ? THICK_IN_PART : 1;
     const signSize = isInPart ? SIGN_IN_PART : isBelow ? SIGN_UPRIGHT : 1;
     const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
@@ -137,7 +137,7 @@ export function createFitting(body, scene) {
     const isOver = hasBadge && isOneSided; // the badge, over the thermometer
     const isBadgeBulb = !isExplicit && isBelow; // the badge is the thermometer's bulb
     const stand = isBelow ? bottom - total - AIR : bottom;
-    const zero = stand - (isBadgeBulb ? BADGE_FOOT : FOOT);
+    const zero = stand - (isBadgeBulb ? BADGE_FOOT : FOOT * thick);
     const underBadge = main.offsetTop / u + (isInPart ? UNDER_BADGE_IN_PART : UNDER_BADGE);
     const head = isOver
       ? underBadge
@@ -151,7 +151,7 @@ export function createFitting(body, scene) {
     const beside = isBelow || isAbove ? 0 : total;
     const ground = goal + under + (isUpright ? badge + beside : Math.max(badge, beside));
     if (zero - top < (isInPart ? BESIDE_WORDS : SCALE_LEAST) || ground > stand) return null;
-    const atEdge = width - EDGE - (isBelow ? HALF_BADGE : isOneSided || isUpright ? HALF : BEFORE_SIGN);
+    const atEdge = width - EDGE - (isBadgeBulb ? HALF_BADGE : isOneSided || isUpright ? HALF : BEFORE_SIGN);
     const axis = column === "center" ? width / 2 + (isUpright ? 0 : BESIDE_MIDDLE) : atEdge;
     const above = isAbove ? high / u : goal + under - main.offsetTop / u;
     const full = isOneSided && isExplicit ? Math.min(top, main.offsetTop / u + UNDER_PAUSE) : top; // the glass goes on
@@ -160,6 +160,7 @@ export function createFitting(body, scene) {
       height,
       sign,
       signSize,
+      tip: isUpright ? 1 : -1, // across from the sign, or in its place
       isBadgeBulb,
       stand,
       axis,

@@ -45,6 +45,7 @@ export function createScene(svg) {
       reach,
       sign,
       signSize,
+      tip,
       isFlipped,
       axis: x,
       isBadgeBulb,
@@ -53,7 +54,7 @@ export function createScene(svg) {
     } = frame;
     const { path, rise, turn } = SIGNS[sign];
     const [r, bulbRadius] = [TUBE_RADIUS * thick, BULB_RADIUS * thick];
-    const [top, bottom] = [full - 36, stand - (isBadgeBulb ? BADGE_HIGH : BULB_HIGH)];
+    const [top, bottom] = [full - 36, stand - (isBadgeBulb ? BADGE_HIGH : BULB_HIGH * thick)];
     const join = bottom - Math.sqrt(bulbRadius ** 2 - r ** 2);
     const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
     const bulb = isBadgeBulb ? `V${bottom}H${-r}Z` : `A${bulbRadius} ${bulbRadius} 0 1 1 ${-r} ${join}Z`;
@@ -66,6 +67,7 @@ export function createScene(svg) {
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", turn * (r + 14), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
+    place(".tip", tip * (r + 14), goal, {}, ` scale(${tip * signSize} ${signSize})`);
     find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
     find(".pennant text").setAttribute("transform", isTurned ? "translate(182 0) scale(-1 1)" : "");

@@ -103,8 +103,7 @@ let widestGoal = 8.88; // so far: where one step names none, the words' place st
 export function samplesOf(session) {
   const goal = session?.last?.goal;
   if (typeof goal === "number") widestGoal = Math.max(widestGoal, Number(goal.toFixed(2).replace(/\d/g, "8")));
-  const phrases = [NOT_MEASURED];
-  if (session?.words_shown !== false) phrases.push(phraseOf({ goal: widestGoal }), ...(session?.longest ?? []));
+  const phrases = [NOT_MEASURED, phraseOf({ goal: widestGoal }), ...(session?.longest ?? [])];
   return { phrases, number: session?.has_points === false ? number(6.66, 2) : "666" };
 }
 
