@@ -77,7 +77,7 @@ FRAMES = f"""async ([texts, column]) => {{
     for (const other of [sign, words, digits].filter((one) => badge && one))
       if (badge[0] < other[2] && other[0] < badge[2] && badge[1] < other[3] && other[1] < badge[3])
         wrong.push(`${{column}} ${{text}}: the badge at ${{badge}} is over ${{other}}`);
-    if (sign && (sign[0] < 0 || sign[2] > innerWidth))
+    if ([sign, box(".tip")].some((one) => one && (one[0] < 0 || one[2] > innerWidth)))
       wrong.push(`${{column}} ${{text}}: the goal's sign leaves the screen`);
   }}
   return [frames, wrong];

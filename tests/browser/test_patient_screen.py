@@ -74,7 +74,10 @@ def test_the_thermometer_stands_where_the_patient_looks(
         with page_of(browser, server, walk, size) as page, feet_of(server, walk) as feet:
             feet.walk(0.9, 1.1)
             until_step(page, 2)
-            parts = (".thermometer .wall", ".key", ".words", ".phrase", ".pennant text", ".emblem")
+            parts = (
+                *(".thermometer .wall", ".key", ".words", ".phrase", ".emblem"),
+                *(".pennant text", ".tip"),
+            )
             at[side] = {part: page.evaluate(MIDDLE, part) for part in parts}
             wide[side] = page.evaluate(
                 "() => document.querySelector('.thermometer').getBoundingClientRect().width"
@@ -88,6 +91,7 @@ def test_the_thermometer_stands_where_the_patient_looks(
     thermometer, total, badge = (center[one] for one in (parts[0], ".key", ".emblem"))
     if size == "tablet-portrait":  # all on the midline
         assert [center[".phrase"], thermometer, total, badge] == pytest.approx(4 * [0.5], abs=0.02)
+        assert center[".tip"] > thermometer
     else:  # words and total on one side of it, thermometer and badge on the other
         assert 0.3 < center[".phrase"] < 0.5 < thermometer < 0.7
         assert 0.3 < total < thermometer
@@ -98,7 +102,7 @@ def test_the_thermometer_stands_where_the_patient_looks(
 def test_across_the_largest_words_name_the_goal_on_its_line(
     browser: Browser, server: Server
 ) -> None:
-    """Where they do not, its sign does. The frame stays; what follows is in its own place."""
+    """Its tip is there, else its sign. The frame stays; what follows is in its own place."""
     (walk,) = make_walks(server, {"valence": "explicit", "screen": {"screen_text": "largest"}})
     sign, frames = {}, []
     screen = page_of(browser, server, walk, "tablet-landscape")
@@ -107,15 +111,15 @@ def test_across_the_largest_words_name_the_goal_on_its_line(
             feet.walk(performance)
             until_step(page, feet.number)
             words = page.locator(".words").inner_text().split()[0]
-            sign[words] = page.locator(".pennant").is_visible()
+            sign[words] = [page.locator(one).is_visible() for one in (".pennant", ".tip")]
             frames.append([page.evaluate(BOX, part) for part in (".wall", ".goal")])
         near = page.evaluate(BOX, ".goal")[1] - page.evaluate(BOX, ".words")[3]
         page.click(".pause")
         page.wait_for_selector("body[data-look=paused]")
         down = page.evaluate("() => getComputedStyle(document.querySelector('.phrase')).translate")
-    assert 0 <= near < 40
+    assert 40 < near < 60  # clear of the tip
     assert down == "none"
-    assert sign == {"Goal:": False, "Not": True}
+    assert sign == {"Goal:": [False, True], "Not": [True, False]}
     assert frames == [frames[0]] * 3
 
 

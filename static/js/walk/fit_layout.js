@@ -25,6 +25,7 @@ const AIR = 24; // between words and goal line, goal line and badge
 const CHART_REACH = 96; // of the strides above and below the goal line
 const BADGE_LEAST = 160;
 const BESIDE_CHART = 240; // the least badge: sooner the chart goes
+const ABOVE_TIP = 48; // of the goal, words that name it
 const SCALE_LEAST = 240; // of the thermometer
 const BESIDE_WORDS = 300; // the same across in the middle or a half, whose units are smaller
 const UNDER_PAUSE = 48; // the glass, from the words' top
@@ -117,13 +118,13 @@ export function createFitting(body, scene) {
     const isInPart = !isUpright && column; // of the screen, with smaller units
     const isMiddle = !isUpright && column === "center";
     const isLargest = text === "largest";
-    const isColumn = column || isLargest; // all that counts
-    const isOneSided = !isUpright && isColumn;
-    const isBelow = isUpright && isColumn; // the total, below the thermometer
+    const isStacked = column || isLargest; // words, total and thermometer, in one column
+    const isOneSided = !isUpright && isStacked;
+    const isBelow = isUpright && isStacked; // the total, below the thermometer
     const isAbove = level < LAST && isUpright && isExplicit && !isBelow; // the value, below the words
     const isOnTwoLines = isMiddle ? level < LAST : isLargest && (!column || column === "center");
     if (isOnTwoLines) high = Math.max(high, TWO * parseFloat(getComputedStyle(words).lineHeight));
-    const sign = isColumn ? "beside" : isUpright ? "before" : "behind"; // the goal's (scene.js)
+    const sign = isStacked ? "beside" : isUpright ? "before" : "behind"; // the goal's (scene.js)
     const thick = isInPart ? THICK_IN_PART : 1;
     const signSize = isInPart ? SIGN_IN_PART : isBelow ? SIGN_UPRIGHT : 1;
     const reaching = isOneSided ? signSize : 0; // of the sign, to words and total
@@ -160,7 +161,7 @@ export function createFitting(body, scene) {
       height,
       sign,
       signSize,
-      tip: isUpright ? 1 : -1, // across from the sign, or in its place
+      tipTurn: isUpright ? 1 : -1, // opposite the sign, or in its place
       isBadgeBulb,
       stand,
       axis,
@@ -213,7 +214,7 @@ export function createFitting(body, scene) {
     if (level === LAST) return;
     main.style.setProperty("--above", `${found.above * unit()}px`);
     main.style.setProperty("--below", `${found.below * unit()}px`);
-    main.style.setProperty("--words-down", `${(found.goal - AIR) * unit() - main.offsetTop - found.high}px`);
+    main.style.setProperty("--words-down", `${(found.goal - ABOVE_TIP) * unit() - main.offsetTop - found.high}px`);
     narrow(found.high);
     scene.layOut({ ...found, isFlipped: body.dataset.side === "left" });
   }

@@ -12,6 +12,7 @@ const [BULB_HIGH, BADGE_HIGH] = [94, 104]; // its middle, above the thermometer'
 const [CLEAR, CLEAR_IN_CHART] = [44, 26];
 const TICKS = [0.25, 0.5, 0.75, 1.25];
 // The goal's sign: it points at the line, behind or before the thermometer, or stands on the horizon before it.
+// Its tip alone is where words name the goal, or opposite the sign (layouts.css).
 const AT_LINE = "M0 0l20 -40h148v80h-148z";
 const ON_LINE = "M0 40l20 -80h148v80z";
 const SIGN_WIDE = 184; // with air
@@ -45,7 +46,7 @@ export function createScene(svg) {
       reach,
       sign,
       signSize,
-      tip,
+      tipTurn,
       isFlipped,
       axis: x,
       isBadgeBulb,
@@ -67,7 +68,7 @@ export function createScene(svg) {
     place(".cut", 0, zero - 14);
     place(".foot", 0, bottom, {}, `${isFlipped ? " scale(-1 1)" : ""} rotate(14) scale(1.08)`);
     place(".pennant", turn * (r + 14), goal - rise * signSize, {}, ` scale(${turn * signSize} ${signSize})`);
-    place(".tip", tip * (r + 14), goal, {}, ` scale(${tip * signSize} ${signSize})`);
+    place(".tip", tipTurn * (r + 14), goal, {}, ` scale(${tipTurn * signSize} ${signSize})`);
     find(".pennant path").setAttribute("d", path);
     const isTurned = isFlipped === turn > 0; // by the sign or by the scene, not by both
     find(".pennant text").setAttribute("transform", isTurned ? "translate(182 0) scale(-1 1)" : "");
