@@ -342,7 +342,7 @@ def build_world(name: str) -> World:
             clinic=clinic, name=mark(name, Questionnaire), items="Zqtiredqz | zq | zq | 5"
         ),
         ClinicTest.everywhere.create(
-            clinic=clinic, code="zqform", name=mark(name, ClinicTest), items="Zqbendsqz | 0 | 2"
+            clinic=clinic, code="zqformqz", name=mark(name, ClinicTest), items="Zqbendsqz | 0 | 2"
         ),
         QuestionnaireResponse.everywhere.create(
             session=session,
