@@ -52,7 +52,7 @@ LOOKS = 8  # ways that it tries; three are enough in nine of ten (the same place
 # is small. (Ours.)
 FARTHEST_M = 1.7
 # What does not see its tag turns by so much [rad], and looks: a circle, and one halfway between.
-# (Ours: of 300 places with a tag, simulated, 5 % saw it in less than 30°; tests/support/tag_room.py)
+# (Ours: of 300 places that see one, simulated, 5 % do in less than 30°; tests/support/tag_room.py)
 SEARCH_RAD = math.radians(30.0)
 LOOKS_AROUND = 12
 # By its tag and by its wheels it has come equally far and turned equally much, but for this much
