@@ -113,7 +113,8 @@ class Site:
         self.actors += [Actor("host", host, None, "host"), Actor("stranger", None)]
         self.routes: dict[str, list[Route]] = {}
         for route in dict.fromkeys(all_routes(self.worlds)):
-            if not route.url.startswith("/api/"):
+            # Whether it is ready is answered with 503 here, where nothing serves sessions.
+            if not route.url.startswith("/api/") and route.name != "readyz":
                 self.routes.setdefault(route.name, []).append(route)
         self._cookies = {actor.label: self._sign_in(actor) for actor in self.actors}
         self._forms: dict[tuple[str, str], dict[str, str]] = {}
