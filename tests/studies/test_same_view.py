@@ -136,6 +136,7 @@ def find_differences(trial: Trial, actors: dict[str, Client], urls: Sequence[str
     found: Found = {}
     for (name, _, url), answer in before.items():
         if after[name, _, url] != answer:
+            print(name, url, answer, after[name, _, url], sep="\n")
             found.setdefault(name, set()).add(url)
     return found
 

@@ -111,7 +111,10 @@ def find_differences(
     _changing, before, after = looks
     assert before.keys() == after.keys()
     assert {name for name, *_ in before} == {*AS_ACCOUNT, *TABLETS, *PHONES, FAMILY, STALE}
-    return {key for key, said in before.items() if after[key] != said}
+    found = {key for key, said in before.items() if after[key] != said}
+    for key in found:
+        print(*key, before[key], after[key], sep="\n")
+    return found
 
 
 @pytest.mark.long

@@ -101,7 +101,8 @@ def walk_visit(
     session = start_session(enrollment, Place(station=station), None, NOW)
     aggregate = SessionAggregate(session)
     store(aggregate, aggregate.change(Change(ChangeKind.START), None, NOW))
-    more = ARMS.index(session.valence) / 10 + enrollment.pk % 5 / 50  # than who walks the other arm
+    # More than who walks the other arm, by more than values differ: other steps reach the goal.
+    more = ARMS.index(session.valence) / 5 + enrollment.pk % 5 / 50
     for phase in range(3):
         for number in range(60 * phase + 1, 60 * phase + 61):
             value = 1.0 + number % 5 / 10 + (more if phase else 0)
