@@ -54,7 +54,7 @@ FARTHEST_M = 1.7
 # What does not see its tag turns by so much [rad], and looks: a circle, and one halfway between.
 # (Ours: of 300 places that see one, simulated, 5 % do in less than 30°; tests/support/tag_room.py)
 SEARCH_RAD = math.radians(30.0)
-LOOKS_AROUND = 12
+LOOKS_AROUND = round(math.tau / SEARCH_RAD)
 # By its tag and by its wheels it has come equally far and turned equally much, but for this much
 # [m, and m for each m of way, and of distance to the tag; rad]. More is a tag that was moved or is
 # not of its size, or a wheel that slipped. (Ours: twice the largest that was measured with a right
