@@ -17,6 +17,7 @@ from rehab.people.models import Patient, User
 from rehab.people.simulated import counted
 from rehab.sessions.formatting import clinic_time, format_day, format_number
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.day.today import IS_OPEN, begun_today
 
 LOOKED_BACK = timedelta(weeks=26)
 COMING = timedelta(weeks=4)
@@ -69,7 +70,7 @@ class Case:
 
     ``walks``: the newest sessions, the newest first; ``recent``: how many of the last four weeks;
     ``missed``: the last planned day whose visit is past, if the patient has not walked since;
-    ``may_come``: it is today, and the patient only late.
+    ``may_come``: it is today, and the patient only late; ``is_here``: a session of today is open.
     """
 
     patient: Patient
@@ -79,6 +80,7 @@ class Case:
     missed: date | None
     flags: tuple[Flag, ...]
     may_come: bool = False
+    is_here: bool = False
 
     @property
     def needs_visit(self) -> bool:
@@ -175,7 +177,12 @@ def load_caseload(user: User, now: datetime) -> list[Case]:
     planned = Visit.objects.visible_to(user).filter(day__gte=today - COMING)
     for visit in planned.order_by("day", "at"):
         visits[visit.patient_id].append(visit)
-    cases = [_to_case(each, walks[each.pk], visits[each.pk], now) for each in patients]
+    opened = TrainingSession.objects.visible_to(user).filter(IS_OPEN, begun_today(now))
+    here = set(opened.values_list("patient", flat=True))
+    cases = [
+        _to_case(each, walks[each.pk], visits[each.pk], now, is_here=each.pk in here)
+        for each in patients
+    ]
     return sorted(
         cases,
         key=lambda case: (
@@ -195,10 +202,15 @@ def _time_today(case: Case, today: date) -> time:
 
 
 def _to_case(
-    patient: Patient, walks: Sequence[Walk], visits: Sequence[Visit], now: datetime
+    patient: Patient,
+    walks: Sequence[Walk],
+    visits: Sequence[Visit],
+    now: datetime,
+    *,
+    is_here: bool,
 ) -> Case:
     today = now.date()
-    last = walks[0].day if walks else date.min
+    last = today if is_here else walks[0].day if walks else date.min
     gone = [v for v in visits if v.day == today and is_late(v.at, now, by=MISSED_AFTER)]
     coming = next((v for v in visits if v.day >= today and v.day > last and v not in gone), None)
     past = [v.day for v in visits if v.day < today or (v.day == today and is_late(v.at, now))]
@@ -209,6 +221,7 @@ def _to_case(
         sum(walk.day > today - COMING for walk in walks),
         coming,
         missed,
-        judge(walks, coming.day if coming else None, missed, today),
+        judge(walks, today if is_here else coming.day if coming else None, missed, today),
         not gone,
+        is_here,
     )

@@ -275,7 +275,7 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
             0
         )  # one way to her
         expect(patient.locator(".words")).to_have_text("Stay where you are.")
-        expect(patient.locator(".sub")).to_have_text("The team has been alerted.")
+        expect(patient.locator(".sub")).to_have_text("The team was called.")
         picture(second, "fall-on-the-second-screen")
         picture(start, "fall-on-the-start-page")
         picture(patient, "fall-on-the-patients-page")

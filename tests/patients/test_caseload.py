@@ -12,7 +12,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from tests.support.walks import HIT, walk
+from tests.support.walks import HIT, make_session, walk
 from tests.support.world import NOW, build_world, client_of
 
 TODAY = date(2026, 11, 21)
@@ -99,12 +99,16 @@ def test_who_is_late_today_is_overdue_and_comes_by_time(world):
     now = clinic_time(NOW, world.clinic)
     for name, minutes in (("Bo", -185), ("Ana", -30), ("Cleo", -5), ("Dora", 30)):
         plan_visit(world.add_patient(name), now.date(), (now + timedelta(minutes=minutes)).time())
-    cases = load_caseload(world.people[Role.PT], now)
+    user = world.people[Role.PT]
+    cases = load_caseload(user, now)
     come = [(case.patient.nickname, "due" in case.flags) for case in cases if case.next_visit]
     assert come == [("Ana", True), ("Cleo", False), ("Dora", False)]
     to_plan = {case.patient.nickname for case in cases if case.needs_visit}
     assert {"Bo"} <= to_plan <= {"Bo", world.patient.nickname}  # who is late may yet come
     told = {case.patient.nickname: case.tell(now.date()) for case in cases}
+    make_session(Patient.everywhere.get(nickname="Ana"))  # she came, and is about to start
+    (ana,) = (one for one in load_caseload(user, now) if one.patient.nickname == "Ana")
+    assert (ana.is_here, ana.missed, list(ana.flags)) == (True, None, ["new"])
     assert (told["Bo"][0][2], told["Ana"][0][2]) == (
         "did not come today",
         "late today",

@@ -58,7 +58,7 @@ def test_today_stands_beside_last_time(world, patient):
     assert "You walked" in words
     assert "Today 7 of 10 Last time 4 of 10" in words
     assert "Last time 4 of 10 More often at the goal than last time." in words
-    assert "Longest row at the goal 5 steps in a row" in words
+    assert "Most at the goal 5 steps in a row" in words
     assert f"{day:%A} {day.day} {day:%B}, 14:15" in words
     assert "More often at the goal than last time." in words
 

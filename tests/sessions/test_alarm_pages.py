@@ -127,7 +127,7 @@ def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
     note(session, "fall_severity", value=1)
     listed = words(seen(client_of(world), "incidents"))
     where = re.escape(str(session.station or "–"))
-    told = rf"Iris fell. .*{NOW:%Y, %H:%M} {where} Slightly hurt – Nobody takes care of it yet"
+    told = rf"Iris fell. .*{NOW:%Y, %H:%M} {where} Slightly hurt – Nobody has answered yet"
     assert re.search(told, listed)
     note(session, "robot_stop", data={"reason": "bump"})
     note(session, "fall_acknowledged", by=by)
@@ -196,6 +196,19 @@ def test_what_was_only_simulated_is_listed_and_not_counted(world, session):
     listed = words(seen(client_of(world), "incidents"))
     assert "Falls 0" in listed
     assert "· simulated" in listed
+    assert "What was simulated is listed below, and not counted." in listed
+
+
+def test_falls_come_first_and_a_simulated_robot_alarms_no_other_page(world, session):
+    note(session, "fall")
+    other = walk(make_patient(world.clinic, "Tom", code="K-2"), "positive", [HIT])
+    note(other, "robot_stop", data={"reason": "bump"})
+    told = seen(client_of(world))
+    assert told.index("Iris fell, ") < told.index("The robot of Tom stopped by itself, ")
+    TrainingSession.everywhere.filter(pk__in=[session.pk, other.pk]).update(simulated=True)
+    told = seen(client_of(world))
+    assert "Iris fell, " in told
+    assert "Tom" not in told
 
 
 def test_a_withdrawn_fall_is_no_mark(world, session):

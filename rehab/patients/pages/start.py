@@ -19,6 +19,7 @@ from rehab.patients.pages.first_steps import list_first_steps
 from rehab.patients.screen_check import LETTERS, propose
 from rehab.patients.visits import QUICK_VISIT_DAYS, Progress, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import current_text, unasked_purposes
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
@@ -187,6 +188,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     if was_here:
         visits = visits.exclude(day=today)
     planned = {visit.day: visit for visit in visits}
+    not_asked = [] if patient.simulated else unasked_purposes(patient)
     context = lists | begin_context(user, patient)
     context |= {
         "patient": patient,
@@ -203,7 +205,8 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
             if days or row is None
         ],
         "at": suggested_time(user, patient, lists["now"]),
-        "not_asked": [] if patient.simulated else unasked_purposes(patient),
+        "not_asked": not_asked,
+        "asks_care": Purpose.CARE in not_asked,
     }
     return render(request, "patients/start.html", context)
 

@@ -118,7 +118,7 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to the session's own pages, and to the form that corrects it."""
-        links = [(reverse("session", args=[row.pk]), _("Session"))]
+        links = [(reverse("session", args=[row.pk]), _("Open the session"))]
         if not may_see_names(user_of(request).role):
             return links
         if State(row.state) in OPEN_STATES:
@@ -187,10 +187,10 @@ class TrainingSessionAdmin(ScopedAdmin):
         return date_format(clinic_time(session.began_at, session.clinic), "DATE_FORMAT")
 
     @admin.display(description=_("start time"), ordering="started_at")
-    def start_time(self, session: TrainingSession) -> str | None:
-        """The time of day when it was started."""
+    def start_time(self, session: TrainingSession) -> str:
+        """The time of day when it was started; "" before."""
         if session.started_at is None:
-            return None
+            return ""
         return f"{clinic_time(session.started_at, session.clinic):%H:%M}"
 
     @admin.display(description=_("duration"), ordering="active_s")
@@ -204,22 +204,22 @@ class TrainingSessionAdmin(ScopedAdmin):
         return session.valences_label
 
     @admin.display(description=_("goal"), ordering="goal")
-    def goal_value(self, session: TrainingSession) -> str | None:
-        """The goal with its unit."""
-        return None if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
+    def goal_value(self, session: TrainingSession) -> str:
+        """The goal with its unit; "" where it has none."""
+        return "" if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
 
     @admin.display(description=_("score"), ordering="metric_score")
-    def score(self, session: Any) -> str | None:
-        """The points; None for explicit feedback and sessions that have not ended."""
+    def score(self, session: Any) -> str:
+        """The points; "" for explicit feedback and sessions that have not ended."""
         if session.metric_score is None:
-            return None
+            return ""
         return gettext("%(score)s points") % {"score": format_number(session.metric_score, 0)}
 
     @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
-    def hit_rate(self, session: Any) -> str | None:
-        """The share of hits."""
+    def hit_rate(self, session: Any) -> str:
+        """The share of hits; "" before its end."""
         if session.metric_hit_rate is None:
-            return None
+            return ""
         return format_html(
             "<b>{}</b> {}",
             format_rate(session.metric_hit_rate),

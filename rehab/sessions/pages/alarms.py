@@ -12,8 +12,8 @@ from django.views.decorators.http import require_POST, require_safe
 
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.roles import Role
-from rehab.people.simulated import counted
-from rehab.sessions.alarms import falls_just_seen, open_alarms
+from rehab.people.simulated import counted, is_counted
+from rehab.sessions.alarms import Alarm, falls_just_seen, open_alarms
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.log import SessionEvent
@@ -34,22 +34,25 @@ LONGEST = "52"  # weeks
 def show_alarms(request: HttpRequest) -> HttpResponse:
     """Return what is open in the clinic, or at one station, as a part of a page.
 
+    Falls come first. A simulated session's robot is told of on that session's page alone.
     ``but``: of which open sessions the page itself tells: there, what others that ended left is
     folded up.
     """
     station = request.GET.get("station", "")
     user, now = user_of(request), timezone.now()
     found = open_alarms(user, now, int(station) if station.isdecimal() else None)
+    falls = [one for one in found if one.kind == Alarm.FALL]
+    stops = [one for one in found if one not in falls and is_counted(one.session.simulated)]
     but = request.GET.getlist("but")
     context: dict[str, list[tuple[SessionEvent, datetime]]] = {"alarms": [], "ended": []}
-    for one in found:
+    for one in falls + stops:
         is_own, is_open = str(one.session_id) in but, State(one.session.state) in OPEN_STATES
         if not (is_own and is_open):
             is_folded = bool(but) and not is_own and not is_open
             row = (one, clinic_time(one.at, one.session.clinic))
             context["ended" if is_folded else "alarms"].append(row)
     stopped: list[int] = []
-    if found:
+    if falls:
         robots = Device.objects.visible_to(user).filter(kind=Device.Kind.ROBOT)
         stopped = list(robots.filter(station__robot_stopped=True).values_list("station", flat=True))
     seen = falls_just_seen(user, now) if not but else []
@@ -92,5 +95,6 @@ def list_incidents(request: HttpRequest) -> HttpResponse:
         "weeks": weeks,
         "periods": PERIODS,
         "figures": count_adverse(entries),
+        "has_uncounted": any(one.is_one and not one.is_counted for one in entries),
     }
     return render(request, "sessions/incidents.html", context)

@@ -91,7 +91,7 @@ def _from_incident(user: User, incident: Incident) -> Entry:
     if not incident.was_one:
         then = gettext("it was not a fall")
     elif ended is None:
-        then = gettext("Nobody takes care of it yet") if is_fall else gettext("not seen yet")
+        then = gettext("Nobody has answered yet") if is_fall else gettext("not seen yet")
     else:
         time = format_duration(max((ended.at - raised.at).total_seconds(), 0.0))
         then = gettext("seen after %(time)s by %(who)s") % {"time": time, "who": ended.by or "–"}

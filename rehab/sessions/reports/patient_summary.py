@@ -137,7 +137,7 @@ def _find_facts(
     if rewards and row and row > 1:
         earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
         words = ngettext("%(count)s step in a row", "%(count)s steps in a row", round(row))
-        label = _("Longest so far") if earlier and row > earlier else _("Longest row at the goal")
+        label = _("Longest so far") if earlier and row > earlier else _("Most at the goal")
         facts.append((label, words % {"count": format_number(row, 0)}))
     count = before.count() + 1
     if is_milestone(count):

@@ -58,7 +58,7 @@ function describeFall(session, { robot, state }) {
     session.state === "paused" && _("Session paused"),
     robot.isHere && robot.isStopped && _("Robot stopped"),
   ];
-  return [fell, where || "", _("Nobody takes care of it yet"), ...facts.filter(Boolean)].join("\n");
+  return [fell, where || "", _("Nobody has answered yet"), ...facts.filter(Boolean)].join("\n");
 }
 
 // Whoever tapped by mistake takes the note back, and only that: going on, and letting the robot move, are taps of
@@ -183,7 +183,6 @@ export const CAUSES = [
   {
     cause: "robot_stop",
     hides: ["robot"],
-    isRed: true,
     describe: describeOwnStop,
     action: () => [_("I have seen it"), ({ remark }) => remark("stop_acknowledged")],
   },

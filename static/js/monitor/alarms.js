@@ -1,6 +1,6 @@
 // Shows what a therapist has to look at (alarm_causes.js): the cause behind the others first, with its button, and
-// a tone when it begins. It stays until it is gone; what needs to be acknowledged is red on each page until
-// somebody did.
+// a tone when it begins. It stays until it is gone; a fall, which is red on each page, and the robot's own stop until
+// somebody has acknowledged it.
 
 import { soundAlarm } from "garry/monitor/alarm_tone";
 import { findCauses } from "garry/monitor/alarm_causes";

@@ -48,7 +48,7 @@ export function messageFor(screen, session, name, { isAlone, silent_s }) {
     case "offline":
       return [fill(_("No connection for %(count)s s."), { count: silent_s }), KEEP_WALKING];
     case "fell":
-      return [_("Stay where you are."), session.fell ? _("The team has been alerted.") : _("Help is coming.")];
+      return [_("Stay where you are."), session.fell ? _("The team was called.") : _("Help is coming.")];
     case "ended":
       return [_("You have finished."), _("Next: your scores.")];
     case "closed":
