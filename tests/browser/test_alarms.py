@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 from websockets.sync.client import connect
 
-from tests.support.browsers import Visit, picture, signed_in
+from tests.support.browsers import SIZES, Visit, picture, signed_in
 from tests.support.servers import Server
 from tests.support.walk_seed import Feet, Walk, feet_of, hear, make_walks, robot_of
 
@@ -302,6 +302,35 @@ def test_a_fall_is_red_on_every_screen_until_it_is_seen_from_any_of_them(
     followed = re.compile(r"^Seen after [1-9]\d*\ss by walker\d+$")
     expect(listed.get_by_role("cell", name=followed)).to_have_count(1)
     picture(start, "incidents")
+
+
+FALLS = """
+from django.utils import timezone
+from rehab.sessions.log import SessionEvent
+for session in {}:
+    SessionEvent.everywhere.create(
+        session_id=session, kind="fall", after_number=0, at=timezone.now()
+    )
+"""
+
+
+def test_two_falls_are_whole_in_sight_each_with_its_place_and_button(
+    server: Server, visit: Visit
+) -> None:
+    walks = make_walks(server, {"name": "Olga"}, {"name": "Otto"})
+    server.run_shell(FALLS.format([walk.session for walk in walks]))
+    start = visit("/start/", walks[0])
+    told = [start.locator(".red", has_text=f"{name} fell, ") for name in ("Olga", "Otto")]
+    for width, height in (SIZES["phone"], SIZES["laptop"]):
+        start.set_viewport_size({"width": width, "height": height})
+        for one in told:
+            for part in (one.locator("b").first, one.get_by_text("Go to"), one.locator("button")):
+                expect(part).to_be_in_viewport(ratio=1)
+        expect(start.locator(".red ol:visible")).to_have_count(1)
+    picture(start, "two-falls")
+    for one in told:
+        one.get_by_role("button", name="I’m going there").click()
+        expect(one).to_have_count(0)
 
 
 def test_the_cause_comes_first_and_has_its_button(

@@ -105,6 +105,7 @@ LOOKED_AT = (
 VISITS = """
 from datetime import time, timedelta
 from django.utils import timezone
+from rehab.people.consent.services import offered_purposes, record_consent
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.gestures.models import ComposedGesture
 from rehab.people.models import Patient, User
@@ -120,6 +121,8 @@ from tests.support.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
 )
+for purpose in offered_purposes(rosa.clinic):
+    record_consent(rosa, purpose, None, timezone.now())
 wave = ComposedGesture.everywhere.create(clinic=first_clinic(), name="slow-wave")
 for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0, -0.12), (40, 0)]):
     wave.steps.create(position=position + 1, turn_deg=turn, forward_m=way)

@@ -26,7 +26,7 @@ from rehab.sessions.setup.protocol_models import MeasureDefinition, Protocol, Pr
 from rehab.stations.models import Device, Station
 from rehab.stations.tokens import find_device
 from tests.support.admin_actions import act
-from tests.support.walks import make_patient, strides, walk
+from tests.support.walks import make_patient, make_session, strides, walk
 from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -103,6 +103,13 @@ def test_the_last_weeks_are_listed(world, walked):
     assert found(client, walked, weeks="") == found(client, walked, weeks="x") == set(walked)
     assert found(client, walked, weeks="12") == {"strong", "lost", "told"}
     assert found(client, walked, weeks="52") == set(walked)
+
+
+def test_a_session_without_figures_says_none_of_them(world, walked):
+    ready = make_session(patient_of(world, "Ada"))
+    page = client_of(world).get(f"{SESSIONS}{ready.pk}/change/").content.decode()
+    assert "Hit rate" in page
+    assert "None" not in page
 
 
 def test_days_are_the_clinics_own(world, walked):

@@ -88,6 +88,7 @@ def start_context(user: User, query: str = "") -> dict[str, Any]:
         "more": len(shown) > MAX_PATIENTS,
         "open": [one for one in open_sessions(user) if one.patient_id not in fallen],
         "fallen": fallen,
+        "stopped": {one.session_id for one in alarms if one.kind == Alarm.ROBOT_STOP},
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from django.contrib import admin
 from django.db.models import QuerySet
-from django.http import HttpRequest
+from django.http import HttpRequest, HttpResponse
 from django.urls import reverse
 from django.utils.formats import date_format
 from django.utils.html import format_html, format_html_join
@@ -127,6 +127,17 @@ class TrainingSessionAdmin(ScopedAdmin):
             links.append((reverse("correct", args=[row.pk]), _("Correct")))
         return links
 
+    def render_change_form(
+        self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
+    ) -> HttpResponse:
+        """Show the session, by whom it was walked and when."""
+        session = context["original"]
+        is_named = may_see_names(user_of(request).role)
+        who = session.patient.nickname if is_named else session.patient.pseudonym
+        when = filter(None, (self.date(session), self.start_time(session)))
+        context |= {"title": ", ".join((who, *when)), "subtitle": None}
+        return super().render_change_form(request, context, *args, **kwargs)
+
     def _for(self, request: HttpRequest, names: tuple[str, ...]) -> tuple[str, ...]:
         if may_see_names(user_of(request).role):
             return names
@@ -152,7 +163,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         unusual = (
             format_state(session.state),
             gettext("simulated") if session.simulated else "",
-            gettext("left out") if session.excluded else "",
+            gettext("left out of figures") if session.excluded else "",
         )
         return format_html(
             '{} <br><span class="muted s">{}</span>{}',
@@ -195,8 +206,8 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     @admin.display(description=_("duration"), ordering="active_s")
     def duration(self, session: TrainingSession) -> str:
-        """The walked time."""
-        return format_duration(session.active_s)
+        """The walked time; "" where nobody walked yet."""
+        return format_duration(session.active_s) if session.active_s else ""
 
     @admin.display(description=_("feedback type"), ordering="valence")
     def types(self, session: TrainingSession) -> str:

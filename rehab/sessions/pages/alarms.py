@@ -41,23 +41,23 @@ def show_alarms(request: HttpRequest) -> HttpResponse:
     station = request.GET.get("station", "")
     user, now = user_of(request), timezone.now()
     found = open_alarms(user, now, int(station) if station.isdecimal() else None)
-    falls = [one for one in found if one.kind == Alarm.FALL]
-    stops = [one for one in found if one not in falls and is_counted(one.session.simulated)]
     but = request.GET.getlist("but")
-    context: dict[str, list[tuple[SessionEvent, datetime]]] = {"alarms": [], "ended": []}
-    for one in falls + stops:
+    parts: dict[str, list[tuple[SessionEvent, datetime]]] = {"falls": [], "stops": [], "ended": []}
+    for one in found:
+        is_fall = one.kind == Alarm.FALL
         is_own, is_open = str(one.session_id) in but, State(one.session.state) in OPEN_STATES
-        if not (is_own and is_open):
-            is_folded = bool(but) and not is_own and not is_open
-            row = (one, clinic_time(one.at, one.session.clinic))
-            context["ended" if is_folded else "alarms"].append(row)
+        if (is_own and is_open) or not (is_fall or is_counted(one.session.simulated)):
+            continue
+        is_folded = bool(but) and not is_own and not is_open
+        part = "ended" if is_folded else "falls" if is_fall else "stops"
+        parts[part].append((one, clinic_time(one.at, one.session.clinic)))
     stopped: list[int] = []
-    if falls:
+    if found:
         robots = Device.objects.visible_to(user).filter(kind=Device.Kind.ROBOT)
         stopped = list(robots.filter(station__robot_stopped=True).values_list("station", flat=True))
     seen = falls_just_seen(user, now) if not but else []
     told = [(one, clinic_time(one.at, one.session.clinic)) for one in seen]
-    return render(request, "sessions/alarms.html", context | {"seen": told, "stopped": stopped})
+    return render(request, "sessions/alarms.html", parts | {"seen": told, "stopped": stopped})
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -91,6 +91,15 @@ class Group:
         return say(self.hit_rate.count)
 
     @property
+    def lacks(self) -> str:
+        """What is missing for an interval; "" where it has one."""
+        if self.hit_rate is None or self.hit_rate.low is not None:
+            return ""
+        say = _say_patients if self.patients > 1 else _say_sessions
+        more = say(max(1, LEAST_FOR_INTERVAL - self.hit_rate.count))
+        return gettext("%(more)s more to compare") % {"more": more}
+
+    @property
     def size(self) -> str:
         """How many sessions of how many patients."""
         return f"{_say_sessions(self.sessions)}, {_say_patients(self.patients)}"

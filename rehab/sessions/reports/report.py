@@ -74,7 +74,7 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
         "answers": list_answers(user, session),
         "robot": _describe_robot(review.rows),
         "charts": [draw_chart(review.chart, size) for size in (PAPER, PHONE)],
-        "has_gain": review.chart["has_gain"],
+        "gains": review.chart["gains"],
         "last_time": _describe_last_time(user, session),
         "has_close": bool(review.figures["close"]),
         "unit": plan.measure.unit,

@@ -67,9 +67,7 @@ export function createStrideCharts({ state, show }) {
       show("of-twenty", describeLast(last));
       if (twenty)
         drawLastStrides(twenty, state.strides.slice(-LAST), LAST, performanceOf(state.strides, session), session.span);
-      // Where the last are a drawing of their own, the ring is of all.
-      const rate = twenty ? session.hit_rate : last.count ? last.hits / last.count : null;
-      drawHitRing(ring, rate, session.target.hit_rate);
+      drawHitRing(ring, last.count ? last.hits / last.count : null, session.target.hit_rate);
       describeRate(session, last);
     },
   };
