@@ -36,7 +36,8 @@ MEANS = """async () =>
   (await import("garry/monitor/strip")).runningMeans([2, 4, null, 6]).map((one) => one &&
     [one.mean, one.sd])"""
 
-# Whether the line about the goal is hidden: at a suggestion, once it is declined, at another one.
+# Whether the line about the goal is hidden: at a suggestion, once it is declined, at another one,
+# at one that is as good as the goal.
 KEPT = """async () => {
   const { createGoalCoach } = await import("garry/monitor/controls/goal_coach");
   const session = {
@@ -51,7 +52,7 @@ KEPT = """async () => {
   };
   const first = draw(3.7);
   press(null, { ...session, suggested_goal: 3.7 });
-  return [first, draw(3.7), draw(3.8)];
+  return [first, draw(3.7), draw(3.8), draw(3.95)];
 }"""
 
 
@@ -84,7 +85,7 @@ def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
     expect(strip).to_contain_text("W/kg")
     page.reload()  # what was walked before is plotted as well
     expect(strip.locator("circle.calm")).to_have_count(4)
-    assert page.evaluate(KEPT) == [False, True, False]
+    assert page.evaluate(KEPT) == [False, True, False, True]
     assert page.evaluate(MEANS) == [
         None,
         [3, pytest.approx(2**0.5)],

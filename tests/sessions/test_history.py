@@ -45,7 +45,9 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
     walked: list[Walked] = [2.1, 1.9, None, 2.4, (RIGHT, 7.0), 2.3]
     walked += [Change(ChangeKind.GOAL, 1.5), 2.3, 99.0]
     session = walk(patient, "positive", walked, phases=phases)
-    chart = read_json(detail(client, session), "session")
+    page = detail(client, session)
+    chart = read_json(page, "session")
+    assert "the patient saw 85 % of each value, so a step needed 1.76 W/kg" in words(page)
     stored = list(Step.everywhere.filter(session=session, side="left").order_by("number"))
     columns = chart["strides"]
     assert columns["number"] == [step.number for step in stored] == [1, 2, 3, 4, 6, 7, 8]

@@ -96,7 +96,7 @@ class Group:
         if self.hit_rate is None or self.hit_rate.low is not None:
             return ""
         say = _say_patients if self.patients > 1 else _say_sessions
-        more = say(max(1, LEAST_FOR_INTERVAL - self.hit_rate.count))
+        more = say(LEAST_FOR_INTERVAL - self.hit_rate.count)
         return gettext("%(more)s more to compare") % {"more": more}
 
     @property

@@ -5,6 +5,7 @@ import { percent } from "garry/shared/format";
 import { _, fill, number } from "garry/shared/language";
 import { update } from "garry/monitor/state";
 
+const WORTH_A_CHANGE = 0.02; // of the goal: less is no move of it (rehab/patients/caseload.py)
 const FIELDS = ["suggested_goal", "wanted_hit_rate", "is_strained", "baseline"];
 
 export function createGoalCoach({ show, onPress, change }) {
@@ -41,7 +42,8 @@ export function createGoalCoach({ show, onPress, change }) {
   }) {
     if (goal === null) declined = "";
     if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
-    if (goal === null || now === null || goal === now || declined === `${now} ${goal}`) return "";
+    if (goal === null || now === null || declined === `${now} ${goal}`) return "";
+    if (Math.abs(goal / now - 1) < WORTH_A_CHANGE) return "";
     const text =
       goal < now
         ? _("Lower the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.")
