@@ -177,7 +177,7 @@ def load_caseload(user: User, now: datetime) -> list[Case]:
     planned = Visit.objects.visible_to(user).filter(day__gte=today - COMING)
     for visit in planned.order_by("day", "at"):
         visits[visit.patient_id].append(visit)
-    opened = TrainingSession.objects.visible_to(user).filter(IS_OPEN, begun_today(now))
+    opened = TrainingSession.objects.visible_to(user).filter(counted(), IS_OPEN, begun_today(now))
     here = set(opened.values_list("patient", flat=True))
     cases = [
         _to_case(each, walks[each.pk], visits[each.pk], now, is_here=each.pk in here)

@@ -222,14 +222,14 @@ def change_session(
     async_to_sync(_order)(session.pk, ChangeOrder(kind, value, by))
 
 
-def acknowledge(session: TrainingSession, by: User) -> None:
-    """Acknowledge all alarms of a session; committed when this returns.
+def acknowledge(session: TrainingSession, kind: Alarm, by: User) -> None:
+    """Acknowledge the alarms of a kind of a session; committed when this returns.
 
     Raises NotStored and OwnedElsewhere as `change_session` does.
     """
     rows = SessionEvent.everywhere.filter(session=session, kind__in=ALARM_KINDS).order_by("pk")
-    for event in OpenAlarms(rows).events:
-        async_to_sync(_order)(session.pk, RemarkOrder(ACKNOWLEDGMENTS[Alarm(event.kind)], None, by))
+    if any(event.kind == kind for event in OpenAlarms(rows).events):
+        async_to_sync(_order)(session.pk, RemarkOrder(ACKNOWLEDGMENTS[kind], None, by))
 
 
 def stop_robot(session: TrainingSession, by: User) -> None:

@@ -69,7 +69,7 @@ def test_the_preview_of_a_shared_board_says_why_nobody_is_on_it(world, patient):
     alone = given | {"among": "self", "min_valid_strides": 10_000, "aggregation": "each"}
     page = world.pt.get(address, alone).content.decode()
     assert "An example. Walks of fewer than" in page
-    assert "Example 3" in page
+    assert "Session 3" in page
     Patient.everywhere.filter(pk=patient.pk).update(boards=BoardsConsent.CLINIC, simulated=True)
     walk(patient, "binary", STEPS, now=NOW - timedelta(hours=2))
     page = world.pt.get(address, given).content.decode()

@@ -41,7 +41,7 @@ MEANS = """async () =>
 KEPT = """async () => {
   const { createGoalCoach } = await import("garry/monitor/controls/goal_coach");
   const session = {
-    goal: 3.9, unit: "W/kg", wanted_hit_rate: 0.6, goal_adaptation: "suggest", phase: {},
+    goal: 3.9, span: 1, unit: "W/kg", wanted_hit_rate: 0.6, goal_adaptation: "suggest", phase: {},
   };
   let press;
   const onPress = (selector, act) => selector === "[data-keep]" && (press = act);

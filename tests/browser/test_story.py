@@ -131,7 +131,7 @@ def end(story: Story, server: Server) -> None:
         expect(you.locator(".value")).to_have_text(f"{metric['value']:.0f}".replace("-", "−"))
     expect(page.locator(f".you[data-session='{story.session}'] >> visible=true")).to_have_count(1)
     page.tap("text=Done")
-    expect(page.locator(".primary.huge")).to_contain_text("Like last time")
+    expect(page.locator(".huge")).to_contain_text("Like last time")
 
 
 @pytest.mark.timeout(300)

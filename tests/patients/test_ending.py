@@ -58,7 +58,7 @@ def test_today_stands_beside_last_time(world, patient):
     assert "You walked" in words
     assert "Today 7 of 10 Last time 4 of 10" in words
     assert "Last time 4 of 10 More often at the goal than last time." in words
-    assert "Most at the goal 5 steps in a row" in words
+    assert "Most in a row 5 steps at the goal" in words
     assert f"{day:%A} {day.day} {day:%B}, 14:15" in words
     assert "More often at the goal than last time." in words
 
@@ -103,7 +103,7 @@ def test_a_paired_tablet_tells_the_patient_the_same(world, patient):
     plan_visit(patient, (NOW + timedelta(days=7)).date(), time(14, 15))
     words = read(world, session, tablet_at(station))
     assert "Today 7 of 10 Last time 4 of 10" in words
-    assert "Longest so far 7 steps in a row" in words
+    assert "Most in a row so far 7 steps at the goal" in words
     assert "Next visit" in words
 
 
@@ -111,10 +111,10 @@ def test_a_longer_row_than_ever_is_told_as_one(world, patient):
     walk(patient, "binary", [HIT] * 4 + [MISS], days_ago=9)
     walk(patient, "negative", [HIT] * 3 + [MISS] * 9, days_ago=7)
     words = read(world, walk(patient, "positive", [HIT] * 4 + [MISS], days_ago=5))
-    assert "4 steps in a row" in words
-    assert "Longest so far" not in words
+    assert "4 steps at the goal" in words
+    assert "so far" not in words
     words = read(world, walk(patient, "positive", [HIT] * 6 + [MISS]))
-    assert "Longest so far 6 steps in a row" in words
+    assert "Most in a row so far 6 steps at the goal" in words
 
 
 @pytest.mark.parametrize("valence", list(VALENCES))

@@ -204,9 +204,10 @@ for name, code, side, at in (
 SECOND = """
 from rehab.people.models import Patient
 from rehab.stations.models import Station
+from rehab.training.steps import Side
 from tests.support.walks import make_session
 joon = Patient.everywhere.get(code="K7-211")
-make_session(joon, station=Station.everywhere.get(name="Treadmill 2"))
+make_session(joon, trained_side=Side.RIGHT, station=Station.everywhere.get(name="Treadmill 2"))
 """
 
 

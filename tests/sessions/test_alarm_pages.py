@@ -56,7 +56,7 @@ def test_an_open_alarm_is_on_the_pages_of_its_clinic_alone(transactional_db, wor
     assert "Iris" not in seen(pt, station=world.session.station_id or 0)  # it was at none
     assert "Iris" not in seen(client_of(build_world("oak")))
     assert "fell" in seen(pt, "start")
-    answer = pt.post(reverse("acknowledge-alarms", args=[session.pk]))
+    answer = pt.post(reverse("acknowledge-alarms", args=[session.pk]), {"kind": "fall"})
     assert (answer.status_code, answer.content) == (204, b"")
     assert "fell" not in (told := seen(pt))
     assert f"{world.people[Role.PT]} takes care of Iris’s fall, {NOW:%H:%M}." in told
@@ -116,9 +116,23 @@ def test_each_page_of_a_patient_asks_for_alarms_where_they_are(world, session):
 def test_another_clinic_acknowledges_nothing(world, session):
     note(session, "fall")
     stranger = client_of(build_world("oak"))
-    answer = stranger.post(reverse("acknowledge-alarms", args=[session.pk]))
+    answer = stranger.post(reverse("acknowledge-alarms", args=[session.pk]), {"kind": "fall"})
     assert answer.status_code == 404
     assert "Iris fell, " in seen(client_of(world))
+
+
+def test_who_has_seen_a_stop_takes_care_of_no_fall(transactional_db, world, session):
+    note(session, "robot_stop", data={"reason": "bump"})
+    note(session, "fall")
+    pt = client_of(world)
+    address = reverse("acknowledge-alarms", args=[session.pk])
+    assert pt.post(address, {"kind": "robot_stop"}).status_code == 204
+    told = seen(pt)
+    assert "Iris fell, " in told
+    assert "stopped by itself" not in told
+    assert pt.post(address).status_code == 400
+    assert pt.post(address, {"kind": "fall"}).status_code == 204
+    assert "Iris fell, " not in seen(pt)
 
 
 def test_list_report_and_list_of_incidents_tell_it_afterwards(world, session):
@@ -195,16 +209,20 @@ def test_what_was_only_simulated_is_listed_and_not_counted(world, session):
     note(session, "fall")
     listed = words(seen(client_of(world), "incidents"))
     assert "Falls 0" in listed
-    assert "· simulated" in listed
-    assert "What was simulated is listed below, and not counted." in listed
+    assert "Nothing went wrong in " in listed
+    assert listed.index("Simulated, not counted") < listed.index("Iris fell.")
 
 
 def test_falls_come_first_and_a_simulated_robot_alarms_no_other_page(world, session):
     note(session, "fall")
     other = walk(make_patient(world.clinic, "Tom", code="K-2"), "positive", [HIT])
     note(other, "robot_stop", data={"reason": "bump"})
-    told = seen(client_of(world))
+    pt = client_of(world)
+    told = seen(pt)
     assert told.index("Iris fell, ") < told.index("The robot of Tom stopped by itself, ")
+    assert "moves again" not in told  # it may, since the session has ended
+    TrainingSession.everywhere.filter(pk=other.pk).update(state="paused")
+    assert "It moves again only when you let it, on Tom’s page." in words(seen(pt))
     TrainingSession.everywhere.filter(pk__in=[session.pk, other.pk]).update(simulated=True)
     told = seen(client_of(world))
     assert "Iris fell, " in told

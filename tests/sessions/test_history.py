@@ -47,7 +47,8 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
     session = walk(patient, "positive", walked, phases=phases)
     page = detail(client, session)
     chart = read_json(page, "session")
-    assert "the patient saw 85 % of each value, so a step needed 1.76 W/kg" in words(page)
+    needed = "a step needed 1.76–2.35 W/kg for the goal of 1.50–2.00 W/kg."
+    assert f"Training: the patient saw 85 % of each value, so {needed}" in words(page)
     stored = list(Step.everywhere.filter(session=session, side="left").order_by("number"))
     columns = chart["strides"]
     assert columns["number"] == [step.number for step in stored] == [1, 2, 3, 4, 6, 7, 8]

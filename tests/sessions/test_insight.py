@@ -53,10 +53,10 @@ def test_several_patients_are_compared_by_their_means(world):
     (group,) = compare(rows, "type")
     assert group.hit_rate.mean == pytest.approx((0.3 + 0.9) / 2)
     assert group.unit == "2 patients"
-    assert group.lacks == "1 patient more to compare"
+    assert group.lacks == "needs 1 more patient"
     ana, mine = compare(rows, "patient")
     assert ana.unit == "3 sessions"
-    assert (ana.lacks, mine.lacks) == ("", "1 session more to compare")
+    assert (ana.lacks, mine.lacks) == ("", "needs 1 more session")
     changed = [*rows, walked_like(world.session, changed_to="binary", hit_rate=1.0)]
     types = [(one.label, one.valence) for one in compare(changed, "type")]
     assert types == [("Positive", "positive"), ("changed during the session", "")]

@@ -118,11 +118,12 @@ def with_example(board: Leaderboard, panel: BoardPanel) -> BoardPanel:
     if panel.rows or panel.total:
         return panel
     shows_ranks = board.show_ranks and not panel.kept
+    words = gettext("Session %(n)s") if board.is_own else gettext("Example %(n)s")
     rows = [
         PanelRow(
             value=format_figure(board.metric, figure),
             bar=figure,
-            title=gettext("Example %(n)s") % {"n": n},
+            title=words % {"n": n},
             rank=n if shows_ranks else None,
             points_at_stake="100" if panel.kept else "",
             you=n == 2,

@@ -19,8 +19,7 @@ from rehab.patients.pages.first_steps import list_first_steps
 from rehab.patients.screen_check import LETTERS, propose
 from rehab.patients.visits import QUICK_VISIT_DAYS, Progress, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
-from rehab.people.consent.models import Purpose
-from rehab.people.consent.services import current_text, unasked_purposes
+from rehab.people.consent.services import current_text, is_care_allowed, unasked_purposes
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.people.simulated import counted
@@ -207,7 +206,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         ],
         "at": suggested_time(user, patient, lists["now"]),
         "not_asked": not_asked,
-        "asks_care": Purpose.CARE in not_asked,
+        "asks_care": not is_care_allowed(patient),
     }
     return render(request, "patients/start.html", context)
 

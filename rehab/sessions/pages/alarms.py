@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
@@ -42,7 +43,11 @@ def show_alarms(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     found = open_alarms(user, now, int(station) if station.isdecimal() else None)
     but = request.GET.getlist("but")
-    parts: dict[str, list[tuple[SessionEvent, datetime]]] = {"falls": [], "stops": [], "ended": []}
+    parts: dict[str, list[tuple[SessionEvent, datetime, bool]]] = {
+        "falls": [],
+        "stops": [],
+        "ended": [],
+    }
     for one in found:
         is_fall = one.kind == Alarm.FALL
         is_own, is_open = str(one.session_id) in but, State(one.session.state) in OPEN_STATES
@@ -50,7 +55,7 @@ def show_alarms(request: HttpRequest) -> HttpResponse:
             continue
         is_folded = bool(but) and not is_own and not is_open
         part = "ended" if is_folded else "falls" if is_fall else "stops"
-        parts[part].append((one, clinic_time(one.at, one.session.clinic)))
+        parts[part].append((one, clinic_time(one.at, one.session.clinic), is_open))
     stopped: list[int] = []
     if found:
         robots = Device.objects.visible_to(user).filter(kind=Device.Kind.ROBOT)
@@ -63,11 +68,13 @@ def show_alarms(request: HttpRequest) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
 def acknowledge_alarms(request: HttpRequest, session_id: int) -> HttpResponse:
-    """Note that a therapist has seen a session's alarms."""
-    user = user_of(request)
+    """Note that a therapist has seen a session's alarms of a ``kind``."""
+    user, kind = user_of(request), request.POST.get("kind", "")
+    if kind not in {one.value for one in Alarm}:
+        return HttpResponse(_("Reload the page, then tap again."), status=400)
     session = get_object_or_404(TrainingSession.objects.visible_to(user), pk=session_id)
     try:
-        acknowledge(session, user)
+        acknowledge(session, Alarm(kind), user)
     except NotStored as problem:
         return HttpResponse(str(problem), status=503)
     return HttpResponse(status=204)
@@ -88,13 +95,18 @@ def list_incidents(request: HttpRequest) -> HttpResponse:
     walked = TrainingSession.objects.visible_to(user).filter(counted(), active_s__gt=0)
     sessions = walked.filter(created_at__gte=since).count()
     context = {
-        "entries": entries[:MAX_INCIDENTS],
+        "lists": [
+            (_("Newest first"), [one for one in entries if not one.is_simulated][:MAX_INCIDENTS]),
+            (
+                _("Simulated, not counted"),
+                [one for one in entries if one.is_simulated][:MAX_INCIDENTS],
+            ),
+        ],
         "now": clinic_time(now, clinic),
         "since": clinic_time(since, clinic),
         "sessions": sessions,
         "weeks": weeks,
         "periods": PERIODS,
         "figures": count_adverse(entries),
-        "has_uncounted": any(one.is_one and not one.is_counted for one in entries),
     }
     return render(request, "sessions/incidents.html", context)

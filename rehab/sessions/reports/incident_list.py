@@ -52,9 +52,9 @@ class Entry:
         return DRAWN[self.kind]
 
     @property
-    def is_counted(self) -> bool:
-        """Whether figures count it."""
-        return self.is_one and is_counted(self.session.simulated)
+    def is_simulated(self) -> bool:
+        """Whether it was of a session that no figure counts."""
+        return not is_counted(self.session.simulated)
 
 
 def list_adverse(user: User, since: datetime) -> list[Entry]:
@@ -66,7 +66,7 @@ def list_adverse(user: User, since: datetime) -> list[Entry]:
 
 def count_adverse(entries: Iterable[Entry]) -> list[tuple[str, int]]:
     """Return how often each thing went wrong in sessions that count: falls, near falls, others."""
-    found = Counter(one.kind for one in entries if one.is_counted)
+    found = Counter(one.kind for one in entries if one.is_one and not one.is_simulated)
     named = {
         Alarm.FALL.value: gettext("Falls"),
         Remark.NEAR_FALL.value: gettext("Near falls"),

@@ -95,9 +95,13 @@ class Group:
         """What is missing for an interval; "" where it has one."""
         if self.hit_rate is None or self.hit_rate.low is not None:
             return ""
-        say = _say_patients if self.patients > 1 else _say_sessions
-        more = say(LEAST_FOR_INTERVAL - self.hit_rate.count)
-        return gettext("%(more)s more to compare") % {"more": more}
+        count = LEAST_FOR_INTERVAL - self.hit_rate.count
+        words = (
+            ngettext("needs %(count)s more patient", "needs %(count)s more patients", count)
+            if self.patients > 1
+            else ngettext("needs %(count)s more session", "needs %(count)s more sessions", count)
+        )
+        return words % {"count": count}
 
     @property
     def size(self) -> str:

@@ -136,8 +136,8 @@ def _find_facts(
     row = rows.filter(session=session).values_list("value", flat=True).first()
     if rewards and row and row > 1:
         earlier = rows.filter(session__in=before.values("pk")).aggregate(most=Max("value"))["most"]
-        words = ngettext("%(count)s step in a row", "%(count)s steps in a row", round(row))
-        label = _("Longest so far") if earlier and row > earlier else _("Most at the goal")
+        words = ngettext("%(count)s step at the goal", "%(count)s steps at the goal", round(row))
+        label = _("Most in a row so far") if earlier and row > earlier else _("Most in a row")
         facts.append((label, words % {"count": format_number(row, 0)}))
     count = before.count() + 1
     if is_milestone(count):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
@@ -13,7 +14,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.sessions.control_text import describe_change
-from rehab.sessions.formatting import clinic_time, format_quantity, format_rate
+from rehab.sessions.formatting import NBSP, clinic_time, format_number, format_rate
 from rehab.sessions.log import FallSeverity, PartEntry, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.log_fold import fold_log
 from rehab.sessions.models import TrainingSession
@@ -113,17 +114,21 @@ def _valence_label(slug: Any) -> str:
     return gettext(VALENCES[slug].label) if slug in VALENCES else str(slug or "")
 
 
-def _describe_gain(plan: SessionPlan, phase: int, gain: float, goal: float) -> str:
-    """Return what a step of a phase needed to be shown as its goal."""
-    unit = plan.measure.unit
+def _describe_gain(plan: SessionPlan, phase: int, gain: float, goals: set[float]) -> str:
+    """Return what steps of a phase needed to be shown as its goals."""
+    ends = sorted({min(goals), max(goals)})
+
+    def name(values: Iterable[float]) -> str:
+        return f"{'–'.join(map(format_number, values))}{NBSP}{plan.measure.unit}"
+
     return gettext(
         "%(phase)s: the patient saw %(gain)s of each value, so a step needed %(needed)s for the "
         "goal of %(goal)s."
     ) % {
         "phase": gettext(plan.phases[phase].name),
         "gain": format_rate(gain),
-        "needed": format_quantity(goal / gain, unit),
-        "goal": format_quantity(goal, unit),
+        "needed": name(goal / gain for goal in ends),
+        "goal": name(ends),
     }
 
 
@@ -146,12 +151,12 @@ def stride_chart(
     columns: dict[str, list[Any]] = {
         name: [] for name in ("number", "value", "goal", "hit", "close", "phase", "why")
     }
-    gains: dict[int, tuple[float, float]] = {}  # and goals, of phases that show other values
+    gains: defaultdict[tuple[int, float], set[float]] = defaultdict(set)  # their goals, by phase
     for number, valid, value, gain, goal, hit, close, phase, reasons in steps.iterator():
         measured, needed = value if valid else None, goal and goal / gain
         row = (number, _round(measured), _round(needed), hit, close, phase, ", ".join(reasons))
-        if gain != 1 and goal:
-            gains[phase] = (gain, goal)
+        if gain != 1 and goal and plan.phases[phase].feedback:
+            gains[phase, gain].add(goal)
         for column, entry in zip(columns.values(), row, strict=True):
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
@@ -161,7 +166,7 @@ def stride_chart(
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
-        "gains": [_describe_gain(plan, phase, *found) for phase, found in gains.items()],
+        "gains": [_describe_gain(plan, *where, goals) for where, goals in gains.items()],
         "strides": columns,
         "phases": [
             {

@@ -4,7 +4,7 @@
 //   describe(session, page)   the sentence; "" where it is not so. A fall has lines: who, where, what is so
 //   asks                      the template of a question that its banner asks
 //   action, undo              functions (session, page) that return what is offered: [label, act, how long]
-//   isRed                     somebody has to acknowledge it; everything else is amber
+//   isRed                     somebody fell; everything else is amber
 //   isCalm                    no alarm: it is told, and makes no sound
 
 import { _, fill } from "garry/shared/language";

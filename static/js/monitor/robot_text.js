@@ -21,7 +21,7 @@ const REASONS = {
   not_running: _("the session does not run"),
   unwatched: _("no therapist's page is open"),
   base_silent: _("its wheels do not answer"),
-  order_lapsed: _("what it was told came too late"),
+  order_lapsed: _("its orders came too late"),
   battery_low: _("its battery is low"),
   battery_empty: _("its battery is empty"),
   charging: _("it is charging"),

@@ -5,7 +5,7 @@ import { percent } from "garry/shared/format";
 import { _, fill, number } from "garry/shared/language";
 import { update } from "garry/monitor/state";
 
-const WORTH_A_CHANGE = 0.02; // of the goal: less is no move of it (rehab/patients/caseload.py)
+const WORTH_A_CHANGE = 0.02; // of the scale below the goal: less is within what strides vary by
 const FIELDS = ["suggested_goal", "wanted_hit_rate", "is_strained", "baseline"];
 
 export function createGoalCoach({ show, onPress, change }) {
@@ -39,11 +39,12 @@ export function createGoalCoach({ show, onPress, change }) {
     is_strained: strained,
     unit,
     goal: now,
+    span,
   }) {
     if (goal === null) declined = "";
     if (goal === null && strained) return _("The heart rate is near its limit: no harder goal is suggested.");
     if (goal === null || now === null || declined === `${now} ${goal}`) return "";
-    if (Math.abs(goal / now - 1) < WORTH_A_CHANGE) return "";
+    if (Math.abs(goal / now - 1) < WORTH_A_CHANGE * span) return "";
     const text =
       goal < now
         ? _("Lower the goal from %(now)s to %(goal)s %(unit)s? Then about %(hits)s of steps reach it.")
