@@ -155,6 +155,8 @@ function describePause({ state, pause_reason: reason, rest_s: rest, fall_seen: s
   return reason === "therapist" ? why : `${why} ${_("Resume when ready.")}`;
 }
 
+const letMove = [_("Let it move"), ({ robot }) => robot.order("arm")];
+
 export const CAUSES = [
   {
     cause: "server",
@@ -184,7 +186,8 @@ export const CAUSES = [
     cause: "robot_stop",
     hides: ["robot"],
     describe: describeOwnStop,
-    action: () => [_("I have seen it"), ({ remark }) => remark("stop_acknowledged")],
+    action: (session, page) => page.robot.alarm && !whyHeld(session) && letMove,
+    undo: () => [_("I have seen it"), ({ remark }) => remark("stop_acknowledged")],
   },
   {
     cause: "storage",
@@ -209,7 +212,7 @@ export const CAUSES = [
     hides: [],
     describe: describeRobot,
     isOwn: ({ robot }) => robot.wasStoppedHere,
-    action: ({ presence }) => presence.robot && [_("Let it move"), ({ robot }) => robot.order("arm")],
+    action: ({ presence }) => presence.robot && letMove,
   },
   { cause: "why", hides: [], describe: describePause, isCalm: true },
 ];
