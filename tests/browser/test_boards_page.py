@@ -84,7 +84,7 @@ def build(pt: Page, names: list[str]) -> None:
     """Build two boards; the preview follows every choice and says what cannot be."""
     seen = pt.frame_locator(".preview iframe")
     example = seen.locator("li .day")  # as all walked fewer than 100 steps
-    expect(example).to_have_text(["Example 1", "You Example 2", "Example 3"])
+    expect(example).to_have_text(["Session 1", "You Session 2", "Session 3"])
     expect(pt.locator(".field-group")).to_be_hidden()
     pt.fill("#id_name", "Steps at the goal")
     expect(seen.locator("h1")).to_have_text("Steps at the goal")
