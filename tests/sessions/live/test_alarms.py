@@ -6,6 +6,7 @@ from typing import Any
 
 from asgiref.sync import ThreadSensitiveContext, sync_to_async
 
+from rehab.sessions.alarms import Alarm
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import acknowledge
 from tests.support.callers import Page, change
@@ -82,7 +83,7 @@ async def test_no_other_session_of_who_fell_starts_before_that(place, sourced, r
     refused = await waiting.change("start")
     assert "take care of the fall: its button" in refused["message"]
     async with ThreadSensitiveContext():
-        await sync_to_async(acknowledge)(fallen, place.pt)
+        await sync_to_async(acknowledge)(fallen, Alarm.FALL, place.pt)
     assert (await waiting.change("start"))["type"] == "done"
 
 
@@ -156,7 +157,7 @@ async def test_an_alarm_outlives_its_session_and_is_acknowledged_from_a_plain_pa
     await until_open(monitor, "fall")
     await change(session, "finish")
     async with ThreadSensitiveContext():
-        await sync_to_async(acknowledge)(session, place.pt)
+        await sync_to_async(acknowledge)(session, Alarm.FALL, place.pt)
     kinds = SessionEvent.everywhere.filter(session=session).order_by("pk")
     assert [kind async for kind in kinds.values_list("kind", flat=True)] == [
         "start",
