@@ -84,8 +84,8 @@ class Case:
 
     @property
     def needs_visit(self) -> bool:
-        """Whether somebody is overdue without a visit to come: who is late today may yet come."""
-        return Flag.DUE in self.flags and self.next_visit is None
+        """Whether no visit is to come: who is late today may yet come."""
+        return self.next_visit is None
 
     @property
     def goals(self) -> str:

@@ -36,6 +36,7 @@ export function createReadiness(robot) {
         const item = document.createElement("li");
         item.className = "badge";
         item.classList.toggle("warn", sign === "!");
+        item.classList.toggle("free", sign === "–");
         item.append(cure ? openBeside(cure, `${sign} ${text}`) : `${sign} ${text}`);
         return item;
       });

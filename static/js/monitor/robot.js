@@ -166,7 +166,7 @@ export class RobotPanel {
     show("no-robot", isAbsent ? _("No robot here") : "");
     show("robot-stop", this.isStopped ? _("Robot stopped") : _("Stop robot"));
     this.#button("stop").hidden = isAbsent;
-    this.#button("stop").classList.toggle("done", this.isStopped);
+    this.#button("stop").classList.toggle("done", this.isStopped || !this.isHere);
     this.#placing.show(this.#isPlaceable, this.#status?.homing != null);
     show("robot-homing", this.#isPlaceable ? describeHoming(this.#status.homing) : "");
     if (!this.#placing.isHeld) this.#drawWords(); // a button that is held stays under its finger
