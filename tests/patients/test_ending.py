@@ -112,7 +112,7 @@ def test_a_longer_row_than_ever_is_told_as_one(world, patient):
     walk(patient, "negative", [HIT] * 3 + [MISS] * 9, days_ago=7)
     words = read(world, walk(patient, "positive", [HIT] * 4 + [MISS], days_ago=5))
     assert "4 steps at the goal" in words
-    assert "so far" not in words
+    assert "in a row so far" not in words
     words = read(world, walk(patient, "positive", [HIT] * 6 + [MISS]))
     assert "Most in a row so far 6 steps at the goal" in words
 

@@ -70,9 +70,9 @@ def show_alarms(request: HttpRequest) -> HttpResponse:
 def acknowledge_alarms(request: HttpRequest, session_id: int) -> HttpResponse:
     """Note that a therapist has seen a session's alarms of a ``kind``."""
     user, kind = user_of(request), request.POST.get("kind", "")
+    session = get_object_or_404(TrainingSession.objects.visible_to(user), pk=session_id)
     if kind not in {one.value for one in Alarm}:
         return HttpResponse(_("Reload the page, then tap again."), status=400)
-    session = get_object_or_404(TrainingSession.objects.visible_to(user), pk=session_id)
     try:
         acknowledge(session, Alarm(kind), user)
     except NotStored as problem:
