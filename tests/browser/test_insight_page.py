@@ -56,7 +56,10 @@ def rows(page: Page) -> dict[str, list[str]]:
     """Return the table's rows: how many sessions and patients, then its cells as text, by label."""
     found = {}
     for row in page.locator("tbody tr").all():
-        label, size = row.locator("th").inner_text().strip().splitlines()
+        named, size = (
+            " ".join(row.locator(part).inner_text().split()) for part in ("th", "th small")
+        )
+        label = named.removesuffix(size).strip()
         cells = [" ".join(cell.inner_text().split()) for cell in row.locator("td").all()]
         found[label] = [*(each.split()[0] for each in size.split(", ")), *cells]
     return found

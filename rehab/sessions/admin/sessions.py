@@ -160,15 +160,16 @@ class TrainingSessionAdmin(ScopedAdmin):
     def day(self, session: TrainingSession) -> str:
         """The day, below it the time and the place, and what is unusual about it."""
         below = (self.start_time(session), session.station.name if session.station else None)
+        state = format_state(session.state)
         unusual = (
-            format_state(session.state),
             gettext("simulated") if session.simulated else "",
             gettext("left out of figures") if session.excluded else "",
         )
         return format_html(
-            '{} <br><span class="muted s">{}</span>{}',
+            '{} <br><span class="muted s">{}</span>{}{}',
             self.date(session),
             " · ".join(filter(None, below)),
+            format_html(' <span class="badge free">{}</span>', state) if state else "",
             format_html_join(
                 "", ' <span class="badge warn">{}</span>', ((word,) for word in unusual if word)
             ),
