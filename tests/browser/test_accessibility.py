@@ -128,17 +128,24 @@ def open_page(context: BrowserContext, path: str, size: str) -> Page:
     return page
 
 
+def to_the_foot(page: Page) -> None:
+    """Scroll to where a page's buttons, which stay in sight, cover nothing."""
+    page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
+
+
 @pytest.mark.parametrize("path", [*PT_PAGES, *ADMIN_PAGES])
 def test_pages_of_the_staff(context: BrowserContext, places: dict[str, str], path: str) -> None:
     """Light on a laptop, then dark on a phone: the same page, recolored and laid out anew."""
     page = open_page(context, path.format(**places), "laptop")
     page.wait_for_load_state("networkidle")
     assert "/sign-in/" not in page.url
+    to_the_foot(page)
     check(page)
     width, height = SIZES["phone"]
     page.set_viewport_size({"width": width, "height": height})
     if page.locator("html[data-pt]").count():  # a worn phone and a patient's screen have one look
         go_dark(page)
+    to_the_foot(page)
     check(page)
 
 
