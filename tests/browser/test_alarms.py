@@ -341,7 +341,8 @@ def test_the_cause_comes_first_and_has_its_button(
         begin(monitor, feet)
         robot.send(json.dumps({"type": "report", "report": {"kind": "stop", "reason": "bump"}}))
         first = monitor.locator("[data-alarm]").first
-        expect(first).to_contain_text("it bumped into something")
+        expect(first).to_contain_text("it bumped into something. Clear its way.")
+        expect(first.get_by_role("button", name="Let it move")).to_be_visible()
         expect(monitor.locator("[data-alarm]")).to_have_count(1)
         first.get_by_role("button", name="I have seen it").click()
         expect(first).to_contain_text(

@@ -94,7 +94,7 @@ function describeOwnStop(session, { robot }) {
   const text = robot.isSimulated
     ? _("The simulated robot stopped by itself, %(time)s: %(why)s.")
     : _("The robot stopped by itself, %(time)s: %(why)s.");
-  return fill(text, values);
+  return `${fill(text, values)} ${robot.alarm && robot.cure}`.trim(); // before it is let move, from the banner too
 }
 
 function describeRestart({ state, pause_reason: reason }) {

@@ -269,7 +269,12 @@ export class RobotPanel {
     if (!this.#isConnected || this.#isRecovering) return "";
     if (!this.isStopped && this.#status?.state !== "stopped") return "";
     const why = fill(_("The robot is standing still: %(why)s."), { why: describeReason(this.#stopReason) });
-    return [why, this.#cureOf(this.#stopReason)].filter(Boolean).join(" ");
+    return [why, this.cure].filter(Boolean).join(" ");
+  }
+
+  // Return what to do before it may move again; "" where nothing is known.
+  get cure() {
+    return this.#cureOf(this.#stopReason);
   }
 
   get isSimulated() {
